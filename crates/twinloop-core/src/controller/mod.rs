@@ -1,0 +1,98 @@
+//! Controllers: families with a bounded parameter vector, one implementation for the search and for the real run.
+
+mod mixer;
+mod parameters;
+mod pid;
+mod single;
+
+pub use mixer::Mixer;
+pub use parameters::Parameters;
+pub use pid::{Axis, Pid};
+pub use single::Controller;
+
+use crate::error::{Result, invalid};
+use crate::lanes::Vector;
+
+/// A control law. Parameters, memory and signals are lanes: several controllers of the family at once.
+pub trait Law {
+    /// Lanes of memory that a controller carries from step to step, zero at the start of a run.
+    fn memory(&self) -> usize;
+
+    /// Writes the command (n_u) for a state (n_x) and a target (n_x), and moves the memory on by one period.
+    fn command<V: Vector>(
+        &self,
+        parameters: &[V],
+        memory: &mut [V],
+        state: &[V],
+        target: &[V],
+        command: &mut [V],
+    );
+}
+
+/// The families there are. A new one is a file here and a line in each match.
+#[derive(Clone, Debug, PartialEq)]
+enum AnyLaw {
+    Pid(Pid),
+}
+
+/// A law, the box of its parameters and the sizes of its signals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Family {
+    law: AnyLaw,
+    parameters: Parameters,
+    states: usize,
+    commands: usize,
+}
+
+impl Family {
+    /// The family of the controllers of one [`Pid`].
+    pub fn pid(pid: Pid, parameters: Parameters, states: usize) -> Result<Self> {
+        let expected = 3 * pid.axes.len();
+        if parameters.len() != expected {
+            return invalid(format!(
+                "controller: expected bounds for {expected} gains (K_P, K_I, K_D of each axis), found {}",
+                parameters.len()
+            ));
+        }
+        pid.check(states)?;
+        let commands = pid.output.commands();
+        Ok(Self { law: AnyLaw::Pid(pid), parameters, states, commands })
+    }
+
+    /// The box of the parameters.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Number of states that the law reads, n_x.
+    pub fn states(&self) -> usize {
+        self.states
+    }
+
+    /// Number of commands that the law writes, n_u.
+    pub fn commands(&self) -> usize {
+        self.commands
+    }
+}
+
+impl Law for Family {
+    fn memory(&self) -> usize {
+        match &self.law {
+            AnyLaw::Pid(pid) => pid.memory(),
+        }
+    }
+
+    #[inline(always)]
+    fn command<V: Vector>(
+        &self,
+        parameters: &[V],
+        memory: &mut [V],
+        state: &[V],
+        target: &[V],
+        command: &mut [V],
+    ) {
+        match &self.law {
+            AnyLaw::Pid(pid) => pid.command(parameters, memory, state, target, command),
+        }
+    }
+}

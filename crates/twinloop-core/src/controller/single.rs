@@ -1,0 +1,59 @@
+//! One controller of a family with its memory, as it runs on a real system.
+
+use std::sync::Arc;
+
+use super::{Family, Law};
+use crate::error::{Result, invalid};
+use crate::lanes::{Scalar, Vector};
+
+/// Parameters and memory; the law is the family's, the same that the search runs on lanes.
+pub struct Controller {
+    family: Arc<Family>,
+    parameters: Vec<Scalar>,
+    memory: Vec<Scalar>,
+}
+
+impl Controller {
+    /// A controller at the start of a run.
+    pub fn new(family: Arc<Family>, parameters: Vec<f64>) -> Result<Self> {
+        let expected = family.parameters().len();
+        if parameters.len() != expected || !parameters.iter().all(|x| x.is_finite()) {
+            return invalid(format!(
+                "controller: expected {expected} finite parameters, found {parameters:?}"
+            ));
+        }
+        let memory = vec![Scalar::splat(0.0); family.memory()];
+        Ok(Self { parameters: parameters.into_iter().map(Scalar::splat).collect(), memory, family })
+    }
+
+    /// The parameter vector (size).
+    pub fn parameters(&self) -> impl Iterator<Item = f64> {
+        self.parameters.iter().map(|lane| lane.lane(0))
+    }
+
+    /// Back to the start of a run.
+    pub fn reset(&mut self) {
+        self.memory.fill(Scalar::splat(0.0));
+    }
+
+    /// The command (n_u) for a state and a target (n_x); to be called once a period.
+    pub fn command(&mut self, state: &[f64], target: &[f64]) -> Result<Vec<f64>> {
+        let expected = self.family.states();
+        if state.len() != expected || target.len() != expected {
+            let (state, target) = (state.len(), target.len());
+            return invalid(format!(
+                "controller: expected {expected} states and targets, found {state} and {target}"
+            ));
+        }
+        if !state.iter().chain(target).all(|x| x.is_finite()) {
+            return invalid(
+                "controller: expected finite states and targets, found NaN or an infinite one; stop the run",
+            );
+        }
+        let lanes =
+            |values: &[f64]| values.iter().map(|&value| Scalar::splat(value)).collect::<Vec<Scalar>>();
+        let mut command = vec![Scalar::splat(0.0); self.family.commands()];
+        self.family.command(&self.parameters, &mut self.memory, &lanes(state), &lanes(target), &mut command);
+        Ok(command.iter().map(|lane| lane.lane(0)).collect())
+    }
+}

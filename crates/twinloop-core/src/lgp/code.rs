@@ -1,0 +1,119 @@
+//! Code: a program without its introns, ready to run on lanes by an interpreter.
+
+use super::instruction::Operand;
+use super::interpreter::{Step, interpret};
+use super::program::Program;
+use crate::lanes::Vector;
+
+/// The effective part of a program. Two programs with equal code are the same function, bit for bit.
+#[derive(Clone, Debug)]
+pub struct Code {
+    steps: Vec<Step>,
+    constants: Vec<f64>,
+    registers: usize,
+    /// Registers that must be set to 0 before a run.
+    zeroed: Vec<u16>,
+    /// Inputs that the outputs depend on.
+    inputs: Vec<u16>,
+    outputs: std::ops::Range<usize>,
+}
+
+impl PartialEq for Code {
+    fn eq(&self, other: &Self) -> bool {
+        // Bits, not values: 0.0 and -0.0 are different functions.
+        let bits = |code: &Self| code.constants.iter().map(|c| c.to_bits()).collect::<Vec<_>>();
+        self.steps == other.steps
+            && self.outputs == other.outputs
+            && self.zeroed == other.zeroed
+            && self.inputs == other.inputs
+            && bits(self) == bits(other)
+    }
+}
+
+/// The registers of a run, as wide as a vector, constants behind them.
+pub struct Bank<V>(Vec<V>);
+
+/// Where inputs come from. A trait and not a closure, because only a named function can be made to be inlined.
+pub trait Inputs<V> {
+    /// The `i`-th input.
+    fn input(&self, i: usize) -> V;
+}
+
+impl<V: Vector> Inputs<V> for Vec<V> {
+    #[inline(always)]
+    fn input(&self, i: usize) -> V {
+        self[i]
+    }
+}
+
+impl Code {
+    /// The effective part of a program.
+    pub fn new(program: &Program) -> Self {
+        let shape = program.shape();
+        let effect = program.effect();
+        let mut constants = Vec::new();
+        let steps = program.instructions().zip(&effect.effective).filter(|(_, effective)| **effective);
+        let steps = steps.map(|(instruction, _)| Step {
+            operation: instruction.operation,
+            destination: instruction.destination,
+            first: instruction.first,
+            second: match instruction.second {
+                None => instruction.first,
+                Some(Operand::Register(register)) => register,
+                Some(Operand::Constant(constant)) => {
+                    constants.push(constant);
+                    (shape.registers + constants.len() - 1) as u16
+                }
+            },
+        });
+        let steps = steps.collect();
+        let live = |range: std::ops::Range<usize>| {
+            range.filter(|&register| effect.live_at_start[register]).map(|register| register as u16).collect()
+        };
+        Self {
+            steps,
+            constants,
+            registers: shape.registers,
+            zeroed: live(shape.inputs..shape.registers),
+            inputs: live(0..shape.inputs),
+            outputs: shape.output_registers(),
+        }
+    }
+
+    /// Number of instructions that are left.
+    pub fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Whether nothing is computed at all.
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// Registers for the rows of a vector, to be used with this code only.
+    pub fn bank<V: Vector>(&self) -> Bank<V> {
+        let mut registers = vec![V::splat(0.0); self.registers + self.constants.len()];
+        for (register, &constant) in registers[self.registers..].iter_mut().zip(&self.constants) {
+            *register = V::splat(constant);
+        }
+        Bank(registers)
+    }
+
+    /// Runs the code on inputs that are asked for only where they matter, and returns the outputs.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub fn run<'b, V: Vector>(&self, bank: &'b mut Bank<V>, inputs: &impl Inputs<V>) -> &'b [V] {
+        let Bank(registers) = bank;
+        for &register in &self.zeroed {
+            registers[usize::from(register)] = V::splat(0.0);
+        }
+        for &register in &self.inputs {
+            registers[usize::from(register)] = inputs.input(usize::from(register));
+        }
+        assert_eq!(registers.len(), self.registers + self.constants.len(), "a bank belongs to one code");
+        // SAFETY: a program's registers are checked when it is made, the constants are numbered behind them by
+        // `Code::new`, and the bank has as many registers as both.
+        unsafe { interpret(&self.steps, registers) };
+        &registers[self.outputs.clone()]
+    }
+}

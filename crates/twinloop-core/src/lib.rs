@@ -1,0 +1,45 @@
+//! The engine of Twinloop: models are programs that are evolved on experiments, tests are controllers that are evolved
+//! on models. It knows numbers only: no files, no clock, no Python, no global state.
+
+mod controller;
+mod dynamics;
+mod error;
+mod evolution;
+mod integrator;
+mod lanes;
+mod lgp;
+mod model;
+mod model_loop;
+mod objective;
+pub mod pareto;
+mod plants;
+mod rng;
+mod rollout;
+mod rows;
+mod selected;
+mod signals;
+mod task;
+mod test_loop;
+mod trajectory;
+mod workers;
+
+pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid};
+pub use dynamics::Dynamics;
+pub use error::{Error, Result};
+pub use evolution::{Problem, Search, Variation};
+pub use integrator::{Field, Stages, rk4};
+pub use lanes::{Isa, Kernel, Piece, Scalar, Vector, Wide, Width, dispatch};
+pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};
+pub use model::{Form, Frame, Model};
+pub use model_loop::{Learnt, ModelSearch};
+pub use objective::{closed_loops, discrimination, final_distances, instability, of_model, open_loops};
+pub use plants::{Gyroscopic, Quadrotor};
+pub use rng::{Purpose, Stream};
+pub use rollout::{Seen, Start, Watch, rollout};
+pub use rows::{run_rows, step_rows};
+pub use selected::{Experiment, SelectedTests};
+pub use signals::Signals;
+pub use task::{Task, distance};
+pub use test_loop::{TestSearch, TestSettings};
+pub use trajectory::{Trajectory, record};
+pub use workers::Workers;

@@ -1,0 +1,163 @@
+//! The model loop: evolution of programs judged on the selected tests (paper, section IV.A).
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::evolution::{Problem, Search, Variation};
+use crate::lgp::{Code, Grammar, Program};
+use crate::model::{Form, Frame, Model};
+use crate::objective::of_model;
+use crate::pareto::{crowding_distances, order};
+use crate::rng::{Purpose, Stream};
+use crate::selected::SelectedTests;
+use crate::workers::Workers;
+
+/// A program and its effective part, found once.
+#[derive(Debug)]
+pub struct Learnt {
+    /// What is varied.
+    pub program: Program,
+    /// What is run.
+    pub code: Code,
+}
+
+impl Learnt {
+    /// A program with its introns found.
+    pub fn new(program: Program) -> Self {
+        let code = Code::new(&program);
+        Self { program, code }
+    }
+}
+
+struct Models<'a> {
+    grammar: &'a Grammar,
+    frame: &'a Frame,
+    selected: &'a SelectedTests,
+}
+
+impl Problem for Models<'_> {
+    type Genome = Learnt;
+    const PURPOSES: (Purpose, Purpose) = (Purpose::FirstModels, Purpose::Models);
+    const RESAMPLED: bool = false;
+
+    fn objectives(&self) -> usize {
+        2 * self.selected.len()
+    }
+
+    fn random(&self, stream: &mut Stream) -> Learnt {
+        Learnt::new(self.grammar.random(stream))
+    }
+
+    fn mutate(&self, parent: &Learnt, stream: &mut Stream) -> Learnt {
+        Learnt::new(self.grammar.mutate(&parent.program, stream))
+    }
+
+    fn crossover(&self, first: &Learnt, second: &Learnt, stream: &mut Stream) -> Learnt {
+        Learnt::new(self.grammar.crossover(&first.program, &second.program, stream).0)
+    }
+
+    fn same(&self, child: &Learnt, parent: &Learnt) -> bool {
+        child.code == parent.code
+    }
+
+    fn judge(&self, genomes: &[Arc<Learnt>], _generation: u64, workers: &Workers) -> Vec<Vec<f64>> {
+        workers.map(genomes.len(), |i| {
+            let model = Model { code: &genomes[i].code, frame: self.frame };
+            of_model(model, self.selected, workers.width())
+        })
+    }
+}
+
+/// The model loop as a value.
+#[derive(Clone)]
+pub struct ModelSearch {
+    search: Search<Learnt>,
+    grammar: Arc<Grammar>,
+    frame: Arc<Frame>,
+    variation: Variation,
+}
+
+impl ModelSearch {
+    /// A random population of models, judged on the selected tests.
+    pub fn start(
+        grammar: Grammar,
+        form: Form,
+        variation: Variation,
+        seed: u64,
+        selected: &SelectedTests,
+        workers: &Workers,
+    ) -> Result<Self> {
+        some_test(selected)?;
+        let (grammar, variation) = (grammar.validated()?, variation.validated()?);
+        let frame = Frame::new(form, selected.signals());
+        let empty = Program::new(grammar.shape, vec![])?;
+        Model::check(&empty, form, selected.signals())?;
+        let problem = Models { grammar: &grammar, frame: &frame, selected };
+        let search = Search::start(&problem, &variation, seed, 1, workers);
+        Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), variation })
+    }
+
+    /// The same population and non-dominated set, judged on other tests: the next iteration.
+    pub fn learn(self, selected: &SelectedTests, workers: &Workers) -> Result<Self> {
+        some_test(selected)?;
+        let Self { search, grammar, frame, variation } = self;
+        let problem = Models { grammar: &grammar, frame: &frame, selected };
+        let search = search.judged_again(&problem, &variation, workers);
+        Ok(Self { search, grammar, frame, variation })
+    }
+
+    /// The search some generations later.
+    pub fn advance(self, selected: &SelectedTests, generations: u64, workers: &Workers) -> Result<Self> {
+        let Self { search, grammar, frame, variation } = self;
+        let problem = Models { grammar: &grammar, frame: &frame, selected };
+        if search.objectives().columns() != problem.objectives() {
+            return crate::error::invalid(format!(
+                "model search: expected the {} tests that it was last judged on, found {}; call learn first",
+                search.objectives().columns() / 2,
+                selected.len()
+            ));
+        }
+        let search = search.advance(&problem, &variation, generations, workers);
+        Ok(Self { search, grammar, frame, variation })
+    }
+
+    /// Population, archive and counters.
+    pub fn search(&self) -> &Search<Learnt> {
+        &self.search
+    }
+
+    /// What makes the programs dynamics.
+    pub fn frame(&self) -> &Arc<Frame> {
+        &self.frame
+    }
+
+    /// The member that is the best trade-off M*.
+    pub fn best(&self) -> usize {
+        self.search.best(self.variation.distance)
+    }
+
+    /// At most `size` members: the best trade-off first, then those with the most room around them.
+    pub fn committee(&self, size: usize) -> Vec<usize> {
+        let best = self.best();
+        let objectives = self.search.archive().objectives();
+        let front = vec![0; objectives.len()];
+        let spread = order(&front, &crowding_distances(&objectives, &front));
+        let others = spread.into_iter().filter(|&member| member != best);
+        std::iter::once(best).chain(others).take(size.max(1)).collect()
+    }
+
+    /// Mean share of introns over the population, 0 to 1.
+    pub fn intron_share(&self) -> f64 {
+        let population = self.search.population();
+        population.iter().map(|learnt| learnt.program.intron_share()).sum::<f64>() / population.len() as f64
+    }
+}
+
+fn some_test(selected: &SelectedTests) -> Result<()> {
+    if selected.is_empty() {
+        return crate::error::invalid(
+            "model search: expected at least one selected test, found none; tell one first",
+        );
+    }
+    Ok(())
+}

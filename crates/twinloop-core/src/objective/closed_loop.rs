@@ -1,0 +1,76 @@
+//! Closed loop: the free-run simulation error with the controller in the loop (paper, section IV.B).
+
+use super::divergence_penalty;
+use crate::dynamics::Dynamics;
+use crate::lanes::{Isa, Kernel, Vector, vectors, with_lanes};
+use crate::rollout::{Seen, Start, Watch, rollout};
+use crate::selected::{Loops, SelectedTests};
+
+/// Mean squared error of each test's run over its recorded steps and components (N).
+pub(super) struct ClosedLoop<'a, D> {
+    pub dynamics: D,
+    pub selected: &'a SelectedTests,
+}
+
+impl<D: Dynamics> Kernel for ClosedLoop<'_, D> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Vec<f64> {
+        let mut errors = Vec::with_capacity(self.selected.len());
+        for loops in self.selected.loops() {
+            with_lanes!(W, loops.tests, self.of_group(loops, &mut errors));
+        }
+        errors
+    }
+}
+
+impl<D: Dynamics> ClosedLoop<'_, D> {
+    #[inline(always)]
+    fn of_group<V: Vector>(&self, loops: &Loops, errors: &mut Vec<f64>) {
+        let states = self.selected.signals().states();
+        let start = Start {
+            family: self.selected.family(),
+            parameters: &vectors::<V>(&loops.parameters),
+            initial: &vectors::<V>(&loops.initial),
+            target: &vectors::<V>(&loops.target),
+            steps: loops.steps.iter().copied().max().unwrap_or(0),
+            limits: self.selected.limits(),
+            noise: &[],
+        };
+        let steps = (0..V::LANES).map(|l| loops.steps.get(l).map_or(0.0, |&steps| steps as f64));
+        let steps = V::load(&steps.collect::<Vec<_>>());
+        let mut error = SquaredError { recorded: &loops.recorded, steps, sum: V::splat(0.0) };
+        let lasted = rollout(&self.dynamics, &start, &mut error);
+        for (l, (&lasted, &steps)) in lasted.iter().zip(&loops.steps).enumerate() {
+            errors.push(if lasted < steps {
+                divergence_penalty(lasted, steps)
+            } else {
+                error.sum.lane(l) / (steps * states) as f64
+            });
+        }
+    }
+}
+
+/// Squared difference to the recorded runs, summed over steps and components.
+struct SquaredError<'a, V> {
+    recorded: &'a [f64],
+    steps: V,
+    sum: V,
+}
+
+impl<V: Vector> Watch<V> for SquaredError<'_, V> {
+    #[inline(always)]
+    fn see(&mut self, seen: Seen<'_, V>) {
+        let row = seen.next.len() * V::LANES;
+        let recorded = &self.recorded[(seen.step + 1) * row..][..row];
+        let mut sum = V::splat(0.0);
+        for (simulated, recorded) in seen.next.iter().zip(recorded.chunks_exact(V::LANES)) {
+            let error = *simulated - V::load(recorded);
+            sum = sum + error * error;
+        }
+        // A lane whose recording has ended adds nothing more.
+        let time = V::splat(seen.step as f64);
+        self.sum = self.sum + time.select_less(self.steps, sum, V::splat(0.0));
+    }
+}

@@ -1,0 +1,85 @@
+//! Final distance: how far from its target a closed loop ends, δ = ‖η_n − η_d‖.
+
+use crate::controller::Family;
+use crate::dynamics::Dynamics;
+use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_lanes};
+use crate::rollout::{Seen, Start, Watch, rollout};
+use crate::task::Task;
+use crate::workers::Workers;
+
+/// Final distances of each controller on each of the dynamics (dynamics × controllers); infinite where the run diverged.
+pub fn final_distances<D: Dynamics + Sync>(
+    dynamics: &[D],
+    family: &Family,
+    parameters: &[&[f64]],
+    task: &Task,
+    limits: &[f64],
+    workers: &Workers,
+) -> Vec<Vec<f64>> {
+    let groups = groups(parameters.len());
+    let distances = workers.map(dynamics.len() * groups.len(), |unit| {
+        let (dynamics, group) = (&dynamics[unit / groups.len()], groups[unit % groups.len()].clone());
+        let parameters = &parameters[group];
+        dispatch(workers.width(), OfGroup { dynamics, family, parameters, task, limits })
+    });
+    distances.chunks(groups.len().max(1)).map(<[_]>::concat).collect()
+}
+
+struct OfGroup<'a, D> {
+    dynamics: &'a D,
+    family: &'a Family,
+    parameters: &'a [&'a [f64]],
+    task: &'a Task,
+    limits: &'a [f64],
+}
+
+impl<D: Dynamics> Kernel for OfGroup<'_, D> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Vec<f64> {
+        with_lanes!(W, self.parameters.len(), self.lanes())
+    }
+}
+
+impl<D: Dynamics> OfGroup<'_, D> {
+    #[inline(always)]
+    fn lanes<V: Vector>(&self) -> Vec<f64> {
+        let Task { initial, target, steps } = self.task;
+        let target: Vec<V> = pack(&[target]);
+        let start = Start {
+            family: self.family,
+            parameters: &pack::<V, _>(self.parameters),
+            initial: &pack::<V, _>(&[initial]),
+            target: &target,
+            steps: *steps,
+            limits: self.limits,
+            noise: &[],
+        };
+        let mut last = LastStep { steps: *steps, target: &target, squared: V::splat(0.0) };
+        let lasted = rollout(self.dynamics, &start, &mut last);
+        let of_lane = |l: usize| {
+            if lasted[l] < *steps { f64::INFINITY } else { last.squared.lane(l).sqrt() }
+        };
+        (0..self.parameters.len()).map(of_lane).collect()
+    }
+}
+
+/// Squared distance to the target after the last step.
+struct LastStep<'a, V> {
+    steps: usize,
+    target: &'a [V],
+    squared: V,
+}
+
+impl<V: Vector> Watch<V> for LastStep<'_, V> {
+    #[inline(always)]
+    fn see(&mut self, seen: Seen<'_, V>) {
+        if seen.step + 1 == self.steps {
+            for (state, target) in seen.next.iter().zip(self.target) {
+                let difference = *state - *target;
+                self.squared = self.squared + difference * difference;
+            }
+        }
+    }
+}

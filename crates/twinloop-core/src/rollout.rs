@@ -1,0 +1,87 @@
+//! The roll-out: closes the loop of a controller around dynamics. There is no second one.
+
+use crate::controller::{Family, Law};
+use crate::dynamics::Dynamics;
+use crate::lanes::Vector;
+
+/// What closed loops start from, one a lane.
+pub struct Start<'a, V> {
+    /// The family of the controllers.
+    pub family: &'a Family,
+    /// Parameters of each lane's controller (size).
+    pub parameters: &'a [V],
+    /// First state (n_x).
+    pub initial: &'a [V],
+    /// State that the controllers lead to (n_x).
+    pub target: &'a [V],
+    /// Steps to run, n.
+    pub steps: usize,
+    /// Magnitude of each state at which a lane has diverged (n_x).
+    pub limits: &'a [f64],
+    /// What the sensors add to the state that the controller reads, (n + 1) × n_x; empty for perfect sensors.
+    pub noise: &'a [V],
+}
+
+/// One step of the loops, as it is shown to a watcher.
+pub struct Seen<'a, V> {
+    /// Number of the step, 0 to n − 1.
+    pub step: usize,
+    /// What the controllers read before it (n_x).
+    pub reading: &'a [V],
+    /// What they commanded (n_u).
+    pub command: &'a [V],
+    /// The true state after it (n_x).
+    pub next: &'a [V],
+}
+
+/// What looks on. A trait and not a closure, because only a named function can be made to be inlined.
+pub trait Watch<V> {
+    /// Is shown each step in turn.
+    fn see(&mut self, seen: Seen<'_, V>);
+}
+
+/// Runs the loops and shows each step to `watch`. Returns the steps that each lane lasted: n, unless its state stopped
+/// being finite or left the limits; what is shown of a lane after that means nothing.
+#[inline(always)]
+pub fn rollout<D: Dynamics, V: Vector>(
+    dynamics: &D,
+    start: &Start<'_, V>,
+    watch: &mut impl Watch<V>,
+) -> Vec<usize> {
+    let Start { family, parameters, initial, target, steps, limits, noise } = *start;
+    let states = initial.len();
+    let mut workspace = dynamics.workspace::<V>();
+    let mut memory = vec![V::splat(0.0); family.memory()];
+    let mut state = initial.to_vec();
+    let mut reading = initial.to_vec();
+    let mut command = vec![V::splat(0.0); family.commands()];
+    let mut alive = V::splat(1.0);
+    let mut lasted = vec![steps; V::LANES];
+    for step in 0..steps {
+        reading.copy_from_slice(&state);
+        if !noise.is_empty() {
+            for (reading, noise) in reading.iter_mut().zip(&noise[step * states..]) {
+                *reading = *reading + *noise;
+            }
+        }
+        family.command(parameters, &mut memory, &reading, target, &mut command);
+        dynamics.step(&mut workspace, &mut state, &command);
+        watch.see(Seen { step, reading: &reading, command: &command, next: &state });
+        let before = alive;
+        for (state, &limit) in state.iter().zip(limits) {
+            // A NaN is not less than the limit, and so counts as gone.
+            alive = state.abs().select_less(V::splat(limit), alive, V::splat(0.0));
+        }
+        if alive.any_less(before) {
+            for (l, lasted) in lasted.iter_mut().enumerate() {
+                if alive.lane(l) < before.lane(l) {
+                    *lasted = step;
+                }
+            }
+            if !V::splat(0.0).any_less(alive) {
+                break;
+            }
+        }
+    }
+    lasted
+}

@@ -1,0 +1,68 @@
+//! Rows: code and dynamics over many rows that know nothing of each other.
+
+use crate::dynamics::Dynamics;
+use crate::lanes::{Isa, Kernel, Vector, Width, dispatch, pack};
+use crate::lgp::Code;
+
+/// Outputs (rows × outputs) of code for each row of inputs.
+pub fn run_rows(code: &Code, inputs: &[&[f64]], width: Width) -> Vec<f64> {
+    dispatch(width, Run { code, inputs })
+}
+
+struct Run<'a> {
+    code: &'a Code,
+    inputs: &'a [&'a [f64]],
+}
+
+impl Kernel for Run<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Vec<f64> {
+        let mut bank = self.code.bank::<W::Of64>();
+        let mut rows = Vec::new();
+        for chunk in self.inputs.chunks(W::Of64::LANES) {
+            let inputs: Vec<W::Of64> = pack(chunk);
+            let outputs = self.code.run(&mut bank, &inputs);
+            for l in 0..chunk.len() {
+                rows.extend(outputs.iter().map(|output| output.lane(l)));
+            }
+        }
+        rows
+    }
+}
+
+/// Next states (rows × n_x) of each row of states under its row of commands.
+pub fn step_rows<D: Dynamics>(
+    dynamics: &D,
+    states: &[&[f64]],
+    commands: &[&[f64]],
+    width: Width,
+) -> Vec<f64> {
+    dispatch(width, Step { dynamics, states, commands })
+}
+
+struct Step<'a, D> {
+    dynamics: &'a D,
+    states: &'a [&'a [f64]],
+    commands: &'a [&'a [f64]],
+}
+
+impl<D: Dynamics> Kernel for Step<'_, D> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Vec<f64> {
+        let mut workspace = self.dynamics.workspace::<W::Of64>();
+        let mut rows = Vec::new();
+        let chunks = self.states.chunks(W::Of64::LANES).zip(self.commands.chunks(W::Of64::LANES));
+        for (states, commands) in chunks {
+            let mut state: Vec<W::Of64> = pack(states);
+            self.dynamics.step(&mut workspace, &mut state, &pack::<W::Of64, _>(commands));
+            for l in 0..states.len() {
+                rows.extend(state.iter().map(|state| state.lane(l)));
+            }
+        }
+        rows
+    }
+}

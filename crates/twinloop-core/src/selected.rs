@@ -1,0 +1,201 @@
+//! The selected tests Ω: those that were run on the system, with their trajectories, laid out for lanes.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::controller::Family;
+use crate::error::{Result, invalid};
+use crate::lanes::{groups, interleave, lanes_for};
+use crate::signals::Signals;
+
+/// A test and what the system did under it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Parameters of the controller (size).
+    pub parameters: Vec<f64>,
+    /// Target state η_d (n_x).
+    pub target: Vec<f64>,
+    /// Measured states, (n + 1) × n_x.
+    pub states: Vec<f64>,
+    /// Commands, n × n_u.
+    pub commands: Vec<f64>,
+}
+
+/// Transitions (η_t, ω_t, η_{t+1}) of neighbouring rows, one a lane.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    /// Rows in the block; further lanes repeat the last.
+    pub rows: usize,
+    /// n_x × lanes
+    pub state: Vec<f64>,
+    /// n_u × lanes
+    pub command: Vec<f64>,
+    /// n_x × lanes
+    pub next: Vec<f64>,
+}
+
+/// Closed loops of a group of tests, one a lane, with the runs that they should reproduce.
+#[derive(Clone, Debug)]
+pub(crate) struct Loops {
+    /// Tests in the group; further lanes repeat the last.
+    pub tests: usize,
+    /// size × lanes
+    pub parameters: Vec<f64>,
+    /// n_x × lanes
+    pub initial: Vec<f64>,
+    /// n_x × lanes
+    pub target: Vec<f64>,
+    /// Recorded states, (n + 1) × n_x × lanes, n that of the longest.
+    pub recorded: Vec<f64>,
+    /// Steps that were recorded of each test.
+    pub steps: Vec<usize>,
+}
+
+/// Ω. A value: a further test makes a new one.
+#[derive(Clone, Debug)]
+pub struct SelectedTests {
+    signals: Arc<Signals>,
+    family: Arc<Family>,
+    experiments: Vec<Arc<Experiment>>,
+    limits: Vec<f64>,
+    /// The transitions of all tests one after another.
+    blocks: Vec<Block>,
+    /// The rows of each test in them.
+    rows: Vec<Range<usize>>,
+    loops: Vec<Loops>,
+}
+
+impl SelectedTests {
+    /// No test yet. A run that leaves `divergence_factor` times the scale of a state counts as diverged.
+    pub fn new(signals: Arc<Signals>, family: Arc<Family>, divergence_factor: f64) -> Result<Self> {
+        if !(divergence_factor.is_finite() && divergence_factor > 0.0) {
+            return invalid(format!(
+                "divergence factor: expected a number above 0, found {divergence_factor}"
+            ));
+        }
+        let limits = signals.limits(divergence_factor);
+        let (experiments, blocks, rows, loops) = Default::default();
+        Ok(Self { signals, family, experiments, limits, blocks, rows, loops })
+    }
+
+    /// These and one more.
+    pub fn with_test(&self, experiment: Experiment) -> Result<Self> {
+        self.check(&experiment)?;
+        let mut experiments = self.experiments.clone();
+        experiments.push(Arc::new(experiment));
+        let (blocks, rows) = transitions(&experiments, self.signals.states(), self.signals.commands());
+        let of_group = |group: Range<usize>| loops(&experiments[group], self.signals.states());
+        let loops = groups(experiments.len()).into_iter().map(of_group).collect();
+        let (signals, family, limits) = (self.signals.clone(), self.family.clone(), self.limits.clone());
+        Ok(Self { signals, family, experiments, limits, blocks, rows, loops })
+    }
+
+    /// Number of tests N.
+    pub fn len(&self) -> usize {
+        self.experiments.len()
+    }
+
+    /// Whether nothing was run yet.
+    pub fn is_empty(&self) -> bool {
+        self.experiments.is_empty()
+    }
+
+    /// The signals of the system.
+    pub fn signals(&self) -> &Arc<Signals> {
+        &self.signals
+    }
+
+    /// The family of the controllers.
+    pub fn family(&self) -> &Family {
+        &self.family
+    }
+
+    pub(crate) fn limits(&self) -> &[f64] {
+        &self.limits
+    }
+
+    pub(crate) fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    pub(crate) fn rows(&self) -> &[Range<usize>] {
+        &self.rows
+    }
+
+    pub(crate) fn loops(&self) -> &[Loops] {
+        &self.loops
+    }
+
+    fn check(&self, experiment: &Experiment) -> Result<()> {
+        let Experiment { parameters, target, states, commands } = experiment;
+        let (n_x, n_u) = (self.signals.states(), self.signals.commands());
+        let steps = commands.len() / n_u;
+        if steps == 0 || commands.len() != steps * n_u || states.len() != (steps + 1) * n_x {
+            return invalid(format!(
+                "trajectory: expected n ≥ 1 steps, (n + 1) × {n_x} states and n × {n_u} commands, found {} and {} \
+                 numbers",
+                states.len(),
+                commands.len()
+            ));
+        }
+        if parameters.len() != self.family.parameters().len() || target.len() != n_x {
+            return invalid(format!(
+                "test: expected {} parameters and a target of {n_x} states, found {} and {}",
+                self.family.parameters().len(),
+                parameters.len(),
+                target.len()
+            ));
+        }
+        if ![parameters, target, states, commands].into_iter().flatten().all(|x| x.is_finite()) {
+            return invalid(
+                "trajectory: expected finite numbers, found NaN or an infinite one; cut the bad samples",
+            );
+        }
+        Ok(())
+    }
+}
+
+/// The transitions of all tests in blocks of 64, and smaller ones for what is left; and the rows of each test.
+fn transitions(experiments: &[Arc<Experiment>], n_x: usize, n_u: usize) -> (Vec<Block>, Vec<Range<usize>>) {
+    let (mut state, mut command, mut next, mut rows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for experiment in experiments {
+        let first = command.len();
+        command.extend(experiment.commands.chunks_exact(n_u));
+        state.extend(experiment.states.chunks_exact(n_x).take(command.len() - first));
+        next.extend(experiment.states.chunks_exact(n_x).skip(1));
+        rows.push(first..command.len());
+    }
+    let mut blocks = Vec::new();
+    let mut row = 0;
+    while row < command.len() {
+        let left = command.len() - row;
+        let taken = [64, 32, 8].into_iter().find(|&size| size <= left).unwrap_or(left);
+        let part = |rows: &[&[f64]]| interleave(&rows[row..row + taken], lanes_for(taken));
+        blocks.push(Block { rows: taken, state: part(&state), command: part(&command), next: part(&next) });
+        row += taken;
+    }
+    (blocks, rows)
+}
+
+/// The closed loops of a group of tests.
+fn loops(group: &[Arc<Experiment>], n_x: usize) -> Loops {
+    let lanes = lanes_for(group.len());
+    let longest = group.iter().map(|experiment| experiment.states.len()).max().unwrap_or(0);
+    let part = |of: fn(&Experiment) -> &[f64]| {
+        interleave(&group.iter().map(|experiment| of(experiment)).collect::<Vec<_>>(), lanes)
+    };
+    let padded = group.iter().map(|experiment| {
+        let mut states = experiment.states.clone();
+        states.resize(longest, 0.0);
+        states
+    });
+    let initial: Vec<&[f64]> = group.iter().map(|experiment| &experiment.states[..n_x]).collect();
+    Loops {
+        tests: group.len(),
+        parameters: part(|experiment| &experiment.parameters),
+        initial: interleave(&initial, lanes),
+        target: part(|experiment| &experiment.target),
+        recorded: interleave(&padded.collect::<Vec<_>>(), lanes),
+        steps: group.iter().map(|experiment| experiment.states.len() / n_x - 1).collect(),
+    }
+}

@@ -1,0 +1,64 @@
+//! What the engine knows of a system's signals: period, scales, bounds, and which state is the derivative of which.
+
+use crate::error::{Result, invalid};
+
+/// States and commands as numbers; their names and units live in the layers above.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Signals {
+    /// Period of the commands, s.
+    pub dt: f64,
+    /// Usual size of each state (n_x,).
+    pub state_scales: Vec<f64>,
+    /// Smallest and largest value of each command (n_u,).
+    pub command_bounds: Vec<(f64, f64)>,
+    /// What a model sees as 1 of each command (n_u,).
+    pub command_scales: Vec<f64>,
+    /// The state that each state is the derivative of, where that is known (n_x,).
+    pub derivative_of: Vec<Option<usize>>,
+}
+
+impl Signals {
+    /// Refuses signals that no loop can be closed with.
+    pub fn validated(self) -> Result<Self> {
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let states = self.states();
+        let mut integrated = vec![false; states];
+        let complaint = if !positive(self.dt) {
+            format!("expected a period above 0 s, found {}", self.dt)
+        } else if states == 0 || self.commands() == 0 {
+            "expected at least one state and one command".to_owned()
+        } else if self.command_scales.len() != self.commands() || self.derivative_of.len() != states {
+            "expected one scale for each command and one derivative entry for each state".to_owned()
+        } else if !self.state_scales.iter().chain(&self.command_scales).all(|&x| positive(x)) {
+            "expected scales above 0".to_owned()
+        } else if let Some((low, high)) = self
+            .command_bounds
+            .iter()
+            .find(|(low, high)| !(low.is_finite() && high.is_finite() && low < high))
+        {
+            format!("expected command bounds low < high, found {low} and {high}")
+        } else if self.derivative_of.iter().enumerate().any(|(state, of)| {
+            of.is_some_and(|of| of >= states || of == state || std::mem::replace(&mut integrated[of], true))
+        }) {
+            "expected each state to be the integral of at most one other state".to_owned()
+        } else {
+            return Ok(self);
+        };
+        invalid(format!("signals: {complaint}"))
+    }
+
+    /// Number of states, n_x.
+    pub fn states(&self) -> usize {
+        self.state_scales.len()
+    }
+
+    /// Number of commands, n_u.
+    pub fn commands(&self) -> usize {
+        self.command_bounds.len()
+    }
+
+    /// Magnitude of each state beyond which a run counts as diverged: `factor` times its scale.
+    pub fn limits(&self, factor: f64) -> Vec<f64> {
+        self.state_scales.iter().map(|scale| scale * factor).collect()
+    }
+}

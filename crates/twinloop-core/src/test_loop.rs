@@ -1,0 +1,199 @@
+//! The test loop: evolution of controllers on which the models disagree, away from instability (paper, section IV.C).
+
+use std::sync::Arc;
+
+use crate::controller::Family;
+use crate::error::{Result, invalid};
+use crate::evolution::{Problem, Search, Variation};
+use crate::model::{Frame, Model};
+use crate::model_loop::Learnt;
+use crate::objective::{discrimination, final_distances, instability};
+use crate::rng::{Purpose, Stream};
+use crate::signals::Signals;
+use crate::task::Task;
+use crate::workers::Workers;
+
+/// What the test loop optimises, and by what chance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TestSettings {
+    /// Whether the final distance on the best model is a third objective.
+    pub control_quality: bool,
+    /// Final distances are capped at this times the distance from start to target.
+    pub distance_cap: f64,
+    /// Mutants of a candidate whose spread is its instability.
+    pub mutants: usize,
+    /// Standard deviation of a mutant's one gain, as a share of its range.
+    pub mutant_step: f64,
+    /// Standard deviation of a mutation of a candidate, as a share of the gene's range.
+    pub mutation_step: f64,
+    /// A run that leaves this times the scale of a state counts as diverged.
+    pub divergence_factor: f64,
+}
+
+impl TestSettings {
+    fn check(&self) -> Result<()> {
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let numbers = [self.distance_cap, self.mutant_step, self.mutation_step, self.divergence_factor];
+        if self.mutants == 0 || !numbers.into_iter().all(positive) {
+            return invalid(format!("test settings: expected numbers above 0, found {self:?}"));
+        }
+        Ok(())
+    }
+}
+
+/// What candidates are judged with: the committee, whose first member is the best trade-off M*.
+struct Tests {
+    committee: Vec<Arc<Learnt>>,
+    frame: Arc<Frame>,
+    family: Arc<Family>,
+    task: Task,
+    limits: Vec<f64>,
+    settings: TestSettings,
+    seed: u64,
+    iteration: u64,
+}
+
+impl Tests {
+    /// Final distances (models × candidates) on the first `models` members of the committee.
+    fn distances(&self, models: usize, candidates: &[&[f64]], workers: &Workers) -> Vec<Vec<f64>> {
+        let members = self.committee[..models].iter();
+        let models: Vec<_> = members.map(|learnt| Model { code: &learnt.code, frame: &self.frame }).collect();
+        final_distances(&models, &self.family, candidates, &self.task, &self.limits, workers)
+    }
+
+    /// The steps of one gain that make the mutants of every candidate of a generation.
+    fn mutations(&self, generation: u64) -> Vec<(usize, f64)> {
+        let mut stream = Stream::new(self.seed, Purpose::Mutants, self.iteration, generation, 0);
+        let genes = self.family.parameters().len();
+        let step = self.settings.mutant_step;
+        (0..self.settings.mutants).map(|_| (stream.below(genes), step * stream.gaussian())).collect()
+    }
+}
+
+/// Worse in every objective than a candidate that ends its run on M* can be: 1 / Var is guarded to 1e9.
+const DIVERGED: f64 = 1e12;
+
+impl Problem for Tests {
+    type Genome = Vec<f64>;
+    const PURPOSES: (Purpose, Purpose) = (Purpose::FirstTests, Purpose::Tests);
+    const RESAMPLED: bool = true;
+
+    fn objectives(&self) -> usize {
+        2 + usize::from(self.settings.control_quality)
+    }
+
+    fn random(&self, stream: &mut Stream) -> Vec<f64> {
+        self.family.parameters().uniform(stream)
+    }
+
+    fn mutate(&self, parent: &Vec<f64>, stream: &mut Stream) -> Vec<f64> {
+        let gene = stream.below(parent.len());
+        self.family.parameters().moved(parent, gene, self.settings.mutation_step * stream.gaussian())
+    }
+
+    fn crossover(&self, first: &Vec<f64>, second: &Vec<f64>, stream: &mut Stream) -> Vec<f64> {
+        first.iter().zip(second).map(|(&a, &b)| if stream.chance(0.5) { a } else { b }).collect()
+    }
+
+    fn same(&self, _child: &Vec<f64>, _parent: &Vec<f64>) -> bool {
+        false
+    }
+
+    fn judge(&self, genomes: &[Arc<Vec<f64>>], generation: u64, workers: &Workers) -> Vec<Vec<f64>> {
+        let candidates: Vec<&[f64]> = genomes.iter().map(|genome| &genome[..]).collect();
+        let by_model = self.distances(self.committee.len(), &candidates, workers);
+        let mutations = self.mutations(generation);
+        let parameters = self.family.parameters();
+        let mutants: Vec<_> = candidates
+            .iter()
+            .flat_map(|candidate| {
+                mutations.iter().map(|&(gene, step)| parameters.moved(candidate, gene, step))
+            })
+            .collect();
+        let mutants: Vec<&[f64]> = mutants.iter().map(|mutant| &mutant[..]).collect();
+        let of_mutants = self.distances(1, &mutants, workers).concat();
+        let cap = self.settings.distance_cap * self.task.distance();
+        let row = |(i, of_mutants): (usize, &[f64])| {
+            let on_best = by_model[0][i];
+            if on_best.is_infinite() {
+                return vec![DIVERGED; self.objectives()];
+            }
+            let mut row = vec![
+                discrimination(by_model.iter().map(|of_model| of_model[i]), cap),
+                instability(of_mutants.iter().copied(), cap),
+            ];
+            row.extend(self.settings.control_quality.then_some(on_best));
+            row
+        };
+        of_mutants.chunks_exact(mutations.len()).enumerate().map(row).collect()
+    }
+}
+
+/// The test loop as a value.
+#[derive(Clone)]
+pub struct TestSearch {
+    search: Search<Vec<f64>>,
+    tests: Arc<Tests>,
+    variation: Variation,
+    flat: bool,
+}
+
+impl TestSearch {
+    /// A random population of tests over a committee whose first member is the best trade-off M*.
+    #[allow(clippy::too_many_arguments)]
+    pub fn start(
+        committee: Vec<Arc<Learnt>>,
+        frame: Arc<Frame>,
+        family: Arc<Family>,
+        task: Task,
+        signals: &Signals,
+        settings: TestSettings,
+        variation: Variation,
+        seed: u64,
+        iteration: u64,
+        workers: &Workers,
+    ) -> Result<Self> {
+        settings.check()?;
+        let variation = variation.validated()?;
+        if committee.is_empty() {
+            return invalid("test search: expected a committee of one model or more, found none");
+        }
+        if task.target.len() != family.states() {
+            let (expected, found) = (family.states(), task.target.len());
+            return invalid(format!("test search: expected a task of {expected} states, found {found}"));
+        }
+        if task.distance() == 0.0 {
+            return invalid(
+                "test search: expected a target away from the initial state, found both the same",
+            );
+        }
+        let limits = signals.limits(settings.divergence_factor);
+        let tests = Tests { committee, frame, family, task, limits, settings, seed, iteration };
+        let search = Search::start(&tests, &variation, seed, iteration, workers);
+        let candidates: Vec<&[f64]> = search.population().iter().map(|genome| &genome[..]).collect();
+        let on_best = tests.distances(1, &candidates, workers).concat();
+        let flat = on_best.iter().all(|distance| *distance == on_best[0]);
+        Ok(Self { search, tests: Arc::new(tests), variation, flat })
+    }
+
+    /// The search some generations later.
+    pub fn advance(self, generations: u64, workers: &Workers) -> Self {
+        let search = self.search.advance(&*self.tests, &self.variation, generations, workers);
+        Self { search, ..self }
+    }
+
+    /// Population, archive and counters.
+    pub fn search(&self) -> &Search<Vec<f64>> {
+        &self.search
+    }
+
+    /// The member that is the best trade-off Υ*.
+    pub fn best(&self) -> usize {
+        self.search.best(self.variation.distance)
+    }
+
+    /// Whether every test of the random population ended at the same distance on M*: it ignores the commands.
+    pub fn flat(&self) -> bool {
+        self.flat
+    }
+}

@@ -1,0 +1,43 @@
+//! Workers: how work is carried out, never what comes out.
+
+use rayon::prelude::*;
+
+use crate::error::{Error, Result, invalid};
+use crate::lanes::Width;
+
+/// A pool of threads and the vector width that they use.
+pub struct Workers {
+    pool: rayon::ThreadPool,
+    width: Width,
+}
+
+impl Workers {
+    /// As many threads as asked for.
+    pub fn new(threads: usize, width: Width) -> Result<Self> {
+        if threads == 0 || threads > 1024 {
+            return invalid(format!("threads: expected 1 to 1024, found {threads}"));
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool =
+            pool.map_err(|error| Error::Invalid(format!("threads: could not start {threads}: {error}")))?;
+        Ok(Self { pool, width })
+    }
+
+    /// Number of threads.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// The vector width.
+    pub fn width(&self) -> Width {
+        self.width
+    }
+
+    /// `work` of each index, in the order of the indices whoever did it.
+    pub fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        if self.threads() == 1 || count <= 1 {
+            return (0..count).map(work).collect();
+        }
+        self.pool.install(|| (0..count).into_par_iter().map(&work).collect())
+    }
+}

@@ -1,0 +1,60 @@
+//! Arrays in both directions: whatever NumPy can read as float64 comes in, float64 in C order goes out.
+
+use numpy::ndarray::{Array1, Array2, Array3};
+use numpy::{
+    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLike1, PyArrayLike2, PyArrayLike3,
+};
+use pyo3::prelude::*;
+
+use crate::error::{Result, misuse};
+
+/// A vector argument.
+pub type Vector<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+/// A matrix argument.
+pub type Matrix<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+/// An argument of three axes.
+pub type Cube<'py> = PyArrayLike3<'py, f64, AllowTypeChange>;
+
+/// The numbers of a vector.
+pub fn vector(array: &Vector<'_>) -> Vec<f64> {
+    array.as_array().iter().copied().collect()
+}
+
+/// The rows of a matrix that must have `columns` columns.
+pub fn rows(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<Vec<f64>>> {
+    let array = array.as_array();
+    if array.ncols() != columns {
+        return Err(misuse(format!(
+            "{name}: expected {columns} columns, found an array of shape ({}, {})",
+            array.nrows(),
+            array.ncols()
+        )));
+    }
+    Ok(array.rows().into_iter().map(|row| row.iter().copied().collect()).collect())
+}
+
+/// Views of rows.
+pub fn views(rows: &[Vec<f64>]) -> Vec<&[f64]> {
+    rows.iter().map(Vec::as_slice).collect()
+}
+
+/// A vector for Python.
+pub fn to_vector<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
+    Array1::from_vec(values).into_pyarray(py)
+}
+
+/// A matrix for Python from values in C order.
+pub fn to_matrix(py: Python<'_>, columns: usize, values: Vec<f64>) -> Bound<'_, PyArray2<f64>> {
+    let rows = values.len() / columns.max(1);
+    Array2::from_shape_vec((rows, columns), values).expect("whole rows").into_pyarray(py)
+}
+
+/// An array of three axes for Python from values in C order.
+pub fn to_cube(py: Python<'_>, shape: [usize; 3], values: Vec<f64>) -> Bound<'_, PyArray3<f64>> {
+    Array3::from_shape_vec(shape, values).expect("whole blocks").into_pyarray(py)
+}
+
+/// Indices for Python.
+pub fn to_integers(py: Python<'_>, values: impl IntoIterator<Item = usize>) -> Bound<'_, PyArray1<i64>> {
+    to_vector(py, values.into_iter().map(|value| value as i64).collect())
+}

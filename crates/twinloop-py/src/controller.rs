@@ -1,0 +1,91 @@
+//! Families of controllers, and one controller with its memory.
+
+use std::sync::{Arc, Mutex};
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use twinloop_core::{Axis, Controller, Family, Mixer, Parameters, Pid};
+
+use crate::arrays::{Matrix, Vector, rows, to_vector, vector};
+use crate::error::{Result, misuse};
+use crate::model::PySignals;
+
+/// A family of controllers: a bounded parameter vector and a law, one implementation for search and real run.
+#[pyclass(frozen, name = "Family", module = "twinloop._core")]
+pub struct PyFamily(pub Arc<Family>);
+
+#[pymethods]
+impl PyFamily {
+    #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "a PID, its box and its output map, as numbers")]
+    fn pid(
+        signals: &PySignals,
+        axes: Vec<(usize, Option<usize>)>,
+        low: Vector<'_>,
+        high: Vector<'_>,
+        logarithmic: Vec<bool>,
+        matrix: Option<Matrix<'_>>,
+        offset: Option<Vector<'_>>,
+        power: f64,
+    ) -> Result<Self> {
+        let signals = &signals.0;
+        let bounds = signals.command_bounds.clone();
+        let output = match matrix {
+            None => Mixer::direct(bounds, axes.len())?,
+            Some(matrix) => {
+                let matrix = rows("mixer matrix", &matrix, axes.len())?;
+                let offset = offset.map_or_else(|| vec![0.0; bounds.len()], |offset| vector(&offset));
+                Mixer::new(matrix, offset, power, bounds, axes.len())?
+            }
+        };
+        let axes = axes.into_iter().map(|(angle, rate)| Axis { angle, rate }).collect();
+        let parameters = Parameters::new(&vector(&low), &vector(&high), &logarithmic)?;
+        let pid = Pid { axes, output, dt: signals.dt };
+        Ok(Self(Arc::new(Family::pid(pid, parameters, signals.states())?)))
+    }
+
+    #[getter]
+    fn size(&self) -> usize {
+        self.0.parameters().len()
+    }
+
+    fn controller(&self, parameters: Vector<'_>) -> Result<PyController> {
+        let controller = Controller::new(self.0.clone(), vector(&parameters))?;
+        Ok(PyController(Mutex::new(controller)))
+    }
+}
+
+/// One controller of a family, with its memory.
+#[pyclass(frozen, name = "Controller", module = "twinloop._core")]
+pub struct PyController(Mutex<Controller>);
+
+#[pymethods]
+impl PyController {
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(to_vector(py, self.lock()?.parameters().collect()))
+    }
+
+    fn reset(&self) -> Result<()> {
+        self.lock()?.reset();
+        Ok(())
+    }
+
+    fn command<'py>(
+        &self,
+        py: Python<'py>,
+        state: Vector<'py>,
+        target: Vector<'py>,
+    ) -> Result<Bound<'py, PyArray1<f64>>> {
+        let command = self.lock()?.command(&vector(&state), &vector(&target))?;
+        Ok(to_vector(py, command))
+    }
+}
+
+impl PyController {
+    fn lock(&self) -> Result<std::sync::MutexGuard<'_, Controller>> {
+        self.0
+            .lock()
+            .map_err(|_| misuse("controller: expected one that has not panicked; make a new one".into()))
+    }
+}

@@ -1,0 +1,47 @@
+//! Python bindings of the engine: conversion only, one file for each concept.
+
+mod arrays;
+mod controller;
+mod error;
+mod model;
+mod objective;
+mod pareto;
+mod plant;
+mod program;
+mod rollout;
+mod search;
+mod selected;
+mod workers;
+
+/// Each evaluation of a model takes and gives back a few aligned kilobytes; the system's allocator would take longer over
+/// that than the model does over a short test.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// The native engine: numbers in, numbers out.
+#[pyo3::pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::controller::{PyController, PyFamily};
+    #[pymodule_export]
+    use crate::model::{PyModel, PySignals};
+    #[pymodule_export]
+    use crate::objective::{closed_loop, discrimination, final_distances, instability, open_loop};
+    #[pymodule_export]
+    use crate::pareto::{PyArchive, best_tradeoff, crowding_distances, ideal_point, ranks, select};
+    #[pymodule_export]
+    use crate::plant::PyQuadrotor;
+    #[pymodule_export]
+    use crate::program::{PyGrammar, PyProgram};
+    #[pymodule_export]
+    use crate::rollout::{PyRuns, PyTask, rollout};
+    #[pymodule_export]
+    use crate::search::{PyModelSearch, PyTestSearch, PyTestSettings, PyVariation};
+    #[pymodule_export]
+    use crate::selected::PySelectedTests;
+    #[pymodule_export]
+    use crate::workers::{PyWorkers, vector_widths};
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "Python's name for it")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

@@ -1,0 +1,141 @@
+//! Ranking and archive: functions of a matrix of objectives.
+
+use std::sync::Mutex;
+
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1};
+use pyo3::prelude::*;
+use twinloop_core::pareto::{self, Archive, Distance, Objectives};
+
+use crate::arrays::{Matrix, to_integers, to_matrix, to_vector};
+use crate::error::{Result, misuse};
+
+/// The one door at which numbers that are not finite are refused.
+fn matrix(array: &Matrix<'_>) -> Result<Objectives> {
+    let array = array.as_array();
+    Ok(Objectives::new(array.ncols(), array.iter().copied().collect())?)
+}
+
+/// Front of each row, 0 for the non-dominated.
+#[pyfunction]
+pub fn ranks<'py>(py: Python<'py>, objectives: Matrix<'py>) -> Result<Bound<'py, PyArray1<i64>>> {
+    let ranks = pareto::ranks(&matrix(&objectives)?);
+    Ok(to_integers(py, ranks.into_iter().map(|rank| rank as usize)))
+}
+
+/// Room around each row within its front; infinite at the edges.
+#[pyfunction]
+pub fn crowding_distances<'py>(
+    py: Python<'py>,
+    objectives: Matrix<'py>,
+    ranks: PyArrayLike1<'py, i64, AllowTypeChange>,
+) -> Result<Bound<'py, PyArray1<f64>>> {
+    let objectives = matrix(&objectives)?;
+    let ranks: Option<Vec<u32>> = ranks.as_array().iter().map(|&rank| u32::try_from(rank).ok()).collect();
+    match ranks {
+        Some(ranks) if ranks.len() == objectives.len() => {
+            Ok(to_vector(py, pareto::crowding_distances(&objectives, &ranks)))
+        }
+        _ => {
+            Err(misuse(format!("ranks: expected a front, 0 or more, for each of {} rows", objectives.len())))
+        }
+    }
+}
+
+/// The best rows, best first, by front and then by room.
+#[pyfunction]
+pub fn select<'py>(
+    py: Python<'py>,
+    objectives: Matrix<'py>,
+    count: usize,
+) -> Result<Bound<'py, PyArray1<i64>>> {
+    Ok(to_integers(py, pareto::select(&matrix(&objectives)?, count)))
+}
+
+/// Smallest value of each column.
+#[pyfunction]
+pub fn ideal_point<'py>(py: Python<'py>, objectives: Matrix<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+    let objectives = matrix(&objectives)?;
+    if objectives.is_empty() {
+        return Err(misuse("ideal point: expected at least one row of objectives, found none".into()));
+    }
+    Ok(to_vector(py, pareto::ideal_point(&objectives)))
+}
+
+/// The row nearest to the ideal point.
+#[pyfunction]
+#[pyo3(signature = (objectives, normalised = false))]
+pub fn best_tradeoff(objectives: Matrix<'_>, normalised: bool) -> Result<usize> {
+    let best = pareto::best_tradeoff(&matrix(&objectives)?, distance(normalised));
+    best.ok_or_else(|| misuse("best trade-off: expected at least one row of objectives, found none".into()))
+}
+
+/// How distances to the ideal point are measured.
+pub fn distance(normalised: bool) -> Distance {
+    if normalised { Distance::Normalised } else { Distance::Raw }
+}
+
+/// Non-dominated set of rows, each with the number under which it was offered.
+#[pyclass(frozen, name = "Archive", module = "twinloop._core")]
+pub struct PyArchive(Mutex<Numbered>);
+
+struct Numbered {
+    archive: Archive<usize>,
+    columns: usize,
+    offered: usize,
+}
+
+#[pymethods]
+impl PyArchive {
+    #[new]
+    #[pyo3(signature = (columns, width = "auto"))]
+    fn new(columns: usize, width: &str) -> Result<Self> {
+        if columns == 0 {
+            return Err(misuse("archive: expected at least one column, found 0".into()));
+        }
+        let archive = Archive::new(columns, width.parse()?);
+        Ok(Self(Mutex::new(Numbered { archive, columns, offered: 0 })))
+    }
+
+    fn offer<'py>(&self, py: Python<'py>, objectives: Matrix<'py>) -> Result<Bound<'py, PyArray1<i64>>> {
+        let objectives = matrix(&objectives)?;
+        let mut numbered = self.lock()?;
+        if objectives.columns() != numbered.columns {
+            let (expected, found) = (numbered.columns, objectives.columns());
+            return Err(misuse(format!("archive: expected {expected} objectives, found {found}")));
+        }
+        for row in objectives.rows() {
+            let number = numbered.offered;
+            numbered.archive.offer(row, || number);
+            numbered.offered += 1;
+        }
+        Ok(to_integers(py, numbered.archive.members().iter().copied()))
+    }
+
+    fn prune(&self, cap: usize) -> Result<bool> {
+        Ok(self.lock()?.archive.prune(cap))
+    }
+
+    #[getter]
+    fn objectives<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        let numbered = self.lock()?;
+        let objectives = numbered.archive.objectives();
+        Ok(to_matrix(py, numbered.columns, objectives.rows().flatten().copied().collect()))
+    }
+
+    #[getter]
+    fn members<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<i64>>> {
+        Ok(to_integers(py, self.lock()?.archive.members().iter().copied()))
+    }
+
+    fn __len__(&self) -> Result<usize> {
+        Ok(self.lock()?.archive.len())
+    }
+}
+
+impl PyArchive {
+    fn lock(&self) -> Result<std::sync::MutexGuard<'_, Numbered>> {
+        self.0
+            .lock()
+            .map_err(|_| misuse("archive: expected one that has not panicked; make a new one".into()))
+    }
+}

@@ -1,0 +1,69 @@
+//! Built-in plants.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use twinloop_core::{Quadrotor, Scalar, Vector as _, step_rows};
+
+use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector, views};
+use crate::error::{Result, misuse};
+use crate::model::same_length;
+use crate::workers::{PyWorkers, or_default};
+
+/// Attitude dynamics of a quadrotor under four rotor speeds, one Runge–Kutta step a period.
+#[pyclass(frozen, name = "Quadrotor", module = "twinloop._core")]
+pub struct PyQuadrotor(pub Quadrotor);
+
+#[pymethods]
+impl PyQuadrotor {
+    #[new]
+    #[pyo3(signature = (dt, *, arm, inertia, rotor_inertia, thrust_factor, drag_factor, gyroscopic))]
+    fn new(
+        dt: f64,
+        arm: f64,
+        inertia: Vector<'_>,
+        rotor_inertia: f64,
+        thrust_factor: f64,
+        drag_factor: f64,
+        gyroscopic: &str,
+    ) -> Result<Self> {
+        let inertia = vector(&inertia);
+        let inertia = inertia.try_into().map_err(|found: Vec<f64>| {
+            misuse(format!("inertia: expected the three numbers I_x, I_y, I_z, found {}", found.len()))
+        })?;
+        let gyroscopic = gyroscopic.parse()?;
+        let plant = Quadrotor { dt, arm, inertia, rotor_inertia, thrust_factor, drag_factor, gyroscopic };
+        Ok(Self(plant.validated()?))
+    }
+
+    fn derivative<'py>(
+        &self,
+        py: Python<'py>,
+        state: Vector<'py>,
+        command: Vector<'py>,
+    ) -> Result<Bound<'py, PyArray1<f64>>> {
+        let (state, command) = (vector(&state), vector(&command));
+        if state.len() != 6 || command.len() != 4 {
+            let (n_x, n_u) = (state.len(), command.len());
+            return Err(misuse(format!("expected 6 states and 4 commands, found {n_x} and {n_u}")));
+        }
+        let lanes = |values: &[f64]| values.iter().map(|&value| Scalar::splat(value)).collect::<Vec<_>>();
+        let mut slope = [Scalar::splat(0.0); 6];
+        self.0.derivative(&lanes(&state), &lanes(&command), &mut slope);
+        Ok(to_vector(py, slope.iter().map(|lane| lane.lane(0)).collect()))
+    }
+
+    #[pyo3(signature = (states, commands, workers = None))]
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        states: Matrix<'py>,
+        commands: Matrix<'py>,
+        workers: Option<&PyWorkers>,
+    ) -> Result<Bound<'py, PyArray2<f64>>> {
+        let (states, commands) = (rows("states", &states, 6)?, rows("commands", &commands, 4)?);
+        same_length(&states, &commands)?;
+        let width = or_default(workers)?.width();
+        let next = py.detach(|| step_rows(&self.0, &views(&states), &views(&commands), width));
+        Ok(to_matrix(py, 6, next))
+    }
+}

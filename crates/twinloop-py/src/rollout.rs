@@ -1,0 +1,175 @@
+//! Tasks and roll-outs, of a model, a plant or a step function in Python.
+
+use std::cell::RefCell;
+
+use numpy::{PyArray1, PyArray3};
+use pyo3::prelude::*;
+use twinloop_core::{Dynamics, Task, Trajectory, Vector as Lanes, record};
+
+use crate::arrays::{Cube, Matrix, Vector, rows, to_cube, to_integers, to_vector, vector, views};
+use crate::controller::PyFamily;
+use crate::error::{Result, misuse};
+use crate::model::{PyModel, PySignals};
+use crate::plant::PyQuadrotor;
+use crate::workers::{PyWorkers, or_default};
+
+/// Where runs start, where they should end, how long they last.
+#[pyclass(frozen, name = "Task", module = "twinloop._core")]
+pub struct PyTask(pub Task);
+
+#[pymethods]
+impl PyTask {
+    #[new]
+    fn new(initial: Vector<'_>, target: Vector<'_>, steps: usize) -> Result<Self> {
+        Ok(Self(Task::new(vector(&initial), vector(&target), steps)?))
+    }
+}
+
+/// What a roll-out leaves: `m` runs of `n` steps; NaN after a run has stopped.
+#[pyclass(frozen, name = "Runs", module = "twinloop._core")]
+pub struct PyRuns {
+    runs: Vec<Trajectory>,
+    steps: usize,
+    states: usize,
+    commands: usize,
+}
+
+impl PyRuns {
+    /// One array of all runs; rows after `lasted + extra` are NaN.
+    fn stack<'py>(
+        &self,
+        py: Python<'py>,
+        rows: usize,
+        columns: usize,
+        of_run: impl Fn(&Trajectory) -> &[f64],
+    ) -> Bound<'py, PyArray3<f64>> {
+        let extra = rows - self.steps;
+        let run = |run: &Trajectory| {
+            let valid = (run.lasted + extra) * columns;
+            let nan = std::iter::repeat_n(f64::NAN, rows * columns - valid);
+            of_run(run)[..valid].iter().copied().chain(nan).collect::<Vec<_>>()
+        };
+        to_cube(py, [self.runs.len(), rows, columns], self.runs.iter().flat_map(run).collect())
+    }
+}
+
+#[pymethods]
+impl PyRuns {
+    #[getter]
+    fn states<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
+        self.stack(py, self.steps + 1, self.states, |run| &run.states)
+    }
+
+    #[getter]
+    fn measured<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
+        self.stack(py, self.steps + 1, self.states, |run| &run.measured)
+    }
+
+    #[getter]
+    fn commands<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
+        self.stack(py, self.steps, self.commands, |run| &run.commands)
+    }
+
+    #[getter]
+    fn lasted<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        to_integers(py, self.runs.iter().map(|run| run.lasted))
+    }
+}
+
+/// Closes the loop of each controller around the dynamics.
+#[pyfunction]
+#[pyo3(signature = (dynamics, family, parameters, task, signals, *, noise = None, divergence_factor = 10.0, workers = None))]
+#[expect(clippy::too_many_arguments, reason = "what a roll-out needs, named by keyword in Python")]
+pub fn rollout(
+    py: Python<'_>,
+    dynamics: &Bound<'_, PyAny>,
+    family: &PyFamily,
+    parameters: Matrix<'_>,
+    task: &PyTask,
+    signals: &PySignals,
+    noise: Option<Cube<'_>>,
+    divergence_factor: f64,
+    workers: Option<&PyWorkers>,
+) -> PyResult<PyRuns> {
+    let workers = or_default(workers)?;
+    let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
+    let (steps, states, commands) = (task.0.steps, signals.0.states(), signals.0.commands());
+    if task.0.initial.len() != states {
+        return Err(misuse(format!("task: expected {states} states, found {}", task.0.initial.len())).into());
+    }
+    let noise = noise_rows(noise, [parameters.len(), steps + 1, states])?;
+    let limits = signals.0.limits(divergence_factor);
+    let (parameters, noise) = (views(&parameters), views(&noise));
+    let (family, task, width) = (&*family.0, &task.0, workers.width());
+    let runs = if let Ok(model) = dynamics.cast::<PyModel>() {
+        let model = model.get();
+        py.detach(|| record(&model.core(), family, &parameters, task, &limits, &noise, width))
+    } else if let Ok(plant) = dynamics.cast::<PyQuadrotor>() {
+        let plant = plant.get();
+        py.detach(|| record(&plant.0, family, &parameters, task, &limits, &noise, width))
+    } else {
+        let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
+        let mut runs = Vec::new();
+        for (i, parameters) in parameters.iter().enumerate() {
+            let noise = noise.get(i..=i).unwrap_or(&[]);
+            runs.extend(record(&step, family, &[parameters], task, &limits, noise, width));
+            if let Some(error) = step.failure.take() {
+                return Err(error);
+            }
+        }
+        runs
+    };
+    Ok(PyRuns { runs, steps, states, commands })
+}
+
+/// The noise of each run, or none at all.
+fn noise_rows(noise: Option<Cube<'_>>, expected: [usize; 3]) -> Result<Vec<Vec<f64>>> {
+    let Some(noise) = noise else { return Ok(vec![]) };
+    let noise = noise.as_array();
+    if noise.shape() != expected {
+        return Err(misuse(format!("noise: expected shape {expected:?}, found {:?}", noise.shape())));
+    }
+    Ok(noise.outer_iter().map(|run| run.iter().copied().collect()).collect())
+}
+
+/// A step function in Python, called on the thread that asked for the roll-out.
+struct StepFunction<'a, 'py> {
+    function: &'a Bound<'py, PyAny>,
+    /// The exception that ended the run; the states after it are NaN, which ends the roll-out.
+    failure: RefCell<Option<PyErr>>,
+}
+
+impl StepFunction<'_, '_> {
+    fn call(&self, state: &[f64], command: &[f64]) -> PyResult<Vec<f64>> {
+        let py = self.function.py();
+        let arguments = (to_vector(py, state.to_vec()), to_vector(py, command.to_vec()));
+        let next: Vector<'_> = self.function.call1(arguments)?.extract()?;
+        let next = vector(&next);
+        if next.len() != state.len() {
+            let (expected, found) = (state.len(), next.len());
+            return Err(
+                misuse(format!("expected a next state of shape ({expected},), found ({found},)")).into()
+            );
+        }
+        Ok(next)
+    }
+}
+
+impl Dynamics for StepFunction<'_, '_> {
+    type Workspace<V: Lanes> = ();
+
+    fn workspace<V: Lanes>(&self) {}
+
+    fn step<V: Lanes>(&self, _workspace: &mut (), state: &mut [V], command: &[V]) {
+        let lane = |values: &[V], l: usize| values.iter().map(|value| value.lane(l)).collect::<Vec<_>>();
+        let next: PyResult<Vec<_>> =
+            (0..V::LANES).map(|l| self.call(&lane(state, l), &lane(command, l))).collect();
+        let next = next.unwrap_or_else(|error| {
+            self.failure.borrow_mut().get_or_insert(error);
+            vec![vec![f64::NAN; state.len()]; V::LANES]
+        });
+        for (j, state) in state.iter_mut().enumerate() {
+            *state = V::load(&next.iter().map(|next| next[j]).collect::<Vec<_>>());
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! The two loops as values.
+
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use twinloop_core::pareto::Objectives;
+use twinloop_core::{Frame, ModelSearch, Signals, TestSearch, TestSettings, Variation};
+
+use crate::arrays::{to_matrix, to_vector};
+use crate::controller::PyFamily;
+use crate::error::{Result, misuse};
+use crate::model::{PyModel, PySignals};
+use crate::pareto::distance;
+use crate::program::{PyGrammar, PyProgram};
+use crate::rollout::PyTask;
+use crate::selected::PySelectedTests;
+use crate::workers::PyWorkers;
+
+/// How a generation is made out of the last.
+#[pyclass(frozen, name = "Variation", module = "twinloop._core")]
+pub struct PyVariation(Variation);
+
+#[pymethods]
+impl PyVariation {
+    #[new]
+    #[pyo3(signature = (
+        population, *, mutation_share = 0.6, crossover_share = 0.3, reproduction_share = 0.1, elite_share = 0.1,
+        ranking_pressure = 1.8, archive_cap = 10_000, normalised_tradeoff = false,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "each is a named option of the paper's method")]
+    fn new(
+        population: usize,
+        mutation_share: f64,
+        crossover_share: f64,
+        reproduction_share: f64,
+        elite_share: f64,
+        ranking_pressure: f64,
+        archive_cap: usize,
+        normalised_tradeoff: bool,
+    ) -> Result<Self> {
+        let sum = mutation_share + crossover_share + reproduction_share;
+        if (sum - 1.0).abs() > 1e-9 {
+            return Err(misuse(format!(
+                "variation: expected shares of the operators that sum to 1, found {sum}"
+            )));
+        }
+        let variation = Variation {
+            population,
+            mutation_share,
+            crossover_share,
+            elite_share,
+            ranking_pressure,
+            archive_cap,
+            distance: distance(normalised_tradeoff),
+        };
+        Ok(Self(variation.validated()?))
+    }
+}
+
+/// The model loop as a value: every method that moves it returns a new one.
+#[pyclass(frozen, name = "ModelSearch", module = "twinloop._core")]
+pub struct PyModelSearch {
+    search: ModelSearch,
+    signals: Arc<Signals>,
+}
+
+impl PyModelSearch {
+    fn model(&self, member: usize) -> PyModel {
+        let learnt = self.search.search().archive().members()[member].clone();
+        PyModel::of(learnt, self.search.frame().clone(), self.signals.clone())
+    }
+}
+
+/// Objectives as an array.
+fn array<'py>(py: Python<'py>, objectives: &Objectives) -> Bound<'py, PyArray2<f64>> {
+    to_matrix(py, objectives.columns(), objectives.rows().flatten().copied().collect())
+}
+
+#[pymethods]
+impl PyModelSearch {
+    #[staticmethod]
+    fn start(
+        py: Python<'_>,
+        grammar: &PyGrammar,
+        form: &str,
+        variation: &PyVariation,
+        seed: u64,
+        selected: &PySelectedTests,
+        workers: &PyWorkers,
+    ) -> Result<Self> {
+        let (grammar, form, variation) = (grammar.0.clone(), form.parse()?, variation.0.clone());
+        let search =
+            py.detach(|| ModelSearch::start(grammar, form, variation, seed, &selected.0, &workers.0))?;
+        Ok(Self { search, signals: selected.0.signals().clone() })
+    }
+
+    fn learn(&self, py: Python<'_>, selected: &PySelectedTests, workers: &PyWorkers) -> Result<Self> {
+        let search = py.detach(|| self.search.clone().learn(&selected.0, &workers.0))?;
+        Ok(Self { search, signals: self.signals.clone() })
+    }
+
+    fn advance(
+        &self,
+        py: Python<'_>,
+        selected: &PySelectedTests,
+        generations: u64,
+        workers: &PyWorkers,
+    ) -> Result<Self> {
+        let search = py.detach(|| self.search.clone().advance(&selected.0, generations, &workers.0))?;
+        Ok(Self { search, signals: self.signals.clone() })
+    }
+
+    #[getter]
+    fn iteration(&self) -> u64 {
+        self.search.search().iteration()
+    }
+
+    #[getter]
+    fn generation(&self) -> u64 {
+        self.search.search().generation()
+    }
+
+    #[getter]
+    fn evaluations(&self) -> u64 {
+        self.search.search().evaluations()
+    }
+
+    #[getter]
+    fn spared(&self) -> u64 {
+        self.search.search().spared()
+    }
+
+    #[getter]
+    fn capped_generations(&self) -> u64 {
+        self.search.search().capped_generations()
+    }
+
+    #[getter]
+    fn intron_share(&self) -> f64 {
+        self.search.intron_share()
+    }
+
+    #[getter]
+    fn population(&self) -> Vec<PyProgram> {
+        self.search.search().population().iter().map(|learnt| PyProgram(learnt.clone())).collect()
+    }
+
+    #[getter]
+    fn population_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        array(py, self.search.search().objectives())
+    }
+
+    #[getter]
+    fn archive_size(&self) -> usize {
+        self.search.search().archive().len()
+    }
+
+    #[getter]
+    fn archive(&self) -> Vec<PyModel> {
+        (0..self.archive_size()).map(|member| self.model(member)).collect()
+    }
+
+    #[getter]
+    fn archive_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        array(py, &self.search.search().archive().objectives())
+    }
+
+    #[getter]
+    fn best(&self) -> usize {
+        self.search.best()
+    }
+
+    #[getter]
+    fn best_model(&self) -> PyModel {
+        self.model(self.search.best())
+    }
+
+    #[getter]
+    fn best_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        to_vector(py, self.search.search().archive().objectives_of(self.search.best()))
+    }
+
+    fn committee(&self, size: usize) -> Vec<usize> {
+        self.search.committee(size)
+    }
+}
+
+/// What the test loop optimises: mutants, caps, the optional third objective.
+#[pyclass(frozen, name = "TestSettings", module = "twinloop._core")]
+pub struct PyTestSettings(TestSettings);
+
+#[pymethods]
+impl PyTestSettings {
+    #[new]
+    #[pyo3(signature = (
+        *, control_quality = false, distance_cap = 3.0, mutants = 10, mutant_step = 0.05, mutation_step = 0.1,
+        divergence_factor = 10.0,
+    ))]
+    fn new(
+        control_quality: bool,
+        distance_cap: f64,
+        mutants: usize,
+        mutant_step: f64,
+        mutation_step: f64,
+        divergence_factor: f64,
+    ) -> Self {
+        let settings = TestSettings {
+            control_quality,
+            distance_cap,
+            mutants,
+            mutant_step,
+            mutation_step,
+            divergence_factor,
+        };
+        Self(settings)
+    }
+}
+
+/// The test loop as a value.
+#[pyclass(frozen, name = "TestSearch", module = "twinloop._core")]
+pub struct PyTestSearch(TestSearch);
+
+#[pymethods]
+impl PyTestSearch {
+    #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "models, task and settings, each a concept of its own")]
+    fn start(
+        py: Python<'_>,
+        committee: Vec<Bound<'_, PyModel>>,
+        family: &PyFamily,
+        task: &PyTask,
+        signals: &PySignals,
+        settings: &PyTestSettings,
+        variation: &PyVariation,
+        seed: u64,
+        iteration: u64,
+        workers: &PyWorkers,
+    ) -> Result<Self> {
+        let frame = one_frame(&committee)?;
+        if !frame.fits(&signals.0) {
+            return Err(misuse(
+                "committee: expected models with the states and commands of the signals".into(),
+            ));
+        }
+        let committee = committee.iter().map(|model| model.get().learnt.clone()).collect();
+        let (family, task, settings, variation) =
+            (family.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
+        let search = py.detach(|| {
+            TestSearch::start(
+                committee, frame, family, task, &signals.0, settings, variation, seed, iteration, &workers.0,
+            )
+        })?;
+        Ok(Self(search))
+    }
+
+    fn advance(&self, py: Python<'_>, generations: u64, workers: &PyWorkers) -> Self {
+        Self(py.detach(|| self.0.clone().advance(generations, &workers.0)))
+    }
+
+    #[getter]
+    fn generation(&self) -> u64 {
+        self.0.search().generation()
+    }
+
+    #[getter]
+    fn evaluations(&self) -> u64 {
+        self.0.search().evaluations()
+    }
+
+    #[getter]
+    fn capped_generations(&self) -> u64 {
+        self.0.search().capped_generations()
+    }
+
+    #[getter]
+    fn archive_size(&self) -> usize {
+        self.0.search().archive().len()
+    }
+
+    #[getter]
+    fn archive_genes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let members = self.0.search().archive().members();
+        let genes: Vec<f64> = members.iter().flat_map(|genes| genes.iter().copied()).collect();
+        to_matrix(py, genes.len() / members.len(), genes)
+    }
+
+    #[getter]
+    fn archive_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        array(py, &self.0.search().archive().objectives())
+    }
+
+    #[getter]
+    fn best(&self) -> usize {
+        self.0.best()
+    }
+
+    #[getter]
+    fn best_genes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        to_vector(py, self.0.search().archive().members()[self.0.best()].to_vec())
+    }
+
+    #[getter]
+    fn best_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        to_vector(py, self.0.search().archive().objectives_of(self.0.best()))
+    }
+
+    #[getter]
+    fn flat(&self) -> bool {
+        self.0.flat()
+    }
+}
+
+/// The frame that all models share.
+fn one_frame(models: &[Bound<'_, PyModel>]) -> Result<Arc<Frame>> {
+    match models.split_first() {
+        Some((first, others)) if others.iter().all(|model| model.get().frame == first.get().frame) => {
+            Ok(first.get().frame.clone())
+        }
+        _ => Err(misuse(
+            "committee: expected one model or more, all of one form and one set of signals".into(),
+        )),
+    }
+}

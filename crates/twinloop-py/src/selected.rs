@@ -1,0 +1,46 @@
+//! Selected tests.
+
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use twinloop_core::{Experiment, SelectedTests};
+
+use crate::arrays::{Matrix, Vector, rows, vector};
+use crate::controller::PyFamily;
+use crate::error::Result;
+use crate::model::PySignals;
+
+/// The tests that were run on the system, with their trajectories.
+#[pyclass(frozen, name = "SelectedTests", module = "twinloop._core")]
+pub struct PySelectedTests(pub Arc<SelectedTests>);
+
+#[pymethods]
+impl PySelectedTests {
+    #[new]
+    #[pyo3(signature = (signals, family, divergence_factor = 10.0))]
+    fn new(signals: &PySignals, family: &PyFamily, divergence_factor: f64) -> Result<Self> {
+        let selected = SelectedTests::new(signals.0.clone(), family.0.clone(), divergence_factor)?;
+        Ok(Self(Arc::new(selected)))
+    }
+
+    fn with_test(
+        &self,
+        parameters: Vector<'_>,
+        target: Vector<'_>,
+        states: Matrix<'_>,
+        commands: Matrix<'_>,
+    ) -> Result<Self> {
+        let signals = self.0.signals();
+        let experiment = Experiment {
+            parameters: vector(&parameters),
+            target: vector(&target),
+            states: rows("states", &states, signals.states())?.concat(),
+            commands: rows("commands", &commands, signals.commands())?.concat(),
+        };
+        Ok(Self(Arc::new(self.0.with_test(experiment)?)))
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+}
