@@ -1,0 +1,31 @@
+"""Twinloop: from a handful of experiments to a twin made of readable equations and a tuned controller."""
+
+from twinloop import contracts, controllers, errors, systems
+from twinloop._core import __version__
+from twinloop.campaign import Campaign
+from twinloop.errors import InvalidInput, NotAvailable, SystemFailure, TwinloopError
+from twinloop.models import Twin
+from twinloop.signals import Command, Signals, State
+from twinloop.systems import System
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+__all__ = [
+    "Campaign",
+    "Command",
+    "InvalidInput",
+    "NotAvailable",
+    "Signals",
+    "State",
+    "System",
+    "SystemFailure",
+    "Test",
+    "Trajectory",
+    "Twin",
+    "TwinloopError",
+    "__version__",
+    "contracts",
+    "controllers",
+    "errors",
+    "systems",
+]

@@ -1,0 +1,368 @@
+"""Types of the native engine: numbers in, numbers out; the packages above it give them names and units."""
+
+from collections.abc import Callable, Sequence
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+__version__: str
+
+def vector_widths() -> list[str]:
+    """Vector widths that this processor has, narrowest first."""
+
+@final
+class Workers:
+    """How work is carried out, never what comes out: a number of threads and a vector width."""
+
+    def __new__(cls, threads: int = 1, width: str = "auto") -> Workers: ...
+    @property
+    def threads(self) -> int: ...
+    @property
+    def width(self) -> str: ...
+
+@final
+class Program:
+    """Pages of instructions over registers: inputs first, then outputs, then spare ones."""
+
+    @staticmethod
+    def parse(text: str) -> Program: ...
+    @property
+    def inputs(self) -> int: ...
+    @property
+    def outputs(self) -> int: ...
+    @property
+    def registers(self) -> int: ...
+    @property
+    def page_lengths(self) -> list[int]: ...
+    @property
+    def instructions(self) -> list[tuple[str, int, int, int | float | None]]:
+        """(operation, destination, first, second): a register is an int, a constant a float, no operand None."""
+    @property
+    def intron_share(self) -> float: ...
+    def effective(self) -> Program: ...
+    def run(self, inputs: ArrayLike, workers: Workers | None = None) -> Floats:
+        """Outputs (rows, outputs) of inputs (rows, inputs)."""
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+@final
+class Grammar:
+    """What programs may look like and how they vary."""
+
+    def __new__(
+        cls,
+        inputs: int,
+        outputs: int,
+        *,
+        spare_registers: int = 4,
+        pages: int = 5,
+        page_length: int = 10,
+        operations: Sequence[str] = ("+", "-", "*", "/"),
+        writable_inputs: bool = True,
+        constant_share: float = 0.5,
+        constant_low: float = 1e-3,
+        constant_high: float = 10.0,
+        constant_step: float = 0.1,
+        mutation_rate: float = 0.02,
+        aligned_pages: float = 0.5,
+    ) -> Grammar: ...
+    def random(self, seed: int, count: int = 1) -> list[Program]: ...
+    def mutate(self, program: Program, seed: int) -> Program: ...
+    def crossover(self, first: Program, second: Program, seed: int) -> tuple[Program, Program]: ...
+
+@final
+class Signals:
+    """Period, scales, bounds and derivatives of states and commands, as numbers."""
+
+    def __new__(
+        cls,
+        dt: float,
+        state_scales: ArrayLike,
+        command_bounds: ArrayLike,
+        command_scales: ArrayLike,
+        derivative_of: Sequence[int | None],
+    ) -> Signals: ...
+
+@final
+class Model:
+    """A program with the form that makes it dynamics: "absolute", "increment" or "acceleration"."""
+
+    def __new__(cls, program: Program, form: str, signals: Signals) -> Model: ...
+    @staticmethod
+    def shape(form: str, signals: Signals) -> tuple[int, int]:
+        """Inputs and outputs that a program must have for this form."""
+    @property
+    def program(self) -> Program: ...
+    @property
+    def form(self) -> str: ...
+    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> Floats:
+        """Next states (rows, n_x) of states (rows, n_x) and commands (rows, n_u)."""
+
+@final
+class Quadrotor:
+    """Attitude dynamics of a quadrotor under four rotor speeds, one Runge-Kutta step a period."""
+
+    def __new__(
+        cls,
+        dt: float,
+        *,
+        arm: float,
+        inertia: ArrayLike,
+        rotor_inertia: float,
+        thrust_factor: float,
+        drag_factor: float,
+        gyroscopic: str,
+    ) -> Quadrotor: ...
+    def derivative(self, state: ArrayLike, command: ArrayLike) -> Floats: ...
+    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> Floats: ...
+
+@final
+class Family:
+    """A family of controllers: a bounded parameter vector and a law, one implementation for search and real run."""
+
+    @staticmethod
+    def pid(
+        signals: Signals,
+        axes: Sequence[tuple[int, int | None]],
+        low: ArrayLike,
+        high: ArrayLike,
+        logarithmic: Sequence[bool],
+        matrix: ArrayLike | None,
+        offset: ArrayLike | None,
+        power: float,
+    ) -> Family:
+        """One PID an axis (angle, rate or None); genes (K_P, K_I, K_D) per axis; matrix (n_u, axes)."""
+    @property
+    def size(self) -> int: ...
+    def controller(self, parameters: ArrayLike) -> Controller: ...
+
+@final
+class Controller:
+    """One controller of a family, with its memory."""
+
+    @property
+    def parameters(self) -> Floats: ...
+    def reset(self) -> None: ...
+    def command(self, state: ArrayLike, target: ArrayLike) -> Floats: ...
+
+@final
+class Task:
+    """Where runs start, where they should end, how long they last."""
+
+    def __new__(cls, initial: ArrayLike, target: ArrayLike, steps: int) -> Task: ...
+
+@final
+class Runs:
+    """What a roll-out leaves: `m` runs of `n` steps; NaN after a run has stopped."""
+
+    @property
+    def states(self) -> Floats:
+        """True states (m, n + 1, n_x)."""
+    @property
+    def measured(self) -> Floats:
+        """What the controller read (m, n + 1, n_x)."""
+    @property
+    def commands(self) -> Floats:
+        """Commands (m, n, n_u)."""
+    @property
+    def lasted(self) -> Integers:
+        """Steps before each run stopped (m,); n if it did not."""
+
+def rollout(
+    dynamics: Model | Quadrotor | Callable[[Floats, Floats], ArrayLike],
+    family: Family,
+    parameters: ArrayLike,
+    task: Task,
+    signals: Signals,
+    *,
+    noise: ArrayLike | None = None,
+    divergence_factor: float = 10.0,
+    workers: Workers | None = None,
+) -> Runs:
+    """Closes the loop of each controller (m, size) around the dynamics. noise (m, n + 1, n_x) is added to what
+    the controller reads. A Python callable (state (n_x,), command (n_u,)) -> next state is called on this thread."""
+
+@final
+class SelectedTests:
+    """The tests that were run on the system, with their trajectories."""
+
+    def __new__(cls, signals: Signals, family: Family, divergence_factor: float = 10.0) -> SelectedTests: ...
+    def with_test(
+        self, parameters: ArrayLike, target: ArrayLike, states: ArrayLike, commands: ArrayLike
+    ) -> SelectedTests:
+        """These and one more: states (n + 1, n_x) as measured, commands (n, n_u)."""
+    def __len__(self) -> int: ...
+
+def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> Floats:
+    """One-step-ahead error of each model on each test (models, tests)."""
+
+def closed_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> Floats:
+    """Free-run error with the controller in the loop (models, tests)."""
+
+def final_distances(
+    models: Sequence[Model],
+    family: Family,
+    parameters: ArrayLike,
+    task: Task,
+    signals: Signals,
+    *,
+    divergence_factor: float = 10.0,
+    workers: Workers | None = None,
+) -> Floats:
+    """Distance of the last state to the target (models, tests); infinite where the run diverged."""
+
+def discrimination(distances: ArrayLike, cap: float) -> Floats:
+    """1 / variance over models (tests,) of distances (models, tests), each capped."""
+
+def instability(distances: ArrayLike, cap: float) -> Floats:
+    """Variance over mutants (tests,) of distances (mutants, tests); one at the cap counts as cap squared."""
+
+def ranks(objectives: ArrayLike) -> Integers: ...
+def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats: ...
+def select(objectives: ArrayLike, count: int) -> Integers: ...
+def ideal_point(objectives: ArrayLike) -> Floats: ...
+def best_tradeoff(objectives: ArrayLike, normalised: bool = False) -> int: ...
+
+@final
+class Archive:
+    """Non-dominated set of rows, each with the number under which it was offered."""
+
+    def __new__(cls, columns: int, width: str = "auto") -> Archive: ...
+    def offer(self, objectives: ArrayLike) -> Integers:
+        """Offers rows (n, columns) in order; the numbers of the members after it."""
+    def prune(self, cap: int) -> bool: ...
+    @property
+    def objectives(self) -> Floats: ...
+    @property
+    def members(self) -> Integers: ...
+    def __len__(self) -> int: ...
+
+@final
+class Variation:
+    """How a generation is made out of the last: population, shares, elitism, ranking, cap of the archive."""
+
+    def __new__(
+        cls,
+        population: int,
+        *,
+        mutation_share: float = 0.6,
+        crossover_share: float = 0.3,
+        reproduction_share: float = 0.1,
+        elite_share: float = 0.1,
+        ranking_pressure: float = 1.8,
+        archive_cap: int = 10_000,
+        normalised_tradeoff: bool = False,
+    ) -> Variation: ...
+
+@final
+class ModelSearch:
+    """The model loop as a value: every method that moves it returns a new one."""
+
+    @staticmethod
+    def start(
+        grammar: Grammar,
+        form: str,
+        variation: Variation,
+        seed: int,
+        selected: SelectedTests,
+        workers: Workers,
+    ) -> ModelSearch:
+        """A random population, evaluated, and its non-dominated set."""
+    def learn(self, selected: SelectedTests, workers: Workers) -> ModelSearch:
+        """The same population and non-dominated set, judged on more tests: a new iteration, generation 0."""
+    def advance(self, selected: SelectedTests, generations: int, workers: Workers) -> ModelSearch: ...
+    @property
+    def iteration(self) -> int: ...
+    @property
+    def generation(self) -> int: ...
+    @property
+    def evaluations(self) -> int:
+        """Models that were run on the tests since the start."""
+    @property
+    def spared(self) -> int:
+        """Offspring that were not run: their effective code was their parent's."""
+    @property
+    def capped_generations(self) -> int: ...
+    @property
+    def intron_share(self) -> float:
+        """Mean over the population."""
+    @property
+    def population(self) -> list[Program]: ...
+    @property
+    def population_objectives(self) -> Floats: ...
+    @property
+    def archive_size(self) -> int: ...
+    @property
+    def archive(self) -> list[Model]: ...
+    @property
+    def archive_objectives(self) -> Floats:
+        """(members, 2 N): open loop and closed loop of each test in turn."""
+    @property
+    def best(self) -> int:
+        """The member that is the best trade-off."""
+    @property
+    def best_model(self) -> Model: ...
+    @property
+    def best_objectives(self) -> Floats: ...
+    def committee(self, size: int) -> list[int]:
+        """At most `size` members, the best trade-off first, spread by crowding."""
+
+@final
+class TestSettings:
+    """What the test loop optimises: mutants, caps, the optional third objective."""
+
+    def __new__(
+        cls,
+        *,
+        control_quality: bool = False,
+        distance_cap: float = 3.0,
+        mutants: int = 10,
+        mutant_step: float = 0.05,
+        mutation_step: float = 0.1,
+        divergence_factor: float = 10.0,
+    ) -> TestSettings: ...
+
+@final
+class TestSearch:
+    """The test loop as a value."""
+
+    @staticmethod
+    def start(
+        committee: Sequence[Model],
+        family: Family,
+        task: Task,
+        signals: Signals,
+        settings: TestSettings,
+        variation: Variation,
+        seed: int,
+        iteration: int,
+        workers: Workers,
+    ) -> TestSearch:
+        """A random population of tests over a committee whose first member is the best trade-off."""
+    def advance(self, generations: int, workers: Workers) -> TestSearch: ...
+    @property
+    def generation(self) -> int: ...
+    @property
+    def evaluations(self) -> int: ...
+    @property
+    def capped_generations(self) -> int: ...
+    @property
+    def archive_size(self) -> int: ...
+    @property
+    def archive_genes(self) -> Floats: ...
+    @property
+    def archive_objectives(self) -> Floats:
+        """(members, 2 or 3): discrimination, instability, control quality."""
+    @property
+    def best(self) -> int: ...
+    @property
+    def best_genes(self) -> Floats: ...
+    @property
+    def best_objectives(self) -> Floats: ...
+    @property
+    def flat(self) -> bool:
+        """Whether every candidate so far had the same distance on the best model: it ignores the commands."""

@@ -1,0 +1,195 @@
+"""The command `twinloop`: checks what it was asked before it works, and exits 0, 1 or 2."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from twinloop import __version__
+from twinloop.campaign import Campaign
+from twinloop.console import Watch
+from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
+from twinloop.files import check_picture, check_writable, write_text
+from twinloop.presets import PRESETS, options_of, parsed
+from twinloop.reproduce.command import reproduce
+from twinloop.result import Result, summary, to_json
+from twinloop.run_info import Stopwatch
+from twinloop.systems import BUILT_IN, Quadrotor
+from twinloop.text import render
+
+Answer = TypeVar("Answer")
+
+
+class OneSentence(click.Group):
+    """A group of commands that says what went wrong in one sentence, and exits 1 or 2."""
+
+    def main(self, args: Any = None, prog_name: str | None = None, **extra: Any) -> Any:  # type: ignore[override]
+        """Runs the command line; see `click.Command.main`."""
+        if not extra.pop("standalone_mode", True):
+            return super().main(args, prog_name, standalone_mode=False, **extra)
+        try:
+            code = super().main(args, prog_name, standalone_mode=False, **extra)
+        except click.ClickException as misuse:
+            _fail(misuse.format_message(), misuse.exit_code)
+        except (InvalidInput, NotAvailable) as misuse:
+            _fail(str(misuse), 2)
+        except TwinloopError as failure:
+            _fail(str(failure), 1)
+        except (click.Abort, KeyboardInterrupt):
+            _fail("Interrupted before there was a result.", 130)
+        except OSError as failure:
+            _fail(f"The system refused: {failure}.", 1)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+@click.group(
+    cls=OneSentence, context_settings={"help_option_names": ["-h", "--help"]}, invoke_without_command=True
+)
+@click.version_option(__version__, prog_name="twinloop", message="%(prog)s %(version)s")
+@click.pass_context
+def main(context: click.Context) -> None:
+    """From a handful of experiments to a twin made of readable equations and a tuned controller."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+@main.command()
+@click.argument("system")
+@click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
+@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--preset", default="paper", show_default=True, help=f"Set of options: {', '.join(PRESETS)}.")
+@click.option(
+    "--experiments", type=int, default=4, show_default=True, help="Runs on the system, the first included."
+)
+@click.option("--generations", type=int, help="Of the model loop, in each iteration.")
+@click.option("--test-generations", type=int, help="Of the test loop; by default a share of --generations.")
+@click.option(
+    "--noise", type=float, default=0.0, show_default=True, help="Of the sensors, rad; five times in rad/s."
+)
+@click.option(
+    "--gyroscopic", default="physical", show_default=True, help="Signs of the rotor terms: physical, print."
+)
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Any other option of the preset.")
+@click.option("--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON.")
+@click.option("--plot", type=Path, metavar="FILE.svg|png", help="Also draw the runs and the errors.")
+@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.pass_context
+def run(
+    context: click.Context,
+    system: str,
+    seed: int,
+    threads: int | None,
+    preset: str,
+    experiments: int,
+    generations: int | None,
+    test_generations: int | None,
+    noise: float,
+    gyroscopic: str,
+    changes: tuple[str, ...],
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Experiment on a built-in SYSTEM (quadrotor): learn its twin, tune its controller."""
+    if system not in BUILT_IN:
+        raise unknown("system", system, BUILT_IN)
+    if experiments < 1:
+        raise InvalidInput(
+            f"--experiments: expected at least 1, found {experiments}; the first flight counts."
+        )
+    options = dict(_change(change) for change in changes)
+    options |= {} if generations is None else {"model_generations": generations}
+    options |= {} if test_generations is None else {"test_generations": test_generations}
+    rig = BUILT_IN[system](noise=noise, seed=seed, gyroscopic=gyroscopic)
+    watch = Watch(options_of(preset, options), experiments, system)
+    campaign = Campaign(
+        rig.signals,
+        controller=rig.controller,
+        initial_state=rig.initial_state,
+        target_state=rig.target_state,
+        duration=rig.duration,
+        preset=preset,
+        seed=seed,
+        options=options,
+        threads=threads,
+        progress=watch,
+    )
+    if output is not None:
+        check_writable(output, [".json"])
+    if plot is not None:
+        check_picture(plot)
+
+    stopwatch = Stopwatch(campaign.threads)
+    result = _worked(campaign, rig, watch, experiments, _described(system, rig), stopwatch)
+    if output is not None:
+        write_text(output, to_json(result))
+    if plot is not None:
+        _uninterrupted(lambda: _draw(campaign, plot))
+    click.echo(to_json(result) if as_json else render(result), nl=False)
+    context.exit(130 if campaign.interrupted else 0)
+
+
+main.add_command(reproduce)
+
+
+def _worked(
+    campaign: Campaign,
+    rig: Quadrotor,
+    watch: Watch,
+    experiments: int,
+    system: dict[str, object],
+    clock: Stopwatch,
+) -> Result:
+    with watch:
+        campaign.run(rig, experiments)
+        if not campaign.experiments:
+            raise KeyboardInterrupt
+        if not campaign.interrupted:
+            with suppress(KeyboardInterrupt):
+                _ = campaign.twin
+    return _uninterrupted(lambda: summary(campaign, system, clock.info()))
+
+
+def _uninterrupted(work: Callable[[], Answer]) -> Answer:
+    """Does short work to its end, even if Ctrl-C is pressed once more."""
+    try:
+        return work()
+    except KeyboardInterrupt:
+        return work()
+
+
+def _described(name: str, rig: Quadrotor) -> dict[str, object]:
+    return {
+        "name": name,
+        "noise": rig.noise,
+        "gyroscopic": rig.gyroscopic,
+        "inertia": rig.inertia.tolist(),
+        "natural_frequency": rig.natural_frequency,
+    }
+
+
+def _draw(campaign: Campaign, path: Path) -> None:
+    from twinloop.plots import campaign_picture  # only who draws pays for matplotlib
+
+    campaign_picture(campaign, path)
+
+
+def _change(text: str) -> tuple[str, object]:
+    name, separator, value = text.partition("=")
+    if not separator:
+        raise InvalidInput(f"--set: expected NAME=VALUE, found {text!r}; such as --set pages=3.")
+    return name.strip(), parsed(name.strip(), value.strip())
+
+
+def _fail(sentence: str, code: int) -> None:
+    click.echo(f"twinloop: {sentence}", err=True)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,7 @@
+"""Families of controllers: bounded gains and a law, one implementation for search and real run."""
+
+from twinloop.controllers.family import Controller, Family, Gain, UnboundFamily
+from twinloop.controllers.mixer import Mixer
+from twinloop.controllers.pid import PID
+
+__all__ = ["PID", "Controller", "Family", "Gain", "Mixer", "UnboundFamily"]

@@ -1,0 +1,35 @@
+"""From what an axis asks for to what the actuators get: a linear map, a power, and the bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twinloop.arrays import Floats, floats, number
+
+
+@dataclass(frozen=True, eq=False)
+class Mixer:
+    """command = clip(sign(v) |v| ** power), v = matrix u + offset, with u one entry an axis.
+
+    Args:
+        matrix: (n_u, axes), from the axes to the actuators.
+        offset: (n_u,), what the actuators get when all axes ask for nothing; zeros by default.
+        power: exponent, such as 0.5 from squared rotor speeds to rotor speeds.
+        unit: the unit of u, for the units of the gains.
+
+    Raises:
+        InvalidInput: a shape that does not fit, or numbers that are not finite.
+    """
+
+    matrix: Floats
+    offset: Floats | None = None
+    power: float = 1.0
+    unit: str = "u"
+
+    def __post_init__(self) -> None:
+        matrix = floats("Mixer, matrix (commands, axes)", self.matrix, (None, None))
+        rows = len(matrix)
+        offset = [0.0] * rows if self.offset is None else self.offset
+        object.__setattr__(self, "matrix", matrix)
+        object.__setattr__(self, "offset", floats("Mixer, offset (one entry a command)", offset, (rows,)))
+        object.__setattr__(self, "power", number("Mixer, power", self.power, above=0.0))

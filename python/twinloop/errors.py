@@ -1,0 +1,57 @@
+"""Misuse and failure, each said in one sentence: what was expected, what was found, what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+
+class TwinloopError(Exception):
+    """Everything that Twinloop raises on purpose."""
+
+
+class InvalidInput(TwinloopError, ValueError):
+    """Something that was passed in cannot be used; nothing was changed by the call."""
+
+
+class SystemFailure(TwinloopError, RuntimeError):
+    """The system under test raised, or answered with something that is no next state."""
+
+
+class NotAvailable(TwinloopError, RuntimeError):
+    """What was asked for does not exist yet, or not in this installation."""
+
+
+def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:
+    """The error for a name that is not on a list.
+
+    Args:
+        kind: what the name stands for, such as "preset".
+        found: the name that was given.
+        known: the names that there are.
+
+    Returns:
+        An error that names the nearest known name, or all of them if none is near.
+    """
+    names = [str(name) for name in known]
+    near = difflib.get_close_matches(str(found), names, n=1)
+    advice = (
+        f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names) or '(there are none)'}."
+    )
+    return InvalidInput(f"Unknown {kind} {str(found)!r}: {advice}")
+
+
+@contextmanager
+def engine_input() -> Iterator[None]:
+    """Turns the engine's refusals into `InvalidInput`, with the engine's own sentence.
+
+    Raises:
+        InvalidInput: where the engine raised a ValueError.
+    """
+    try:
+        yield
+    except TwinloopError:
+        raise
+    except ValueError as refusal:
+        raise InvalidInput(str(refusal)) from refusal

@@ -1,0 +1,67 @@
+"""Flies one test on dynamics, real or learnt, through the engine's roll-out; there is no second loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+Dynamics = _core.Model | _core.Quadrotor | Callable[[Floats, Floats], Floats]
+
+
+def fly(
+    dynamics: Dynamics,
+    test: Test,
+    *,
+    noise: Floats | None = None,
+    divergence_factor: float = 10.0,
+) -> Trajectory:
+    """Closes the loop of the test's controller around dynamics.
+
+    Args:
+        dynamics: an engine's model or plant, or a function (state (n_x,), command (n_u,)) -> next state.
+        test: what to fly.
+        noise: what the sensors add to each state (n + 1, n_x), in the units of the states; None: nothing.
+        divergence_factor: multiple of a state's scale beyond which the run counts as diverged and is cut.
+
+    Returns:
+        The measured run, with the true states beside it; cut before the step that diverged.
+
+    Raises:
+        InvalidInput: the engine refused the arguments.
+    """
+    signals = test.family.signals
+    with engine_input():
+        runs = _core.rollout(
+            dynamics,
+            test.family.engine,
+            test.genes[np.newaxis],
+            test.task,
+            signals.engine,
+            noise=None if noise is None else noise[np.newaxis],
+            divergence_factor=divergence_factor,
+        )
+    lasted = int(runs.lasted[0])
+    completed = lasted == test.steps
+    reason = (
+        ""
+        if completed
+        else (
+            f"a state left {divergence_factor:g} times its scale, or stopped being finite, "
+            f"{(lasted + 1) * signals.dt:.3g} s after the start"
+        )
+    )
+    return Trajectory(
+        signals.dt * np.arange(lasted + 1, dtype=np.float64),
+        runs.measured[0, : lasted + 1],
+        runs.commands[0, :lasted],
+        ended="completed" if completed else "diverged",
+        reason=reason,
+        true_states=runs.states[0, : lasted + 1],
+    )

@@ -1,0 +1,118 @@
+"""What a campaign remembers of its iterations: plain records, one for each turn of the double loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One run on the system.
+
+    Args:
+        test: what was asked for.
+        trajectory: what the system answered.
+        before: closed-loop error of the twin before it learnt the run; None if there was no twin yet.
+        frozen: closed-loop error of the model that never moves, on the run.
+        final_distance: distance of the last measured state to the target; None if the run was cut.
+    """
+
+    test: Test
+    trajectory: Trajectory
+    before: float | None
+    frozen: float
+    final_distance: float | None
+
+
+@dataclass(frozen=True)
+class TestLoop:
+    """One turn of the test loop.
+
+    Args:
+        test: number of the test that it gave.
+        genes: gains of the test, in their units.
+        objectives: of the test: discrimination, instability and, where it is one, control quality.
+        flat: whether every candidate had the same distance on the best model: it ignores the commands.
+        generations: that it ran.
+        archive_size: non-dominated tests.
+        evaluations: tests that were judged.
+        predicted: final distance on the best model; infinite if it diverged.
+        flown: final distance on the system, mean over complete runs; None if there was none.
+    """
+
+    __test__ = False  # a name that pytest would otherwise collect
+
+    test: int
+    genes: tuple[float, ...]
+    objectives: tuple[float, ...]
+    flat: bool
+    generations: int
+    archive_size: int
+    evaluations: int
+    predicted: float
+    flown: float | None = None
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One turn of the model loop, and the tests asked for after it; iteration 0 is the random population.
+
+    Args:
+        iteration: its number.
+        generations: that it ran.
+        tests: numbers of the selected tests, in the order they were told.
+        archive_size: non-dominated models.
+        capped_generations: generations in which the non-dominated set was pruned to its cap.
+        open_loop: of the best trade-off, one for each selected test, SI units squared.
+        closed_loop: of the best trade-off, one for each selected test, SI units squared.
+        normalised: closed_loop over that of the model that never moves.
+        intron_share: mean share of instructions that cannot affect the outputs, over the population.
+        evaluations: models that were run on the tests since the start.
+        spared: offspring that were not run since the start: their effective code was their parent's.
+        asked: the test loops that followed.
+    """
+
+    iteration: int
+    generations: int
+    tests: tuple[int, ...]
+    archive_size: int
+    capped_generations: int
+    open_loop: tuple[float, ...]
+    closed_loop: tuple[float, ...]
+    normalised: tuple[float, ...]
+    intron_share: float
+    evaluations: int
+    spared: int
+    asked: tuple[TestLoop, ...] = ()
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a campaign is, as told to its progress callback after every chunk of work.
+
+    Args:
+        phase: "models", "tests" or "experiment".
+        iteration: of the double loop.
+        generation: of the loop that is running.
+        generations: that it will run.
+        told: experiments that were told.
+        tests: numbers of the tests that are being learnt.
+        open_loop: of the best trade-off, one for each of them.
+        closed_loop: of the best trade-off, one for each of them.
+        archive_size: of the loop that is running.
+        evaluations: of the loop that is running, since its start.
+    """
+
+    phase: str
+    iteration: int
+    generation: int
+    generations: int
+    told: int
+    tests: tuple[int, ...]
+    open_loop: tuple[float, ...]
+    closed_loop: tuple[float, ...]
+    archive_size: int
+    evaluations: int

@@ -1,0 +1,162 @@
+"""What a campaign asked for and what it was told; a bad record is refused and leaves the book as it was."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import uuid
+from collections.abc import Callable, Sequence
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import InvalidInput, engine_input
+from twinloop.history import Experiment, Iteration, TestLoop
+from twinloop.objectives import frozen_error
+from twinloop.setup import Setup
+from twinloop.test import Test, check_signals, final_distance
+from twinloop.trajectory import Trajectory, check_recorded
+
+
+class Logbook:
+    """Tests by number, experiments in the order they were told.
+
+    Args:
+        setup: of the campaign.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.tests: list[Test] = []
+        self.experiments: list[Experiment] = []
+        self.asked: list[tuple[int, TestLoop]] = []
+        self.selected = setup.none_selected()
+        self._identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
+
+    def new_test(self, genes: Floats, predicted: float | None = None) -> Test:
+        """Enters a test.
+
+        Args:
+            genes: gains (size,), in their units.
+            predicted: final distance that is expected.
+
+        Returns:
+            The test, under the next number.
+        """
+        test = Test(
+            self.setup.family,
+            genes,
+            self.setup.initial_state,
+            self.setup.target_state,
+            self.setup.steps,
+            number=len(self.tests),
+            campaign=self._identity,
+            predicted=predicted,
+        )
+        self.tests.append(test)
+        return test
+
+    def enter_loop(self, iteration: int, test: Test, search: _core.TestSearch) -> None:
+        """Enters the test loop that gave a test.
+
+        Args:
+            iteration: of the models that judged it.
+            test: that it gave.
+            search: at its end.
+        """
+        assert test.predicted is not None
+        loop = TestLoop(
+            test=test.number,
+            genes=tuple(test.genes.tolist()),
+            objectives=tuple(search.best_objectives.tolist()),
+            flat=search.flat,
+            generations=search.generation,
+            archive_size=search.archive_size,
+            evaluations=search.evaluations,
+            predicted=test.predicted,
+        )
+        self.asked.append((iteration, loop))
+
+    def tell(
+        self, test: object, trajectory: Trajectory, judge: Callable[[_core.SelectedTests], float | None]
+    ) -> None:
+        """Enters an experiment.
+
+        Args:
+            test: that was run.
+            trajectory: what the system answered.
+            judge: the error on it of what is known so far.
+
+        Raises:
+            InvalidInput: a test of another campaign, or a trajectory that cannot be learnt from.
+        """
+        known = self._known(test)
+        check_recorded(trajectory, self.setup.signals, known.steps, self.setup.options.divergence_factor)
+        with engine_input():
+            run = (known.genes, known.target_state, trajectory.states, trajectory.commands)
+            selected = self.selected.with_test(*run)
+            before = judge(self.setup.none_selected().with_test(*run))
+        complete = trajectory.ended == "completed" and trajectory.steps == known.steps
+        distance = final_distance(trajectory.states[-1], known.target_state) if complete else None
+        experiment = Experiment(known, trajectory, before, frozen_error(trajectory), distance)
+        self.selected = selected
+        self.experiments.append(experiment)
+
+    def measured(self, test: int) -> float | None:
+        """Final distance of a test on the system, mean over complete runs; None if there was none.
+
+        Args:
+            test: its number.
+        """
+        distances = [
+            run.final_distance
+            for run in self.experiments
+            if run.test.number == test and run.final_distance is not None
+        ]
+        return math.fsum(distances) / len(distances) if distances else None
+
+    def best(self) -> Test:
+        """The flown test that ended nearest to its target; the first one if no run was complete."""
+
+        def distance(test: Test) -> float:
+            measured = self.measured(test.number)
+            return math.inf if measured is None else measured
+
+        return min((run.test for run in self.experiments), key=distance)
+
+    def waiting(self) -> Test | None:
+        """The first test that was asked for and not told; before the first flight, the last that was made."""
+        told = {run.test.number for run in self.experiments}
+        for _, loop in self.asked:
+            if loop.test not in told:
+                return self.tests[loop.test]
+        return self.tests[-1] if self.tests and not told else None
+
+    def with_loops(self, records: Sequence[Iteration]) -> tuple[Iteration, ...]:
+        """Iterations with the test loops that followed each.
+
+        Args:
+            records: of the model loop.
+
+        Returns:
+            The same, complete.
+        """
+        loops = [
+            (iteration, dataclasses.replace(loop, flown=self.measured(loop.test)))
+            for iteration, loop in self.asked
+        ]
+        return tuple(
+            dataclasses.replace(
+                record, asked=tuple(loop for iteration, loop in loops if iteration == record.iteration)
+            )
+            for record in records
+        )
+
+    def _known(self, test: object) -> Test:
+        check_signals(test, self.setup.signals)
+        assert isinstance(test, Test)  # check_signals has refused everything else
+        if test.number >= len(self.tests) or not self.tests[test.number].same_as(test):
+            raise InvalidInput(
+                f"Campaign.tell: expected a test of this campaign, found test {test.number} of another; "
+                "tell it to the campaign that made it, or make it here with campaign.test(gains)."
+            )
+        return self.tests[test.number]

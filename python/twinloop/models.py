@@ -1,0 +1,164 @@
+"""The twin: a learnt simulator made of readable equations, with its known error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats, floats
+from twinloop.equations import equations
+from twinloop.errors import engine_input
+from twinloop.flight import fly
+from twinloop.signals import Signals
+from twinloop.test import Test, check_signals
+from twinloop.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class TestErrors:
+    """How well a twin follows one selected test.
+
+    Args:
+        test: number of the test; a replicate has a row of its own.
+        open_loop: mean squared error one step ahead, over steps and components, SI units squared.
+        closed_loop: mean squared error of the free run under the test's own controller, the same units.
+        normalised: closed_loop over that of the model that never moves; 1 means useless.
+        before: closed-loop error of the twin before it learnt the test; None if there was no twin yet.
+        after: closed-loop error now.
+    """
+
+    __test__ = False
+
+    test: int
+    open_loop: float
+    closed_loop: float
+    normalised: float
+    before: float | None
+    after: float
+
+
+class ErrorTable(tuple[TestErrors, ...]):
+    """Errors of a twin, one row for each selected test in the order they were told; printable."""
+
+    def __str__(self) -> str:
+        """A table as text."""
+        head = (
+            f"{'test':>4}  {'open loop':>10}  {'closed loop':>11}  {'normalised':>10}  {'before':>10} "
+            f" {'after':>10}"
+        )
+        lines = [head]
+        for row in self:
+            before = "-" if row.before is None else f"{row.before:.4g}"
+            lines.append(
+                f"{row.test:>4}  {row.open_loop:>10.4g}  {row.closed_loop:>11.4g}  {row.normalised:>10.4g}  "
+                f"{before:>10}  {row.after:>10.4g}"
+            )
+        return "\n".join(lines)
+
+
+class Twin:
+    """A model that stands in for the system.
+
+    Args:
+        model: the engine's model.
+        signals: what it is a model of.
+        errors: how well it follows the selected tests.
+        divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
+    """
+
+    def __init__(
+        self,
+        model: _core.Model,
+        signals: Signals,
+        errors: Iterable[TestErrors] = (),
+        divergence_factor: float = 10.0,
+    ) -> None:
+        self.model = model
+        self.signals = signals
+        self.errors = ErrorTable(errors)
+        self.divergence_factor = divergence_factor
+
+    def equations(self, digits: int = 6) -> str:
+        """The twin as text.
+
+        Args:
+            digits: significant digits of constants; 17 give every bit back.
+
+        Returns:
+            A legend, the parts that are used several times, and one equation a state.
+
+        Raises:
+            InvalidInput: digits out of range.
+        """
+        return equations(self.model, self.signals, digits)
+
+    def simulate(self, test: Test) -> Trajectory:
+        """Flies a test on the twin instead of the system.
+
+        Args:
+            test: any test for the same signals.
+
+        Returns:
+            The predicted run, cut where it diverges.
+
+        Raises:
+            InvalidInput: the test is for other signals.
+        """
+        check_signals(test, self.signals)
+        return fly(self.model, test, divergence_factor=self.divergence_factor)
+
+    def predict(self, states: ArrayLike, commands: ArrayLike) -> Floats:
+        """One step.
+
+        Args:
+            states: (n_x,) or (rows, n_x), SI units, radians.
+            commands: (n_u,) or (rows, n_u), in their units.
+
+        Returns:
+            The states one period later, in the shape of `states`; not finite where the model is not.
+
+        Raises:
+            InvalidInput: shapes that do not fit.
+        """
+        single = np.ndim(states) == 1
+        x = floats("States", np.atleast_2d(states), (None, self.signals.n_x))
+        u = floats("Commands", np.atleast_2d(commands), (len(x), self.signals.n_u))
+        with engine_input():
+            following = self.model.step(x, u)
+        return following[0] if single else following
+
+    def simulate_commands(self, initial_state: ArrayLike, commands: ArrayLike) -> Trajectory:
+        """A free run under given commands, without a controller.
+
+        Args:
+            initial_state: (n_x,), SI units, radians.
+            commands: (n, n_u), in their units, each held for one period.
+
+        Returns:
+            The predicted run, cut where it diverges.
+
+        Raises:
+            InvalidInput: shapes that do not fit.
+        """
+        state = floats("Initial state", initial_state, (self.signals.n_x,))
+        u = floats("Commands", commands, (None, self.signals.n_u))
+        limits = self.divergence_factor * np.array([state.scale for state in self.signals.states])
+        states = [state]
+        for command in u:
+            following = self.predict(states[-1], command)
+            if not (np.abs(following) <= limits).all():
+                break
+            states.append(following)
+        lasted = len(states) - 1
+        t = self.signals.dt * np.arange(lasted + 1, dtype=np.float64)
+        if lasted == len(u):
+            return Trajectory(t, np.array(states), u)
+        reason = f"a state left {self.divergence_factor:g} times its scale after {lasted} steps"
+        return Trajectory(t, np.array(states), u[:lasted], ended="diverged", reason=reason)
+
+    def __repr__(self) -> str:
+        return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"

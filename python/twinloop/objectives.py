@@ -1,0 +1,186 @@
+"""What models and tests are judged by, one function a formula, all minimised (paper, section IV)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.controllers import Family
+from twinloop.errors import InvalidInput, engine_input
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+
+def selected_tests(
+    tests: Sequence[Test], trajectories: Sequence[Trajectory], divergence_factor: float = 10.0
+) -> _core.SelectedTests:
+    """Tests and what the system answered, as the engine judges models on them.
+
+    Args:
+        tests: at least one, all of one family.
+        trajectories: one for each test.
+        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+
+    Returns:
+        The engine's set of selected tests.
+
+    Raises:
+        InvalidInput: none, another number of trajectories, or shapes that do not fit.
+    """
+    if not tests or len(tests) != len(trajectories):
+        raise InvalidInput(
+            f"Selected tests: expected a trajectory for each of at least one test, found {len(tests)} tests"
+            f" and {len(trajectories)} trajectories; pass both in the same order."
+        )
+    family = tests[0].family
+    with engine_input():
+        selected = _core.SelectedTests(family.signals.engine, family.engine, divergence_factor)
+        for test, trajectory in zip(tests, trajectories, strict=True):
+            selected = selected.with_test(
+                test.genes, test.target_state, trajectory.states, trajectory.commands
+            )
+    return selected
+
+
+def open_loop(
+    models: Sequence[_core.Model], selected: _core.SelectedTests, workers: _core.Workers | None = None
+) -> Floats:
+    """One-step-ahead error: mean squared error of M(ω_t, η_t) against η_{t+1} (paper, section IV.B).
+
+    Args:
+        models: m of them.
+        selected: N tests with their trajectories.
+        workers: how the work is carried out; one thread by default.
+
+    Returns:
+        Errors (m, N), SI units squared, mean over steps and components.
+
+    Raises:
+        InvalidInput: models for other signals.
+    """
+    with engine_input():
+        return _core.open_loop(models, selected, workers)
+
+
+def closed_loop(
+    models: Sequence[_core.Model], selected: _core.SelectedTests, workers: _core.Workers | None = None
+) -> Floats:
+    """Free-run error with the controller in the loop (paper, section IV.B).
+
+    Args:
+        models: m of them.
+        selected: N tests with their trajectories.
+        workers: how the work is carried out; one thread by default.
+
+    Returns:
+        Errors (m, N), SI units squared, mean over the n predicted states and all components;
+        1e6 (2 − t/n) for a run that diverged at step t.
+
+    Raises:
+        InvalidInput: models for other signals.
+    """
+    with engine_input():
+        return _core.closed_loop(models, selected, workers)
+
+
+def frozen_error(trajectory: Trajectory) -> float:
+    """Closed-loop error of the model that never moves (specification, section 3).
+
+    Args:
+        trajectory: a recorded run of at least one step.
+
+    Returns:
+        Mean square of states 1 to n minus state 0, over steps and components, SI units squared.
+
+    Raises:
+        InvalidInput: a trajectory without steps.
+    """
+    if trajectory.steps < 1:
+        raise InvalidInput("Frozen error: expected at least one step, found none; record a longer run.")
+    moved = trajectory.states[1:] - trajectory.states[0]
+    return float(math.fsum((moved * moved).ravel().tolist()) / moved.size)
+
+
+def normalised_error(closed_loop_error: float, frozen: float) -> float:
+    """Closed-loop error over that of the model that never moves; 1 means useless.
+
+    Args:
+        closed_loop_error: of a model on a test.
+        frozen: `frozen_error` of the test's trajectory.
+
+    Returns:
+        The ratio; infinite if the system never moved and the model did.
+    """
+    if frozen > 0.0:
+        return closed_loop_error / frozen
+    return 1.0 if closed_loop_error == 0.0 else math.inf
+
+
+def final_distances(
+    models: Sequence[_core.Model],
+    family: Family,
+    genes: ArrayLike,
+    task: _core.Task,
+    *,
+    divergence_factor: float = 10.0,
+    workers: _core.Workers | None = None,
+) -> Floats:
+    """Final distance δ of tests on models (paper, section IV.C).
+
+    Args:
+        models: m of them.
+        family: of the controllers.
+        genes: gains of k tests (k, size), in their units.
+        task: start, target and length of all of them.
+        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+        workers: how the work is carried out; one thread by default.
+
+    Returns:
+        Distances (m, k); infinite where the run diverged.
+
+    Raises:
+        InvalidInput: shapes that do not fit.
+    """
+    with engine_input():
+        return _core.final_distances(
+            models, family.engine, genes, task, family.signals.engine,
+            divergence_factor=divergence_factor, workers=workers,
+        )  # fmt: skip
+
+
+def discrimination(distances: ArrayLike, cap: float) -> Floats:
+    """1 / (variance over models + 1e-9) of capped final distances (paper, section IV.C).
+
+    Args:
+        distances: (models, tests), infinite where a run diverged.
+        cap: what a distance counts at most.
+
+    Returns:
+        One objective a test (tests,), to be minimised.
+
+    Raises:
+        InvalidInput: not a matrix, or a cap that is not above 0.
+    """
+    with engine_input():
+        return _core.discrimination(distances, cap)
+
+
+def instability(distances: ArrayLike, cap: float) -> Floats:
+    """Variance over mutants of a test's final distance on the best model (paper, section IV.C).
+
+    Args:
+        distances: (mutants, tests), infinite where a run diverged.
+        cap: what a distance counts at most; a mutant at the cap counts as its square.
+
+    Returns:
+        One objective a test (tests,), to be minimised.
+
+    Raises:
+        InvalidInput: not a matrix, or a cap that is not above 0.
+    """
+    with engine_input():
+        return _core.instability(distances, cap)

@@ -1,0 +1,94 @@
+"""Ranking and archive: they see rows of numbers, minimised, and nothing else (Deb et al., NSGA-II, 2002)."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+
+Archive = _core.Archive
+
+
+def ranks(objectives: ArrayLike) -> _core.Integers:
+    """Front of each row: 0 for those that nothing dominates, 1 for those that only they dominate, and so on.
+
+    Args:
+        objectives: (rows, columns), minimised.
+
+    Returns:
+        Ranks (rows,).
+
+    Raises:
+        InvalidInput: not a matrix, or NaN in it.
+    """
+    with engine_input():
+        return _core.ranks(objectives)
+
+
+def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats:
+    """Distance of each row to its neighbours in its front; infinite at the edges of the front.
+
+    Args:
+        objectives: (rows, columns), minimised.
+        ranks: front of each row (rows,).
+
+    Returns:
+        Distances (rows,), in shares of the front's extent.
+
+    Raises:
+        InvalidInput: shapes that do not fit, or NaN.
+    """
+    with engine_input():
+        return _core.crowding_distances(objectives, ranks)
+
+
+def select(objectives: ArrayLike, count: int) -> _core.Integers:
+    """The best rows by rank, then by crowding distance.
+
+    Args:
+        objectives: (rows, columns), minimised.
+        count: how many.
+
+    Returns:
+        Their numbers (count,), best first.
+
+    Raises:
+        InvalidInput: not a matrix, NaN in it, or more than there are.
+    """
+    with engine_input():
+        return _core.select(objectives, count)
+
+
+def ideal_point(objectives: ArrayLike) -> Floats:
+    """Smallest value of each objective (paper, section IV.A).
+
+    Args:
+        objectives: (rows, columns), minimised.
+
+    Returns:
+        The point (columns,).
+
+    Raises:
+        InvalidInput: not a matrix, or no row.
+    """
+    with engine_input():
+        return _core.ideal_point(objectives)
+
+
+def best_tradeoff(objectives: ArrayLike, normalised: bool = False) -> int:
+    """The row nearest to the ideal point (paper, section IV.A).
+
+    Args:
+        objectives: (rows, columns), minimised.
+        normalised: measure in extents of the objectives; the paper does not.
+
+    Returns:
+        Its number.
+
+    Raises:
+        InvalidInput: not a matrix, or no row.
+    """
+    with engine_input():
+        return _core.best_tradeoff(objectives, normalised)

@@ -1,0 +1,174 @@
+"""Pictures of a campaign: real runs against the twin, errors by iteration; needs matplotlib."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from twinloop.campaign import Campaign
+from twinloop.errors import NotAvailable
+
+SUFFIXES = (".svg", ".png")
+INK, FAINT, TWIN, TARGET = "#22272e", "#c9ced6", "#d1495b", "#6b7280"
+CYCLE = ("#22577a", "#d1495b", "#2a9d8f", "#e09f3e", "#7b4b94", "#6b7280", "#8ab17d", "#b5651d")
+STYLE: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": FAINT,
+    "axes.titlesize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#eceef1",
+    "grid.linewidth": 0.8,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "twinloop",  # equal pictures are equal files
+}
+
+
+def require() -> Any:
+    """Matplotlib itself.
+
+    Raises:
+        NotAvailable: it is not installed.
+    """
+    try:
+        return importlib.import_module("matplotlib")
+    except ImportError as missing:
+        raise NotAvailable(
+            "Pictures need matplotlib, which is not installed: pip install 'twinloop[plot]'."
+        ) from missing
+
+
+def campaign_picture(campaign: Campaign, path: Path) -> None:
+    """Every state of every test, flown and predicted, above the errors by iteration.
+
+    Args:
+        campaign: with at least one experiment told.
+        path: where to write; its suffix is .svg or .png.
+
+    Raises:
+        NotAvailable: matplotlib is missing, or nothing was told.
+        OSError: the file cannot be written.
+    """
+    with require().rc_context(STYLE):
+        columns, rows = len(campaign.experiments), campaign.signals.n_x
+        figure = _figure(max(6.4, 1.2 + 2.2 * columns), 1.15 * rows + 3.4)
+        above, below = figure.subfigures(2, 1, height_ratios=[1.15 * rows + 0.6, 2.8])
+        _runs(above, campaign)
+        axes = below.subplots(1, 1)
+        errors = {
+            test: [
+                (float(record.iteration), record.normalised[record.tests.index(test)])
+                for record in campaign.history
+                if test in record.tests
+            ]
+            for test in dict.fromkeys(run.test.number for run in campaign.experiments)
+        }
+        _error_lines(axes, errors, "normalised closed-loop error")
+        axes.axhline(1.0, color=TARGET, linewidth=0.8, linestyle=":")
+        axes.set_title("Error of the best trade-off by iteration (1: a model that never moves)", loc="left")
+        _save(figure, path)
+
+
+def iterations_picture(errors: Mapping[int, Sequence[tuple[float, float]]], title: str, path: Path) -> None:
+    """One line for each selected test: its closed-loop error under the successive best trade-offs.
+
+    Args:
+        errors: (iteration, error) pairs by number of the test, SI units squared.
+        title: of the picture.
+        path: where to write; its suffix is .svg or .png.
+
+    Raises:
+        NotAvailable: matplotlib is missing.
+        OSError: the file cannot be written.
+    """
+    with require().rc_context(STYLE):
+        figure = _figure(6.8, 4.2)
+        axes = figure.subplots(1, 1)
+        _error_lines(axes, errors, "closed-loop error (mean square; rad, rad/s)")
+        axes.set_title(title, loc="left")
+        _save(figure, path)
+
+
+def _figure(width: float, height: float) -> Any:
+    return importlib.import_module("matplotlib.figure").Figure(figsize=(width, height), layout="constrained")
+
+
+def _save(figure: Any, path: Path) -> None:
+    metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+    figure.savefig(path, dpi=150, metadata=metadata)
+
+
+def _runs(figure: Any, campaign: Campaign) -> None:
+    states, runs, twin = campaign.signals.states, campaign.experiments, campaign.twin
+    grid = figure.subplots(len(states), len(runs), sharex=True, sharey="row", squeeze=False)
+    best = campaign.best_test.number
+    for column, run in enumerate(runs):
+        predicted = twin.simulate(run.test)
+        start = run.trajectory.t[0]
+        title = f"test {run.test.number}" + (" (best)" if run.test.number == best else "")
+        grid[0, column].set_title(title, loc="left")
+        for row, state in enumerate(states):
+            axes, (factor, unit) = grid[row, column], shown_unit(state.unit)
+            flown = factor * run.trajectory.states[:, row]
+            target = factor * float(run.test.target_state[row])
+            axes.axhline(target, color=TARGET, linewidth=0.8, linestyle=":", label="target")
+            axes.plot(run.trajectory.t - start, flown, color=INK, linewidth=1.6, label="system")
+            axes.plot(predicted.t, factor * predicted.states[:, row], color=TWIN, linewidth=1.2, label="twin")
+            if column == 0:
+                axes.set_ylabel(f"{state.name.replace('_', ' ')}\n({unit})")
+        grid[-1, column].set_xlabel("time (s)")
+    for row, state in enumerate(states):
+        low, high = _extent([shown_unit(state.unit)[0] * run.trajectory.states[:, row] for run in runs])
+        grid[row, 0].set_ylim(low, high)
+    figure.align_ylabels(grid[:, 0])
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=3)
+
+
+def _extent(curves: Sequence[Any]) -> tuple[float, float]:
+    """Limits that show the real runs; a twin that runs away must not flatten them."""
+    values = np.concatenate(curves)
+    low, high = float(values.min()), float(values.max())
+    margin = 0.25 * max(high - low, 1e-3)
+    return low - margin, high + margin
+
+
+def _error_lines(axes: Any, errors: Mapping[int, Sequence[tuple[float, float]]], label: str) -> None:
+    for i, (test, points) in enumerate(errors.items()):
+        shown = [(x, y) for x, y in points if math.isfinite(y) and y > 0.0]
+        colour = CYCLE[i % len(CYCLE)]
+        axes.plot(
+            [x for x, _ in shown], [y for _, y in shown],
+            color=colour, marker="o", markersize=4.0, linewidth=1.5, label=f"test {test}",
+        )  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_xlabel("iteration")
+    axes.set_ylabel(label)
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """The unit of a face: degrees instead of radians.
+
+    Args:
+        unit: of a signal.
+
+    Returns:
+        What to multiply with, and the unit that is shown.
+    """
+    if unit == "rad" or unit.startswith("rad/"):
+        return 180.0 / math.pi, "°" + unit[3:]
+    return 1.0, unit or "1"

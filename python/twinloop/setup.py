@@ -1,0 +1,145 @@
+"""What a campaign is about, checked before anything is flown: signals, controllers, task, options, seed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats, floats, number, whole
+from twinloop.controllers import Family, UnboundFamily
+from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.presets import Options, options_of
+from twinloop.search import grammar, settings_of_tests, variation
+from twinloop.signals import Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """The question of a campaign.
+
+    Args:
+        signals: of the system.
+        family: of the controllers.
+        initial_state: where every test starts (n_x,), SI units, radians.
+        target_state: where every test should end (n_x,), the same units.
+        steps: of a test.
+        preset: name of the set of options.
+        options: the preset's, with those that were changed.
+        seed: of all random numbers.
+    """
+
+    signals: Signals
+    family: Family
+    initial_state: Floats
+    target_state: Floats
+    steps: int
+    preset: str
+    options: Options
+    seed: int
+
+    @cached_property
+    def task(self) -> _core.Task:
+        """Start, target and length, for the native engine."""
+        return _core.Task(self.initial_state, self.target_state, self.steps)
+
+    def none_selected(self) -> _core.SelectedTests:
+        """No tests yet, for the native engine."""
+        return _core.SelectedTests(self.signals.engine, self.family.engine, self.options.divergence_factor)
+
+
+def checked(
+    signals: object,
+    controller: object,
+    initial_state: ArrayLike,
+    target_state: ArrayLike,
+    duration: object,
+    preset: str,
+    options: Mapping[str, object] | None,
+    seed: object,
+) -> Setup:
+    """The arguments of a campaign, if they can be used.
+
+    Args:
+        signals: of the system.
+        controller: a family of controllers.
+        initial_state: (n_x,), SI units, radians.
+        target_state: (n_x,), the same units.
+        duration: of a test, s.
+        preset: name of a set of options.
+        options: other values for some of them.
+        seed: of all random numbers.
+
+    Returns:
+        The setup.
+
+    Raises:
+        InvalidInput: one of them cannot be used.
+    """
+    if not isinstance(signals, Signals):
+        raise InvalidInput(
+            f"Campaign, signals: expected twinloop.Signals, found {signals!r}; describe them first."
+        )
+    if not isinstance(controller, UnboundFamily):
+        raise InvalidInput(
+            "Campaign, controller: expected a family such as twinloop.controllers.PID, "
+            f"found {controller!r}; pass one."
+        )
+    if callable(target_state):
+        raise InvalidInput(
+            "Campaign, target_state: expected one constant state, found a function of time; "
+            "this version has no time-varying targets, pass an array."
+        )
+    start = floats("Campaign, initial_state", initial_state, (signals.n_x,))
+    target = floats("Campaign, target_state", target_state, (signals.n_x,))
+    if (start == target).all():
+        raise InvalidInput(
+            "Campaign, target_state: expected a target away from the initial state, found both the same; "
+            "distances are measured in that length, so move one of them."
+        )
+    known_seed = whole("Campaign, seed", seed)
+    if known_seed >= 2**64:
+        raise InvalidInput(f"Campaign, seed: expected less than 2**64, found {seed}; choose a smaller one.")
+    steps = _steps(number("Campaign, duration (s)", duration, above=0.0), signals.dt)
+    chosen = options_of(preset, options)
+    setup = Setup(signals, controller.bind(signals), start, target, steps, preset, chosen, known_seed)
+    with engine_input():
+        _ = setup.task  # the engine refuses now rather than after the first flight
+        grammar(chosen, signals)
+        variation(chosen, chosen.model_population)
+        settings_of_tests(chosen)
+    return setup
+
+
+def refuse_arguments(where: str, found: Mapping[str, object], known: Sequence[str]) -> None:
+    """Refuses arguments that this version does not have, by name.
+
+    Args:
+        where: what they were passed to.
+        found: the arguments beside the known ones.
+        known: names of the arguments that there are.
+
+    Raises:
+        InvalidInput: there is one.
+    """
+    for name in found:
+        if difflib.get_close_matches(name, known, n=1, cutoff=0.75):
+            raise unknown(f"argument of {where}", name, known)
+        raise InvalidInput(
+            f"{where}: expected arguments among {', '.join(known)}, found {name!r}, "
+            "which this version does not have; leave it out."
+        )
+
+
+def _steps(duration: float, dt: float) -> int:
+    steps = round(duration / dt)
+    if abs(steps * dt - duration) > 1e-6 * duration or steps < 2:
+        raise InvalidInput(
+            f"Campaign, duration: expected a whole number of periods of {dt:g} s, at least 2, "
+            f"found {duration:g} s; choose {max(2, steps) * dt:g} s."
+        )
+    return int(steps)

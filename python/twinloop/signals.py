@@ -1,0 +1,207 @@
+"""What a system's states and commands are called, measured in and bounded by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from twinloop import _core
+from twinloop.arrays import number
+from twinloop.errors import InvalidInput, engine_input, unknown
+
+Bounds = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class State:
+    """One component of the state.
+
+    Args:
+        name: a Python identifier; it appears in equations and tables.
+        unit: SI, radians for angles.
+        scale: its usual size, in its unit; a run that leaves ten times this counts as diverged.
+        derivative_of: the state whose derivative in time this one is, where that is known.
+        envelope: smallest and largest value that the system may safely take, in its unit.
+
+    Raises:
+        InvalidInput: a name, scale or envelope that cannot be used.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    derivative_of: str | None = None
+    envelope: Bounds | None = None
+
+    def __post_init__(self) -> None:
+        _check_name("State", self.name)
+        object.__setattr__(self, "scale", number(f"State {self.name!r}, scale", self.scale, above=0.0))
+        if self.envelope is not None:
+            object.__setattr__(self, "envelope", ordered(f"State {self.name!r}, envelope", self.envelope))
+
+
+@dataclass(frozen=True)
+class Command:
+    """One component of the command.
+
+    Args:
+        name: a Python identifier; it appears in equations and tables.
+        unit: SI.
+        bounds: smallest and largest value that is ever sent, in its unit.
+        scale: what a model sees as 1, in its unit; by default the larger magnitude of the two bounds.
+
+    Raises:
+        InvalidInput: a name, bounds or scale that cannot be used.
+    """
+
+    name: str
+    unit: str
+    bounds: Bounds
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_name("Command", self.name)
+        low, high = ordered(f"Command {self.name!r}, bounds", self.bounds)
+        scale = max(abs(low), abs(high)) if self.scale is None else self.scale
+        object.__setattr__(self, "bounds", (low, high))
+        object.__setattr__(self, "scale", number(f"Command {self.name!r}, scale", scale, above=0.0))
+
+    @property
+    def size(self) -> float:
+        """What a model sees as 1, in the command's unit."""
+        assert self.scale is not None  # __post_init__ has set it
+        return self.scale
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The states and commands of a system, and the period at which commands are sent.
+
+    Args:
+        states: n_x of them, in the order of a state vector.
+        commands: n_u of them, in the order of a command vector.
+        dt: period, s; a command is held for one period.
+
+    Raises:
+        InvalidInput: none of a kind, a name used twice, or a `derivative_of` that makes no sense.
+    """
+
+    states: Sequence[State]
+    commands: Sequence[Command]
+    dt: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "states", _members("states", State, self.states))
+        object.__setattr__(self, "commands", _members("commands", Command, self.commands))
+        object.__setattr__(self, "dt", number("Signals, dt (s)", self.dt, above=0.0))
+        names = self.state_names + self.command_names
+        for name in names:
+            if names.count(name) > 1:
+                raise InvalidInput(
+                    f"Signals: expected names that differ, found {name!r} twice; rename one of them."
+                )
+        self._check_derivatives()
+
+    def _check_derivatives(self) -> None:
+        parents = {state.name: state.derivative_of for state in self.states}
+        integrals = [of for of in parents.values() if of is not None]
+        for name, of in parents.items():
+            if of is None:
+                continue
+            if of not in parents:
+                raise unknown(f"state that {name!r} is the derivative of,", of, parents)
+            if integrals.count(of) > 1:
+                raise InvalidInput(
+                    f"Signals: expected at most one derivative of {of!r}, found several; "
+                    "keep `derivative_of` on one of them."
+                )
+            seen, up = {name}, of
+            while up is not None:
+                if up in seen:
+                    raise InvalidInput(
+                        f"Signals: expected derivatives that end at a state, found that {name!r} is in the"
+                        " end the derivative of itself; remove one `derivative_of`."
+                    )
+                seen.add(up)
+                up = parents[up]  # type: ignore[assignment]
+
+    @property
+    def n_x(self) -> int:
+        """Number of states."""
+        return len(self.states)
+
+    @property
+    def n_u(self) -> int:
+        """Number of commands."""
+        return len(self.commands)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states, in order."""
+        return tuple(state.name for state in self.states)
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Names of the commands, in order."""
+        return tuple(command.name for command in self.commands)
+
+    @cached_property
+    def engine(self) -> _core.Signals:
+        """The same signals as numbers, for the native engine."""
+        index = {name: i for i, name in enumerate(self.state_names)}
+        with engine_input():
+            return _core.Signals(
+                self.dt,
+                [state.scale for state in self.states],
+                [command.bounds for command in self.commands],
+                [command.size for command in self.commands],
+                [
+                    None if state.derivative_of is None else index[state.derivative_of]
+                    for state in self.states
+                ],
+            )
+
+
+def ordered(what: str, bounds: object) -> Bounds:
+    """Two finite numbers, the smaller first.
+
+    Args:
+        what: how to call them in an error.
+        bounds: the pair.
+
+    Returns:
+        The pair as floats.
+
+    Raises:
+        InvalidInput: it is no pair of finite numbers, or not in order.
+    """
+    if isinstance(bounds, str) or not isinstance(bounds, Iterable):
+        raise InvalidInput(f"{what}: expected a pair (low, high), found {bounds!r}; write both numbers.")
+    pair = tuple(bounds)
+    if len(pair) != 2:
+        raise InvalidInput(f"{what}: expected a pair (low, high), found {pair!r}; write both numbers.")
+    low, high = (number(what, value) for value in pair)
+    if low >= high:
+        raise InvalidInput(
+            f"{what}: expected low < high, found {low:g} and {high:g}; exchange or widen them."
+        )
+    return low, high
+
+
+def _check_name(kind: str, name: object) -> None:
+    if not isinstance(name, str) or not name.isidentifier():
+        raise InvalidInput(
+            f"{kind}: expected a name of letters, digits and underscores, found {name!r}; "
+            "it becomes a symbol in equations, so rename it."
+        )
+
+
+def _members(what: str, kind: type, values: object) -> tuple[object, ...]:
+    members = tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else ()
+    if not members or not all(isinstance(member, kind) for member in members):
+        raise InvalidInput(
+            f"Signals, {what}: expected a list of at least one twinloop.{kind.__name__}, found {values!r}; "
+            "describe each one."
+        )
+    return members

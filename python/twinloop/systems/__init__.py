@@ -1,0 +1,10 @@
+"""Systems to experiment on: built-in plants, wrappers, and what your own must offer."""
+
+from twinloop.systems.base import System
+from twinloop.systems.quadrotor import Quadrotor
+from twinloop.systems.simulated import Simulated
+
+BUILT_IN: dict[str, type[Quadrotor]] = {"quadrotor": Quadrotor}
+"""Systems that can be run by name."""
+
+__all__ = ["BUILT_IN", "Quadrotor", "Simulated", "System"]

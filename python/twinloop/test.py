@@ -1,0 +1,143 @@
+"""An experiment that can be asked for: a controller, where the run starts, where it should end."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats, floats, whole
+from twinloop.controllers.family import Controller, Family
+from twinloop.errors import InvalidInput
+from twinloop.signals import Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """One candidate experiment; run it with `system.run(test)`, or by hand with `test.controller()`.
+
+    Args:
+        family: what its controller is one of.
+        genes: gains of the controller (size,), in their units.
+        initial_state: state to start from (n_x,), SI units, radians.
+        target_state: state to lead to (n_x,), the same units.
+        steps: number of commands, n.
+        number: its number in the campaign, from 0.
+        campaign: identity of the campaign that it belongs to; empty if none.
+        predicted: final distance that the twin predicts, where it was asked; infinite if it diverges.
+        measured: final distance that was flown, mean over complete runs; None if there was none.
+
+    Raises:
+        InvalidInput: shapes that do not fit the family's signals, or numbers that are not finite.
+    """
+
+    __test__ = False  # a name that pytest would otherwise collect
+
+    family: Family
+    genes: Floats
+    initial_state: Floats
+    target_state: Floats
+    steps: int
+    number: int = 0
+    campaign: str = ""
+    predicted: float | None = None
+    measured: float | None = None
+
+    def __post_init__(self) -> None:
+        n_x = self.family.signals.n_x
+        object.__setattr__(self, "genes", floats("Test.genes", self.genes, (self.family.size,)))
+        object.__setattr__(self, "initial_state", floats("Test.initial_state", self.initial_state, (n_x,)))
+        object.__setattr__(self, "target_state", floats("Test.target_state", self.target_state, (n_x,)))
+        object.__setattr__(self, "steps", whole("Test.steps", self.steps, least=1))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Gains by name, in their units."""
+        return self.family.parameters(self.genes)
+
+    @property
+    def excitation(self) -> None:
+        """What is added to the controller's commands: nothing."""
+        return None
+
+    @property
+    def task(self) -> _core.Task:
+        """Start, target and length, for the native engine."""
+        return _core.Task(self.initial_state, self.target_state, self.steps)
+
+    def controller(self) -> Controller:
+        """A fresh controller for one run: `.reset()`, then `.command(state, target)` once a period."""
+        return self.family.controller(self.genes)
+
+    def judged(self, predicted: float | None, measured: float | None) -> Test:
+        """The same test with its final distances.
+
+        Args:
+            predicted: what the twin predicts.
+            measured: what was flown.
+
+        Returns:
+            A copy under the same number.
+        """
+        return dataclasses.replace(self, predicted=predicted, measured=measured)
+
+    def same_as(self, other: Test) -> bool:
+        """Whether both stand for the same experiment of the same campaign."""
+        return (
+            (self.campaign, self.number, self.steps) == (other.campaign, other.number, other.steps)
+            and self.genes.tobytes() == other.genes.tobytes()
+            and self.initial_state.tobytes() == other.initial_state.tobytes()
+            and self.target_state.tobytes() == other.target_state.tobytes()
+        )
+
+    def __repr__(self) -> str:
+        gains = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())
+        return f"Test({self.number}: {gains})"
+
+
+def final_distance(last_state: ArrayLike, target_state: ArrayLike) -> float:
+    """Distance of the last state to the target, δ (paper, section IV.C).
+
+    Args:
+        last_state: (n_x,), SI units, radians.
+        target_state: (n_x,), the same units.
+
+    Returns:
+        The Euclidean distance over all components.
+    """
+    target = floats("Target state", target_state, (None,))
+    gaps = floats("Last state", last_state, (len(target),)) - target
+    total = 0.0
+    for gap in gaps.tolist():
+        total += gap * gap
+    return math.sqrt(total)
+
+
+def check_signals(test: object, signals: Signals) -> None:
+    """Refuses a test that was made for other signals.
+
+    Args:
+        test: the test.
+        signals: those of the system or twin that is to run it.
+
+    Raises:
+        InvalidInput: not a test, or other states, commands or period.
+    """
+    if not isinstance(test, Test):
+        raise InvalidInput(
+            f"Expected a twinloop.Test, found {type(test).__name__}; get one from campaign.ask()."
+        )
+    found = test.family.signals
+    for what, expected, other in (
+        ("states", signals.state_names, found.state_names),
+        ("commands", signals.command_names, found.command_names),
+        ("period", signals.dt, found.dt),
+    ):
+        if expected != other:
+            raise InvalidInput(
+                f"Test: expected the {what} {expected} of this system or twin, found {other}; "
+                "run it on the system it was made for."
+            )

@@ -1,0 +1,125 @@
+"""What one run of a system leaves behind: times, states, commands, and how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats, floats
+from twinloop.errors import InvalidInput, unknown
+from twinloop.signals import Signals
+
+ENDINGS = ("completed", "aborted", "diverged")
+JITTER = 0.01
+"""Share of the period by which a recorded interval may differ from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A recorded or simulated run of n steps; `commands[k]` is held from `t[k]` to `t[k + 1]`.
+
+    Args:
+        t: times (n + 1,), s.
+        states: states as measured (n + 1, n_x), SI units, radians.
+        commands: commands as sent (n, n_u), in their units.
+        ended: "completed", "aborted" or "diverged".
+        reason: why it did not complete, in a few words.
+        true_states: states without sensor noise (n + 1, n_x), where an oracle knows them; never learnt from.
+
+    Raises:
+        InvalidInput: shapes that do not fit each other, numbers that are not finite, times that do not grow.
+    """
+
+    t: Floats
+    states: Floats
+    commands: Floats
+    ended: str = "completed"
+    reason: str = ""
+    true_states: Floats | None = None
+
+    def __post_init__(self) -> None:
+        t = floats("Trajectory.t", self.t, (None,))
+        if len(t) == 0:
+            raise InvalidInput(
+                "Trajectory.t: expected at least the first time, found nothing; record the run."
+            )
+        states = floats("Trajectory.states (one row per time)", self.states, (len(t), None))
+        commands = floats("Trajectory.commands (one row less than states)", self.commands, (len(t) - 1, None))
+        if len(t) > 1 and float(np.diff(t).min()) <= 0.0:
+            k = int(np.argmin(np.diff(t)))
+            raise InvalidInput(
+                f"Trajectory.t: expected times that grow, found {t[k]:g} s then {t[k + 1]:g} s at rows {k}"
+                f" and {k + 1}; sort the record or remove repeated rows."
+            )
+        if self.ended not in ENDINGS:
+            raise unknown("end of a trajectory", self.ended, ENDINGS)
+        object.__setattr__(self, "t", t)
+        object.__setattr__(self, "states", states)
+        object.__setattr__(self, "commands", commands)
+        if self.true_states is not None:
+            true_states = floats("Trajectory.true_states", self.true_states, (len(t), states.shape[1]))
+            object.__setattr__(self, "true_states", true_states)
+
+    @property
+    def steps(self) -> int:
+        """Number of commands, n."""
+        return len(self.commands)
+
+
+def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_factor: float) -> Trajectory:
+    """Refuses what cannot be learnt from.
+
+    Args:
+        trajectory: what a system answered.
+        signals: what it should consist of.
+        steps: how many steps the test asked for.
+        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+
+    Returns:
+        The trajectory, unchanged.
+
+    Raises:
+        InvalidInput: no trajectory, another width or period, too short, too long, or far out of scale.
+    """
+    if not isinstance(trajectory, Trajectory):
+        raise InvalidInput(
+            f"Expected a twinloop.Trajectory, found {type(trajectory).__name__}; wrap the record in one."
+        )
+    for what, found, expected in (
+        ("states", trajectory.states.shape[1], signals.n_x),
+        ("commands", trajectory.commands.shape[1], signals.n_u),
+    ):
+        if found != expected:
+            raise InvalidInput(
+                f"Trajectory: expected {expected} {what} as in the signals, found {found}; check the columns."
+            )
+    if trajectory.steps < 2:
+        raise InvalidInput(
+            f"Trajectory: expected at least 2 steps to learn from, found {trajectory.steps}; run the test"
+            " again."
+        )
+    if trajectory.steps > steps:
+        raise InvalidInput(
+            f"Trajectory: expected at most the {steps} steps of the test, found {trajectory.steps}; cut the"
+            " record."
+        )
+    intervals = np.diff(trajectory.t)
+    worst = int(np.argmax(np.abs(intervals - signals.dt)))
+    if abs(intervals[worst] - signals.dt) > JITTER * signals.dt * (1.0 + 1e-9):
+        raise InvalidInput(
+            f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s"
+            f" after row {worst}; resample the record, or declare the system's own period as dt."
+        )
+    # Twice: noise may carry the last reading of a run that was stopped in time past the limit.
+    limits = 2.0 * divergence_factor * np.array([state.scale for state in signals.states])
+    excess = np.abs(trajectory.states) / limits
+    k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
+    if excess[k, i] > 1.0:
+        state = signals.states[int(i)]
+        raise InvalidInput(
+            f"Trajectory: expected {state.name} within {limits[i]:g} {state.unit} (twice the divergence"
+            f" factor times its scale), found {trajectory.states[k, i]:g} at row {k}; cut the record before"
+            " it, or declare a larger scale."
+        )
+    return trajectory
