@@ -1,6 +1,6 @@
 """Twinloop: from a handful of experiments to a twin made of readable equations and a tuned controller."""
 
-from twinloop import contracts, controllers, errors, systems
+from twinloop import contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
 from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput, NotAvailable, SystemFailure, TwinloopError
@@ -27,5 +27,7 @@ __all__ = [
     "contracts",
     "controllers",
     "errors",
+    "objectives",
+    "pareto",
     "systems",
 ]

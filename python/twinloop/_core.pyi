@@ -6,8 +6,40 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+_Floats = NDArray[np.float64]
+_Integers = NDArray[np.int64]
+
+__all__ = [
+    "Archive",
+    "Controller",
+    "Family",
+    "Grammar",
+    "Model",
+    "ModelSearch",
+    "Program",
+    "Quadrotor",
+    "Runs",
+    "SelectedTests",
+    "Signals",
+    "Task",
+    "TestSearch",
+    "TestSettings",
+    "Variation",
+    "Workers",
+    "__version__",
+    "best_tradeoff",
+    "closed_loop",
+    "crowding_distances",
+    "discrimination",
+    "final_distances",
+    "ideal_point",
+    "instability",
+    "open_loop",
+    "ranks",
+    "rollout",
+    "select",
+    "vector_widths",
+]
 
 __version__: str
 
@@ -44,7 +76,7 @@ class Program:
     @property
     def intron_share(self) -> float: ...
     def effective(self) -> Program: ...
-    def run(self, inputs: ArrayLike, workers: Workers | None = None) -> Floats:
+    def run(self, inputs: ArrayLike, workers: Workers | None = None) -> _Floats:
         """Outputs (rows, outputs) of inputs (rows, inputs)."""
     def __len__(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -61,7 +93,7 @@ class Grammar:
         spare_registers: int = 4,
         pages: int = 5,
         page_length: int = 10,
-        operations: Sequence[str] = ("+", "-", "*", "/"),
+        operations: Sequence[str] = ...,
         writable_inputs: bool = True,
         constant_share: float = 0.5,
         constant_low: float = 1e-3,
@@ -99,7 +131,7 @@ class Model:
     def program(self) -> Program: ...
     @property
     def form(self) -> str: ...
-    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> Floats:
+    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats:
         """Next states (rows, n_x) of states (rows, n_x) and commands (rows, n_u)."""
 
 @final
@@ -117,8 +149,8 @@ class Quadrotor:
         drag_factor: float,
         gyroscopic: str,
     ) -> Quadrotor: ...
-    def derivative(self, state: ArrayLike, command: ArrayLike) -> Floats: ...
-    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> Floats: ...
+    def derivative(self, state: ArrayLike, command: ArrayLike) -> _Floats: ...
+    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats: ...
 
 @final
 class Family:
@@ -145,9 +177,9 @@ class Controller:
     """One controller of a family, with its memory."""
 
     @property
-    def parameters(self) -> Floats: ...
+    def parameters(self) -> _Floats: ...
     def reset(self) -> None: ...
-    def command(self, state: ArrayLike, target: ArrayLike) -> Floats: ...
+    def command(self, state: ArrayLike, target: ArrayLike) -> _Floats: ...
 
 @final
 class Task:
@@ -160,20 +192,20 @@ class Runs:
     """What a roll-out leaves: `m` runs of `n` steps; NaN after a run has stopped."""
 
     @property
-    def states(self) -> Floats:
+    def states(self) -> _Floats:
         """True states (m, n + 1, n_x)."""
     @property
-    def measured(self) -> Floats:
+    def measured(self) -> _Floats:
         """What the controller read (m, n + 1, n_x)."""
     @property
-    def commands(self) -> Floats:
+    def commands(self) -> _Floats:
         """Commands (m, n, n_u)."""
     @property
-    def lasted(self) -> Integers:
+    def lasted(self) -> _Integers:
         """Steps before each run stopped (m,); n if it did not."""
 
 def rollout(
-    dynamics: Model | Quadrotor | Callable[[Floats, Floats], ArrayLike],
+    dynamics: Model | Quadrotor | Callable[[_Floats, _Floats], ArrayLike],
     family: Family,
     parameters: ArrayLike,
     task: Task,
@@ -197,10 +229,10 @@ class SelectedTests:
         """These and one more: states (n + 1, n_x) as measured, commands (n, n_u)."""
     def __len__(self) -> int: ...
 
-def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> Floats:
+def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:
     """One-step-ahead error of each model on each test (models, tests)."""
 
-def closed_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> Floats:
+def closed_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:
     """Free-run error with the controller in the loop (models, tests)."""
 
 def final_distances(
@@ -212,19 +244,19 @@ def final_distances(
     *,
     divergence_factor: float = 10.0,
     workers: Workers | None = None,
-) -> Floats:
+) -> _Floats:
     """Distance of the last state to the target (models, tests); infinite where the run diverged."""
 
-def discrimination(distances: ArrayLike, cap: float) -> Floats:
+def discrimination(distances: ArrayLike, cap: float) -> _Floats:
     """1 / variance over models (tests,) of distances (models, tests), each capped."""
 
-def instability(distances: ArrayLike, cap: float) -> Floats:
+def instability(distances: ArrayLike, cap: float) -> _Floats:
     """Variance over mutants (tests,) of distances (mutants, tests); one at the cap counts as cap squared."""
 
-def ranks(objectives: ArrayLike) -> Integers: ...
-def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats: ...
-def select(objectives: ArrayLike, count: int) -> Integers: ...
-def ideal_point(objectives: ArrayLike) -> Floats: ...
+def ranks(objectives: ArrayLike) -> _Integers: ...
+def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> _Floats: ...
+def select(objectives: ArrayLike, count: int) -> _Integers: ...
+def ideal_point(objectives: ArrayLike) -> _Floats: ...
 def best_tradeoff(objectives: ArrayLike, normalised: bool = False) -> int: ...
 
 @final
@@ -232,13 +264,13 @@ class Archive:
     """Non-dominated set of rows, each with the number under which it was offered."""
 
     def __new__(cls, columns: int, width: str = "auto") -> Archive: ...
-    def offer(self, objectives: ArrayLike) -> Integers:
+    def offer(self, objectives: ArrayLike) -> _Integers:
         """Offers rows (n, columns) in order; the numbers of the members after it."""
     def prune(self, cap: int) -> bool: ...
     @property
-    def objectives(self) -> Floats: ...
+    def objectives(self) -> _Floats: ...
     @property
-    def members(self) -> Integers: ...
+    def members(self) -> _Integers: ...
     def __len__(self) -> int: ...
 
 @final
@@ -293,13 +325,13 @@ class ModelSearch:
     @property
     def population(self) -> list[Program]: ...
     @property
-    def population_objectives(self) -> Floats: ...
+    def population_objectives(self) -> _Floats: ...
     @property
     def archive_size(self) -> int: ...
     @property
     def archive(self) -> list[Model]: ...
     @property
-    def archive_objectives(self) -> Floats:
+    def archive_objectives(self) -> _Floats:
         """(members, 2 N): open loop and closed loop of each test in turn."""
     @property
     def best(self) -> int:
@@ -307,7 +339,7 @@ class ModelSearch:
     @property
     def best_model(self) -> Model: ...
     @property
-    def best_objectives(self) -> Floats: ...
+    def best_objectives(self) -> _Floats: ...
     def committee(self, size: int) -> list[int]:
         """At most `size` members, the best trade-off first, spread by crowding."""
 
@@ -353,16 +385,16 @@ class TestSearch:
     @property
     def archive_size(self) -> int: ...
     @property
-    def archive_genes(self) -> Floats: ...
+    def archive_genes(self) -> _Floats: ...
     @property
-    def archive_objectives(self) -> Floats:
+    def archive_objectives(self) -> _Floats:
         """(members, 2 or 3): discrimination, instability, control quality."""
     @property
     def best(self) -> int: ...
     @property
-    def best_genes(self) -> Floats: ...
+    def best_genes(self) -> _Floats: ...
     @property
-    def best_objectives(self) -> Floats: ...
+    def best_objectives(self) -> _Floats: ...
     @property
     def flat(self) -> bool:
-        """Whether every candidate so far had the same distance on the best model: it ignores the commands."""
+        """Whether the random tests all ended at one distance on the best model: it ignores the commands."""

@@ -1,4 +1,4 @@
-"""The double loop, counted in experiments: ask for a test, have it flown, tell what happened (section IV)."""
+"""The double loop, counted in experiments: ask for a test, have it flown, tell what happened (paper, section III.C)."""
 
 from __future__ import annotations
 

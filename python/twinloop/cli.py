@@ -128,8 +128,10 @@ def run(
     result = _worked(campaign, rig, watch, experiments, _described(system, rig), stopwatch)
     if output is not None:
         write_text(output, to_json(result))
+        click.echo(f"Result: {output}", err=True)
     if plot is not None:
         _uninterrupted(lambda: _draw(campaign, plot))
+        click.echo(f"Picture: {plot}", err=True)
     click.echo(to_json(result) if as_json else render(result), nl=False)
     context.exit(130 if campaign.interrupted else 0)
 

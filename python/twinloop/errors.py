@@ -8,7 +8,14 @@ from contextlib import contextmanager
 
 
 class TwinloopError(Exception):
-    """Everything that Twinloop raises on purpose."""
+    """Everything that Twinloop raises on purpose.
+
+    Args:
+        sentence: what was expected, what was found, what to do; it is told in one line.
+    """
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(" ".join(sentence.split()))
 
 
 class InvalidInput(TwinloopError, ValueError):
@@ -54,4 +61,5 @@ def engine_input() -> Iterator[None]:
     except TwinloopError:
         raise
     except ValueError as refusal:
-        raise InvalidInput(str(refusal)) from refusal
+        sentence = str(refusal)
+        raise InvalidInput(sentence if sentence.endswith((".", "?")) else f"{sentence}.") from refusal

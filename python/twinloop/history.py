@@ -35,7 +35,8 @@ class TestLoop:
         test: number of the test that it gave.
         genes: gains of the test, in their units.
         objectives: of the test: discrimination, instability and, where it is one, control quality.
-        flat: whether every candidate had the same distance on the best model: it ignores the commands.
+        flat: whether all tests of the random population ended at the same distance on the best model, which
+            then ignores the commands.
         generations: that it ran.
         archive_size: non-dominated tests.
         evaluations: tests that were judged.

@@ -150,7 +150,7 @@ class Twin:
         states = [state]
         for command in u:
             following = self.predict(states[-1], command)
-            if not (np.abs(following) <= limits).all():
+            if not (np.abs(following) < limits).all():
                 break
             states.append(following)
         lasted = len(states) - 1

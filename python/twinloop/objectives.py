@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop.arrays import Floats, floats, number
 from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.test import Test
@@ -165,8 +166,8 @@ def discrimination(distances: ArrayLike, cap: float) -> Floats:
     Raises:
         InvalidInput: not a matrix, or a cap that is not above 0.
     """
-    with engine_input():
-        return _core.discrimination(distances, cap)
+    limit = number("Discrimination, cap", cap, above=0.0)
+    return _core.discrimination(_capped(distances, limit), limit)
 
 
 def instability(distances: ArrayLike, cap: float) -> Floats:
@@ -182,5 +183,13 @@ def instability(distances: ArrayLike, cap: float) -> Floats:
     Raises:
         InvalidInput: not a matrix, or a cap that is not above 0.
     """
-    with engine_input():
-        return _core.instability(distances, cap)
+    limit = number("Instability, cap", cap, above=0.0)
+    return _core.instability(_capped(distances, limit), limit)
+
+
+def _capped(distances: ArrayLike, cap: float) -> Floats:
+    """Distances (rows, tests) where infinity counts as the cap; NaN is refused."""
+    rows = np.asarray(distances)
+    if rows.dtype.kind == "f":
+        rows = np.where(np.isposinf(rows), cap, rows)
+    return floats("Final distances (rows, tests)", rows, (None, None))

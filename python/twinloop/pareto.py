@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop.arrays import Floats, floats, whole
 from twinloop.errors import engine_input
 
 Archive = _core.Archive
@@ -21,10 +21,10 @@ def ranks(objectives: ArrayLike) -> _core.Integers:
         Ranks (rows,).
 
     Raises:
-        InvalidInput: not a matrix, or NaN in it.
+        InvalidInput: not a matrix, or a number in it that is not finite.
     """
     with engine_input():
-        return _core.ranks(objectives)
+        return _core.ranks(_matrix(objectives))
 
 
 def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats:
@@ -38,10 +38,10 @@ def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats:
         Distances (rows,), in shares of the front's extent.
 
     Raises:
-        InvalidInput: shapes that do not fit, or NaN.
+        InvalidInput: shapes that do not fit, or a number that is not finite.
     """
     with engine_input():
-        return _core.crowding_distances(objectives, ranks)
+        return _core.crowding_distances(_matrix(objectives), ranks)
 
 
 def select(objectives: ArrayLike, count: int) -> _core.Integers:
@@ -49,16 +49,16 @@ def select(objectives: ArrayLike, count: int) -> _core.Integers:
 
     Args:
         objectives: (rows, columns), minimised.
-        count: how many.
+        count: how many; all of them if there are fewer.
 
     Returns:
         Their numbers (count,), best first.
 
     Raises:
-        InvalidInput: not a matrix, NaN in it, or more than there are.
+        InvalidInput: not a matrix, a number in it that is not finite, or a count that is none.
     """
     with engine_input():
-        return _core.select(objectives, count)
+        return _core.select(_matrix(objectives), whole("Select, count", count))
 
 
 def ideal_point(objectives: ArrayLike) -> Floats:
@@ -74,7 +74,7 @@ def ideal_point(objectives: ArrayLike) -> Floats:
         InvalidInput: not a matrix, or no row.
     """
     with engine_input():
-        return _core.ideal_point(objectives)
+        return _core.ideal_point(_matrix(objectives))
 
 
 def best_tradeoff(objectives: ArrayLike, normalised: bool = False) -> int:
@@ -91,4 +91,8 @@ def best_tradeoff(objectives: ArrayLike, normalised: bool = False) -> int:
         InvalidInput: not a matrix, or no row.
     """
     with engine_input():
-        return _core.best_tradeoff(objectives, normalised)
+        return _core.best_tradeoff(_matrix(objectives), normalised)
+
+
+def _matrix(objectives: ArrayLike) -> Floats:
+    return floats("Objectives (rows, columns)", objectives, (None, None))

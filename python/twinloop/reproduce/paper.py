@@ -9,7 +9,7 @@ TABLE_2 = {
 }
 """Closed-loop objective on the first test of the best trade-off after iterations 0 to 7, 5 runs."""
 TABLE_2_REMARKS = (
-    "one run of five got worse from iteration 3, four from iterations 4 and 5, one never did",
+    "of five runs one was worse from iteration 3, four by iterations 4 and 5, and one never was",
     "more than half of the models' code was intron",
 )
 TABLE_3 = {

@@ -13,7 +13,7 @@ from twinloop.text import table
 FORGOTTEN_FACTOR, FORGOTTEN_ERROR = 5.0, 0.1
 FORGOTTEN = (
     f"a run forgot from the first iteration whose error on the first test is more than {FORGOTTEN_FACTOR:g}"
-    f" times its best so far and above {FORGOTTEN_ERROR:g}"
+    f" times its best since iteration 1 and above {FORGOTTEN_ERROR:g}"
 )
 
 

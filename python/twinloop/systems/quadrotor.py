@@ -85,6 +85,10 @@ class Quadrotor(System):
         self.thrust_factor = number("Quadrotor, thrust_factor (N s²)", thrust_factor, above=0.0)
         self.drag_factor = number("Quadrotor, drag_factor (N m s²)", drag_factor, above=0.0)
         self.rotor_inertia = number("Quadrotor, rotor_inertia (kg m²)", rotor_inertia)
+        if self.rotor_inertia < 0.0:
+            raise InvalidInput(
+                f"Quadrotor, rotor_inertia (kg m²): expected at least 0, found {rotor_inertia}; change its sign."
+            )
         self.hover_speed = math.sqrt(self.mass * GRAVITY / (4.0 * self.thrust_factor))
         self.top_speed = number("Quadrotor, top_speed (rad/s)", top_speed, above=self.hover_speed)
         self.runs = 0
