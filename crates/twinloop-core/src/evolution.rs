@@ -6,9 +6,7 @@
 use std::sync::Arc;
 
 use crate::error::{Result, invalid};
-use crate::pareto::{
-    Archive, Distance, LinearRanking, Objectives, best_tradeoff, crowding_distances, order, ranks,
-};
+use crate::pareto::{Archive, Distance, LinearRanking, Objectives, Ranking, best_tradeoff};
 use crate::rng::{Purpose, Stream};
 use crate::workers::Workers;
 
@@ -100,6 +98,7 @@ pub struct Search<G> {
     generation: u64,
     population: Vec<Arc<G>>,
     objectives: Objectives,
+    ranking: Ranking,
     archive: Archive<Arc<G>>,
     evaluations: u64,
     spared: u64,
@@ -111,6 +110,7 @@ impl<G> Clone for Search<G> {
         Self {
             population: self.population.clone(),
             objectives: self.objectives.clone(),
+            ranking: self.ranking.clone(),
             archive: self.archive.clone(),
             ..*self
         }
@@ -142,6 +142,7 @@ impl<G: Send + Sync> Search<G> {
             generation: 0,
             evaluations: population.len() as u64,
             population,
+            ranking: Ranking::new(&objectives),
             objectives,
             archive: Archive::new(problem.objectives(), workers.width()),
             spared: 0,
@@ -165,15 +166,13 @@ impl<G: Send + Sync> Search<G> {
         let archived = genomes.len();
         genomes.extend(self.population.iter().cloned());
         let mut rows = problem.judge(&genomes, 0, workers);
-        let population_rows = rows.split_off(archived);
-        let mut archive = Archive::new(problem.objectives(), workers.width());
-        for (row, genome) in rows.iter().zip(&genomes) {
-            archive.offer(row, || genome.clone());
-        }
+        let objectives = matrix(problem, rows.split_off(archived));
+        let archive = self.archive.replace_objectives(matrix(problem, rows)).expect("a row for each member");
         let mut search = Self {
             iteration: self.iteration + 1,
             generation: 0,
-            objectives: matrix(problem, population_rows),
+            ranking: Ranking::new(&objectives),
+            objectives,
             evaluations: self.evaluations + genomes.len() as u64,
             archive,
             ..self
@@ -204,9 +203,7 @@ impl<G: Send + Sync> Search<G> {
         workers: &Workers,
     ) {
         self.generation += 1;
-        let ranks = ranks(&self.objectives);
-        let best_first = order(&ranks, &crowding_distances(&self.objectives, &ranks));
-        let offspring = self.offspring(problem, variation, &best_first, workers);
+        let offspring = self.offspring(problem, variation, &self.ranking.best_first(), workers);
 
         let keep = |child: &Offspring<G>| if P::RESAMPLED { None } else { child.judged_as };
         let fresh: Vec<_> =
@@ -217,6 +214,7 @@ impl<G: Send + Sync> Search<G> {
             None => judged.next().expect("a row for each fresh genome"),
         });
         self.objectives = matrix(problem, rows.collect());
+        self.ranking = Ranking::new(&self.objectives);
         self.evaluations += fresh.len() as u64;
         self.spared +=
             (offspring.len() - fresh.len() - if P::RESAMPLED { 0 } else { variation.elite() }) as u64;
@@ -268,12 +266,9 @@ impl<G: Send + Sync> Search<G> {
 
     /// Offers the non-dominated individuals of the population that `is_new` names to the archive.
     fn offer_front(&mut self, is_new: impl Fn(usize) -> bool) {
-        for (i, rank) in ranks(&self.objectives).into_iter().enumerate() {
-            if rank == 0 && is_new(i) {
-                let genome = &self.population[i];
-                self.archive.offer(self.objectives.row(i), || genome.clone());
-            }
-        }
+        let (objectives, population, archive) = (&self.objectives, &self.population, &mut self.archive);
+        let front = self.ranking.ranks.iter().enumerate().filter(|&(i, &rank)| rank == 0 && is_new(i));
+        archive.offer_all(front.map(|(i, _)| (objectives.row(i), move || population[i].clone())));
     }
 
     /// Whether the archive was above its cap.

@@ -17,13 +17,15 @@ pub struct Archive<T> {
     /// The block that dominated a candidate last. What comes next is often dominated by it too; never does a result
     /// depend on it.
     recent: usize,
+    /// Whether places wait for [`close_ranks`](Self::close_ranks); never between two calls from outside.
+    any_vacant: bool,
 }
 
 impl<T> Archive<T> {
     /// An empty archive of points with so many `columns`, which compares them with the vector instructions of `width`.
     /// The width changes the speed and nothing else.
     pub fn new(columns: usize, width: Width) -> Self {
-        Self { width, points: Blocks::new(columns), members: Vec::new(), recent: 0 }
+        Self { width, points: Blocks::new(columns), members: Vec::new(), recent: 0, any_vacant: false }
     }
 
     /// Offers a point, (columns), and says whether it was taken; only then is its `member` made.
@@ -32,6 +34,22 @@ impl<T> Archive<T> {
     /// members that it dominates leave. A point that could not be a row of [`Objectives`], as it is not finite or has
     /// not the columns of this archive, is not taken.
     pub fn offer(&mut self, objectives: &[f64], member: impl FnOnce() -> T) -> bool {
+        let taken = self.take(objectives, member);
+        self.close_ranks();
+        taken
+    }
+
+    /// Offers points one after another, as [`offer`](Self::offer) does, but sooner: those that leave are cleared away
+    /// once, at the end.
+    pub fn offer_all<'a, F: FnOnce() -> T>(&mut self, offers: impl IntoIterator<Item = (&'a [f64], F)>) {
+        for (objectives, member) in offers {
+            self.take(objectives, member);
+        }
+        self.close_ranks();
+    }
+
+    /// Takes a point or not; the places of those that it dominates are left vacant.
+    fn take(&mut self, objectives: &[f64], member: impl FnOnce() -> T) -> bool {
         let is_row = !objectives.is_empty() && objectives.len() == self.points.columns();
         if !is_row || !objectives.iter().all(|value| value.is_finite()) {
             return false;
@@ -42,7 +60,8 @@ impl<T> Archive<T> {
                 false
             }
             Verdict::Free { beaten } => {
-                self.remove(&beaten);
+                self.any_vacant |= !beaten.is_empty();
+                beaten.into_iter().for_each(|place| self.points.vacate(place));
                 self.points.push(objectives);
                 self.members.push(member());
                 true
@@ -114,6 +133,14 @@ impl<T> Archive<T> {
             archive.offer(row, || member);
         }
         Ok(archive)
+    }
+
+    /// Clears vacant places away.
+    fn close_ranks(&mut self) {
+        if std::mem::take(&mut self.any_vacant) {
+            let vacant: Vec<usize> = (0..self.len()).filter(|&place| self.points.is_vacant(place)).collect();
+            self.remove(&vacant);
+        }
     }
 
     /// Removes the members at these places, given in ascending order.

@@ -52,6 +52,16 @@ impl Blocks {
         self.set(self.len - 1, |_, column| point[column]);
     }
 
+    /// Leaves the place of a point vacant: it dominates nothing any more, and nothing moves yet.
+    pub(super) fn vacate(&mut self, i: usize) {
+        self.set(i, |_, _| f64::INFINITY);
+    }
+
+    /// Whether a place was left vacant. Points are finite, so their first objective tells.
+    pub(super) fn is_vacant(&self, i: usize) -> bool {
+        self.value(i, 0) == f64::INFINITY
+    }
+
     /// Removes the points at these places, given in ascending order; the others stay in theirs.
     pub(super) fn remove(&mut self, places: &[usize]) {
         let Some(&first) = places.first() else { return };
@@ -115,7 +125,7 @@ impl Kernel for Confront<'_> {
                 return Verdict::Dominated { block };
             }
             let places = (0..BLOCK).filter(|&lane| excess.least.lane(lane) >= 0.0);
-            beaten.extend(places.map(|lane| block * BLOCK + lane).filter(|&i| i < blocks.len));
+            beaten.extend(places.map(|lane| block * BLOCK + lane).filter(|&i| i < blocks.len && !blocks.is_vacant(i)));
         }
         Verdict::Free { beaten }
     }

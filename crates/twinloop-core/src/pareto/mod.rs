@@ -21,4 +21,4 @@ pub use dominance::dominates;
 pub use ideal::{Distance, best_tradeoff, ideal_point};
 pub use objectives::Objectives;
 pub use ranks::ranks;
-pub use selection::{LinearRanking, order, select};
+pub use selection::{LinearRanking, Ranking, order, select};

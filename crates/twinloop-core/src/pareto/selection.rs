@@ -7,6 +7,30 @@ use super::ranks::ranks_of_sorted;
 use super::sorted::{SortedColumns, key, sort_into};
 use crate::error::{Result, invalid};
 
+/// Where each row of a matrix stands: its front, and its room within that. Sorts the objectives once for both.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ranking {
+    /// Front of each row, 0 for the non-dominated, (rows).
+    pub ranks: Vec<u32>,
+    /// Crowding distance of each row, (rows).
+    pub crowding: Vec<f64>,
+}
+
+impl Ranking {
+    /// Of the rows of a matrix.
+    pub fn new(objectives: &Objectives) -> Self {
+        let sorted = SortedColumns::new(objectives);
+        let ranks = ranks_of_sorted(objectives, &sorted);
+        let crowding = crowding_of_sorted(objectives, &ranks, &sorted);
+        Self { ranks, crowding }
+    }
+
+    /// The rows from best to worst, (rows).
+    pub fn best_first(&self) -> Vec<usize> {
+        order(&self.ranks, &self.crowding)
+    }
+}
+
 /// Rows from best to worst, (rows): by rank, then by more crowding distance, then by index.
 ///
 /// `ranks`, (rows), and `crowding`, (rows), are of the same rows; a row without both has no place in the order.
@@ -22,10 +46,7 @@ pub fn order(ranks: &[u32], crowding: &[f64]) -> Vec<usize> {
 /// The best `count` rows, best first, (count): in the [`order`] of their ranks and crowding distances. All of them if
 /// there are fewer.
 pub fn select(objectives: &Objectives, count: usize) -> Vec<usize> {
-    let sorted = SortedColumns::new(objectives);
-    let ranks = ranks_of_sorted(objectives, &sorted);
-    let crowding = crowding_of_sorted(objectives, &ranks, &sorted);
-    let mut best = order(&ranks, &crowding);
+    let mut best = Ranking::new(objectives).best_first();
     best.truncate(count);
     best
 }
@@ -44,7 +65,7 @@ pub struct LinearRanking {
 }
 
 impl LinearRanking {
-    /// A draw among `count` positions with a selection `pressure` in (1, 2]: the expected number of times that the
+    /// A draw among `count` positions with a selection `pressure` from 1 (all alike) to 2: the expected number of times that the
     /// best is drawn in `count` draws.
     ///
     /// # Errors
@@ -53,9 +74,9 @@ impl LinearRanking {
         if count == 0 {
             return invalid("linear ranking: expected at least one position, found none; give a population");
         }
-        if !(pressure > 1.0 && pressure <= 2.0) {
+        if !(1.0..=2.0).contains(&pressure) {
             return invalid(format!(
-                "linear ranking: expected a selection pressure above 1 and at most 2, found {pressure}; choose \
+                "linear ranking: expected a selection pressure from 1 to 2, found {pressure}; choose \
                  2 to favour the best most"
             ));
         }
