@@ -87,7 +87,8 @@ class Quadrotor(System):
         self.rotor_inertia = number("Quadrotor, rotor_inertia (kg m²)", rotor_inertia)
         if self.rotor_inertia < 0.0:
             raise InvalidInput(
-                f"Quadrotor, rotor_inertia (kg m²): expected at least 0, found {rotor_inertia}; change its sign."
+                f"Quadrotor, rotor_inertia (kg m²): expected at least 0, found {rotor_inertia}; change its"
+                " sign."
             )
         self.hover_speed = math.sqrt(self.mass * GRAVITY / (4.0 * self.thrust_factor))
         self.top_speed = number("Quadrotor, top_speed (rad/s)", top_speed, above=self.hover_speed)

@@ -1,0 +1,232 @@
+"""Roll-outs: one loop for search and real run, checked against a plain one in NumPy."""
+
+import numpy as np
+import pytest
+
+from oracles import Pid, close_loop, final_distance, model_step, same_bits
+from strategies import program_text
+from twinloop import _core
+
+GROUPS = [1, 2, 5, 9, 33]
+"""Numbers of runs that fill groups of lanes in every way."""
+SCALES, DERIVATIVES, DT = [1.0, 4.0], [None, 0], 0.1
+BOUNDS = [(-1.0, 1.0), (-3.0, 2.0)]
+LIMITS = np.array([10.0, 20.0])
+START, TARGET = np.array([0.3, -0.2]), np.array([0.8, 0.1])
+
+
+def pid(genes):
+    return Pid([(0, 1), (1, None)], genes, DT, [[1.0, 0.25], [0.5, -2.0]], [0.1, -0.2], 1.0, BOUNDS)
+
+
+def drawn(count, seed=0):
+    return np.random.default_rng(seed).uniform(0.0, 2.0, (count, 6))
+
+
+def models(rig, form, count=3):
+    """Random models, one that is sure to move and one that is sure to run away among them."""
+    outputs = 1 if form == "acceleration" else 2
+    text = program_text(4, outputs, 4 + outputs, [[f"r{4 + k} = r{k} * 1.3" for k in range(outputs)]])
+    programs = [_core.Program.parse(text), *_core.Grammar(4, outputs).random(11, count)]
+    return [_core.Model(program, form, rig) for program in programs]
+
+
+def expected_run(model, genes, steps, start=START, target=TARGET, noise=None):
+    def step(x, u):
+        return model_step(model.program, model.form, x, u, SCALES, DERIVATIVES, DT)
+
+    return close_loop(step, pid(genes), start, target, steps, LIMITS, noise)
+
+
+def agree(form, found, expected):
+    if form == "acceleration":
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    else:
+        assert same_bits(found, expected)
+
+
+@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("count", GROUPS)
+def test_a_roll_out_is_the_plain_loop(rig, rig_family, form, count):
+    task, genes = _core.Task(START, TARGET, 15), drawn(count)
+    for model in models(rig, form):
+        runs = _core.rollout(model, rig_family, genes, task, rig)
+        assert runs.states.shape == (count, 16, 2) and runs.commands.shape == (count, 15, 2)
+        for i in range(count):
+            states, _, commands, lasted = expected_run(model, genes[i], 15)
+            assert runs.lasted[i] == lasted
+            agree(form, runs.states[i, : lasted + 1], states)
+            agree(form, runs.commands[i, :lasted], commands)
+            assert np.isnan(runs.states[i, lasted + 1 :]).all()
+            assert np.isnan(runs.commands[i, lasted:]).all()
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_the_controller_reads_the_noise_and_the_model_does_not(rig, rig_family, count):
+    noise = np.random.default_rng(3).normal(0.0, 0.1, (count, 13, 2))
+    task, genes = _core.Task(START, TARGET, 12), drawn(count)
+    model = models(rig, "increment")[1]
+    runs = _core.rollout(model, rig_family, genes, task, rig, noise=noise)
+    for i in range(count):
+        states, readings, commands, lasted = expected_run(model, genes[i], 12, noise=noise[i])
+        assert lasted == runs.lasted[i]
+        assert same_bits(runs.states[i, : lasted + 1], states)
+        assert same_bits(runs.measured[i, : lasted + 1], readings)
+        assert same_bits(runs.commands[i, :lasted], commands)
+
+
+def test_a_python_function_is_rolled_out_like_a_model(rig, rig_family):
+    model = models(rig, "increment")[1]
+    task, genes = _core.Task(START, TARGET, 12), drawn(3)
+    called = _core.rollout(
+        lambda x, u: model.step(x[None], u[None])[0], rig_family, genes, task, rig
+    )  # fmt: skip
+    learnt = _core.rollout(model, rig_family, genes, task, rig)
+    assert same_bits(called.states, learnt.states)
+    assert same_bits(called.commands, learnt.commands)
+
+
+@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("count", GROUPS)
+def test_final_distances_are_those_of_the_plain_loop(rig, rig_family, form, count):
+    task, genes, several = _core.Task(START, TARGET, 10), drawn(count), models(rig, form)
+    found = _core.final_distances(several, rig_family, genes, task, rig)
+    assert found.shape == (len(several), count)
+    for model, row in zip(several, found, strict=True):
+        for i in range(count):
+            states, _, _, lasted = expected_run(model, genes[i], 10)
+            expected = final_distance(states[-1], TARGET) if lasted == 10 else np.inf
+            assert row[i] == pytest.approx(expected, rel=1e-9)
+
+
+def selected(rig, rig_family, count):
+    """Tests of several lengths with recordings that no model made."""
+    stream, tests, recorded = np.random.default_rng(5), _core.SelectedTests(rig, rig_family), []
+    for i, genes in enumerate(drawn(count, seed=2)):
+        steps = 4 + (7 * i) % 11
+        states = stream.uniform(-1.0, 1.0, (steps + 1, 2))
+        commands = stream.uniform(-1.0, 1.0, (steps, 2))
+        target = stream.uniform(-1.0, 1.0, 2)
+        tests = tests.with_test(genes, target, states, commands)
+        recorded.append((genes, target, states, commands))
+    return tests, recorded
+
+
+@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("count", GROUPS)
+def test_the_open_loop_error_is_the_mean_square_one_step_ahead(rig, rig_family, form, count):
+    tests, recorded = selected(rig, rig_family, count)
+    several = models(rig, form)
+    found = _core.open_loop(several, tests)
+    assert found.shape == (len(several), count)
+    for model, row in zip(several, found, strict=True):
+        for k, (_, _, states, commands) in enumerate(recorded):
+            with np.errstate(all="ignore"):
+                ahead = [
+                    model_step(model.program, form, x, u, SCALES, DERIVATIVES, DT)
+                    for x, u in zip(states, commands, strict=False)
+                ]
+                expected = np.mean((np.array(ahead) - states[1:]) ** 2)
+            assert row[k] == pytest.approx(expected if expected < 2e6 else 2e6, rel=1e-9)
+
+
+@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("count", GROUPS)
+def test_the_closed_loop_error_is_that_of_the_free_run_under_the_tests_controller(
+    rig, rig_family, form, count
+):
+    tests, recorded = selected(rig, rig_family, count)
+    several = models(rig, form)
+    found = _core.closed_loop(several, tests)
+    for model, row in zip(several, found, strict=True):
+        for k, (genes, target, states, commands) in enumerate(recorded):
+            steps = len(commands)
+            run, _, _, lasted = expected_run(model, genes, steps, states[0], target)
+            if lasted == steps:
+                expected = np.mean((run[1:] - states[1:]) ** 2)
+            else:
+                expected = 1e6 * (2.0 - lasted / steps)
+            assert row[k] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(("factor", "steps"), [(3.0, 2), (3.0, 20), (1.5, 8), (20.0, 5)])
+def test_a_run_that_blows_up_is_worth_the_time_it_lasted(rig, rig_family, factor, steps):
+    program = _core.Program.parse(program_text(4, 2, 6, [[f"r4 = r0 * {factor}", "r5 = r1 * 1.0"]]))
+    model = _core.Model(program, "absolute", rig)
+    size, lasted = 1.0, 0
+    while lasted < steps and abs(size * factor) < 10.0:
+        size, lasted = size * factor, lasted + 1
+    states = np.zeros((steps + 1, 2))
+    states[0] = [1.0, 0.0]
+    tests = _core.SelectedTests(rig, rig_family).with_test(np.ones(6), TARGET, states, np.zeros((steps, 2)))
+    found = _core.closed_loop([model], tests)[0, 0]
+    if lasted < steps:
+        assert found == 1e6 * (2.0 - lasted / steps)
+        assert 1e6 < found <= 2e6
+    runs = _core.rollout(model, rig_family, np.ones((1, 6)), _core.Task([1.0, 0.0], TARGET, steps), rig)
+    assert runs.lasted[0] == lasted
+
+
+def test_a_run_that_stops_being_finite_has_diverged(rig, rig_family):
+    text = program_text(4, 2, 6, [["r4 = exp(r0)", "r4 = r4 * 1e300", "r4 = r4 * 1e300", "r5 = r4 - r4"]])
+    model = _core.Model(_core.Program.parse(text), "absolute", rig)
+    task = _core.Task(START, TARGET, 5)
+    assert _core.rollout(model, rig_family, np.ones((1, 6)), task, rig).lasted.tolist() == [0]
+    assert np.isinf(_core.final_distances([model], rig_family, np.ones((1, 6)), task, rig)).all()
+
+
+def test_the_limit_of_divergence_is_a_multiple_of_the_scale(rig, rig_family):
+    program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r0 * 2.0", "r5 = r1 * 1.0"]]))
+    model, task = _core.Model(program, "absolute", rig), _core.Task([1.0, 0.0], TARGET, 9)
+    lasted = [
+        _core.rollout(model, rig_family, np.ones((1, 6)), task, rig, divergence_factor=f).lasted[0]
+        for f in (2.0, 2.1, 8.0, 8.1, 1e6)
+    ]
+    assert lasted == [0, 1, 2, 3, 9]
+
+
+def test_a_failing_step_function_passes_its_own_error_on(rig, rig_family):
+    def fails(x, u):
+        raise KeyError("the rig is on fire")
+
+    with pytest.raises(KeyError, match="fire"):
+        _core.rollout(fails, rig_family, np.ones((1, 6)), _core.Task(START, TARGET, 5), rig)
+    with pytest.raises(ValueError, match=r"expected a next state of shape \(2,\)"):
+        _core.rollout(
+            lambda x, u: np.zeros(3), rig_family, np.ones((1, 6)), _core.Task(START, TARGET, 5), rig
+        )
+
+
+def test_arguments_of_another_shape_are_refused(rig, rig_family):
+    model, task = models(rig, "absolute")[0], _core.Task(START, TARGET, 5)
+    with pytest.raises(ValueError, match="expected 6 columns"):
+        _core.rollout(model, rig_family, np.ones((1, 5)), task, rig)
+    with pytest.raises(ValueError, match="noise: expected shape"):
+        _core.rollout(model, rig_family, np.ones((1, 6)), task, rig, noise=np.zeros((1, 5, 2)))
+    with pytest.raises(ValueError, match="expected 2 states"):
+        _core.rollout(model, rig_family, np.ones((1, 6)), _core.Task([0.0], [1.0], 5), rig)
+    for wrong in ([0.0, np.nan], [0.0, np.inf]):
+        with pytest.raises(ValueError, match="expected finite"):
+            _core.Task(START, wrong, 5)
+    with pytest.raises(ValueError, match="steps"):
+        _core.Task(START, TARGET, 0)
+
+
+@pytest.mark.parametrize("what", ["states", "commands", "parameters", "target"])
+def test_a_recorded_test_that_does_not_fit_is_refused(rig, rig_family, what):
+    good = {
+        "parameters": np.ones(6),
+        "target": TARGET,
+        "states": np.zeros((4, 2)),
+        "commands": np.zeros((3, 2)),
+    }
+    tests = _core.SelectedTests(rig, rig_family)
+    assert len(tests.with_test(**good)) == 1
+    longer = {**good, what: np.concatenate([good[what], good[what]])}
+    with pytest.raises(ValueError, match="expected"):
+        tests.with_test(**longer)
+    spoilt = good[what].copy()
+    spoilt.flat[0] = np.nan
+    with pytest.raises(ValueError, match="expected"):
+        tests.with_test(**{**good, what: spoilt})
+    assert len(tests) == 0
