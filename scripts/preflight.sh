@@ -42,3 +42,6 @@ rust_found=$(rustc --version 2>/dev/null | sed -n 's/^rustc \([0-9][0-9.]*\).*/\
     fail "Rust $rust_wanted or newer is needed, but \`rustc\` does not run; install Rust from https://rustup.rs."
 at_least "$rust_found" "$rust_wanted" ||
     fail "Rust $rust_wanted or newer is needed, but \`rustc\` is $rust_found; run \`rustup update stable\`."
+
+"${CC:-cc}" --version >/dev/null 2>&1 ||
+    fail "A C compiler is needed to link, but \`${CC:-cc}\` does not run; install gcc or clang (on Debian and Ubuntu: build-essential)."

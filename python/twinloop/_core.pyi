@@ -72,7 +72,7 @@ class Program:
     def page_lengths(self) -> list[int]: ...
     @property
     def instructions(self) -> list[tuple[str, int, int, int | float | None]]:
-        """(operation, destination, first, second): a register is an int, a constant a float, no operand None."""
+        """(operation, destination, first, second): a register an int, a constant a float, no operand None."""
     @property
     def intron_share(self) -> float: ...
     def effective(self) -> Program: ...
@@ -154,7 +154,7 @@ class Quadrotor:
 
 @final
 class Family:
-    """A family of controllers: a bounded parameter vector and a law, one implementation for search and real run."""
+    """Controllers that differ by a bounded parameter vector; one law for the search and the real run."""
 
     @staticmethod
     def pid(
@@ -215,8 +215,11 @@ def rollout(
     divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> Runs:
-    """Closes the loop of each controller (m, size) around the dynamics. noise (m, n + 1, n_x) is added to what
-    the controller reads. A Python callable (state (n_x,), command (n_u,)) -> next state is called on this thread."""
+    """Closes the loop of each controller (m, size) around the dynamics.
+
+    noise (m, n + 1, n_x) is added to what the controller reads. A Python callable takes a state (n_x,) and a
+    command (n_u,), returns the next state, and is called on this thread.
+    """
 
 @final
 class SelectedTests:

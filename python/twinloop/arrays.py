@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from twinloop.errors import InvalidInput
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 def floats(what: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:

@@ -1,4 +1,4 @@
-"""The double loop, counted in experiments: ask for a test, have it flown, tell what happened (paper, section III.C)."""
+"""The double loop, counted in experiments: ask for a test, fly it, tell what happened (section III.C)."""
 
 from __future__ import annotations
 

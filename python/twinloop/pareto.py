@@ -5,13 +5,13 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, whole
+from twinloop.arrays import Floats, Integers, floats, whole
 from twinloop.errors import engine_input
 
 Archive = _core.Archive
 
 
-def ranks(objectives: ArrayLike) -> _core.Integers:
+def ranks(objectives: ArrayLike) -> Integers:
     """Front of each row: 0 for those that nothing dominates, 1 for those that only they dominate, and so on.
 
     Args:
@@ -44,7 +44,7 @@ def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats:
         return _core.crowding_distances(_matrix(objectives), ranks)
 
 
-def select(objectives: ArrayLike, count: int) -> _core.Integers:
+def select(objectives: ArrayLike, count: int) -> Integers:
     """The best rows by rank, then by crowding distance.
 
     Args:
