@@ -1,11 +1,12 @@
 //! A model: a program and the form that makes it dynamics (paper, section IV.A; specification, section 4).
 
+use std::borrow::Cow;
 use std::str::FromStr;
 
 use crate::dynamics::Dynamics;
 use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
-use crate::lanes::Vector;
+use crate::lanes::{Vector, vectors};
 use crate::lgp::{Bank, Code, Inputs, Program};
 use crate::signals::Signals;
 
@@ -128,6 +129,24 @@ impl<'a> Model<'a> {
         Ok(())
     }
 
+    /// The next states of interleaved states (n_x × lanes) under interleaved commands (n_u × lanes): what
+    /// [`step`](Dynamics::step) gives, with fewer copies where the outputs are the next state.
+    #[inline(always)]
+    pub(crate) fn predict<'w, V: Vector>(
+        &self,
+        workspace: &'w mut ModelWorkspace<V>,
+        state: &[f64],
+        command: &[f64],
+    ) -> Cow<'w, [V]> {
+        if self.frame.form == Form::Absolute {
+            let inputs = Interleaved { state, command, factors: &self.frame.command_factors };
+            return Cow::Borrowed(self.code.run(&mut workspace.bank, &inputs));
+        }
+        let mut state = vectors(state);
+        self.step(workspace, &mut state, &vectors::<V>(command));
+        Cow::Owned(state)
+    }
+
     /// The code's outputs at a state, under a command.
     #[inline(always)]
     fn outputs<'b, V: Vector>(&self, bank: &'b mut Bank<V>, state: &[V], command: &[V]) -> &'b [V] {
@@ -148,6 +167,23 @@ impl<V: Vector> Inputs<V> for StateAndCommand<'_, V> {
         match i.checked_sub(self.state.len()) {
             None => self.state[i],
             Some(j) => self.command[j] * self.factors[j],
+        }
+    }
+}
+
+/// The same inputs where they lie, as interleaved numbers.
+struct Interleaved<'a> {
+    state: &'a [f64],
+    command: &'a [f64],
+    factors: &'a [f64],
+}
+
+impl<V: Vector> Inputs<V> for Interleaved<'_> {
+    #[inline(always)]
+    fn input(&self, i: usize) -> V {
+        match (i * V::LANES).checked_sub(self.state.len()) {
+            None => V::load(&self.state[i * V::LANES..]),
+            Some(place) => V::load(&self.command[place..]) * self.factors[place / V::LANES],
         }
     }
 }

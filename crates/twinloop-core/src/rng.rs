@@ -99,4 +99,44 @@ mod tests {
         }
         assert_eq!(stream(3).uniform(), first[3]);
     }
+
+    #[test]
+    fn every_part_of_a_key_makes_another_stream() {
+        let purposes = [
+            Purpose::Single,
+            Purpose::FirstModels,
+            Purpose::Models,
+            Purpose::FirstTests,
+            Purpose::Tests,
+            Purpose::Mutants,
+        ];
+        let mut first = Vec::new();
+        for seed in [0, 1, u64::MAX] {
+            for purpose in purposes {
+                for iteration in [0, 1, 2] {
+                    for generation in [0, 1, 1 << 40] {
+                        for unit in [0, 1, 2] {
+                            first.push(Stream::new(seed, purpose, iteration, generation, unit).uniform());
+                        }
+                    }
+                }
+            }
+        }
+        let streams = first.len();
+        first.sort_by(f64::total_cmp);
+        first.dedup();
+        assert_eq!(first.len(), streams);
+    }
+
+    #[test]
+    fn draws_stay_within_their_bounds() {
+        let mut stream = stream(2);
+        for n in [1, 2, 3, 1 << 20] {
+            assert!((0..1000).all(|_| stream.below(n) < n));
+        }
+        assert!((0..1000).all(|_| (0.0..1.0).contains(&stream.uniform())));
+        assert!((0..1000).all(|_| stream.gaussian().is_finite()));
+        assert!((0..1000).all(|_| (0.999e-3..=10.001).contains(&stream.log_uniform(1e-3, 10.0))));
+        assert!((0..1000).all(|_| stream.chance(1.0) && !stream.chance(0.0)));
+    }
 }

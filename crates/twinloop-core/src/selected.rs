@@ -73,6 +73,7 @@ impl SelectedTests {
                 "divergence factor: expected a number above 0, found {divergence_factor}"
             ));
         }
+        family.check(&signals)?;
         let limits = signals.limits(divergence_factor);
         let (experiments, blocks, rows, loops) = Default::default();
         Ok(Self { signals, family, experiments, limits, blocks, rows, loops })
@@ -155,7 +156,10 @@ impl SelectedTests {
     }
 }
 
-/// The transitions of all tests in blocks of 64, and smaller ones for what is left; and the rows of each test.
+/// Rows of a block: as many as the widest vector has lanes, for an instruction costs little more than its dispatch.
+const ROWS: usize = 64;
+
+/// The transitions of all tests in blocks, and the rows of each test.
 fn transitions(experiments: &[Arc<Experiment>], n_x: usize, n_u: usize) -> (Vec<Block>, Vec<Range<usize>>) {
     let (mut state, mut command, mut next, mut rows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for experiment in experiments {
@@ -165,15 +169,12 @@ fn transitions(experiments: &[Arc<Experiment>], n_x: usize, n_u: usize) -> (Vec<
         next.extend(experiment.states.chunks_exact(n_x).skip(1));
         rows.push(first..command.len());
     }
-    let mut blocks = Vec::new();
-    let mut row = 0;
-    while row < command.len() {
-        let left = command.len() - row;
-        let taken = [64, 32, 8].into_iter().find(|&size| size <= left).unwrap_or(left);
-        let part = |rows: &[&[f64]]| interleave(&rows[row..row + taken], lanes_for(taken));
-        blocks.push(Block { rows: taken, state: part(&state), command: part(&command), next: part(&next) });
-        row += taken;
-    }
+    let block = |first: usize| {
+        let rows = (command.len() - first).min(ROWS);
+        let part = |all: &[&[f64]]| interleave(&all[first..first + rows], lanes_for(rows));
+        Block { rows, state: part(&state), command: part(&command), next: part(&next) }
+    };
+    let blocks = (0..command.len()).step_by(ROWS).map(block).collect();
     (blocks, rows)
 }
 

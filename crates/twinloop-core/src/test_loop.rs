@@ -158,6 +158,7 @@ impl TestSearch {
         if committee.is_empty() {
             return invalid("test search: expected a committee of one model or more, found none");
         }
+        family.check(signals)?;
         if task.target.len() != family.states() {
             let (expected, found) = (family.states(), task.target.len());
             return invalid(format!("test search: expected a task of {expected} states, found {found}"));

@@ -12,6 +12,7 @@ pub use single::Controller;
 
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
+use crate::signals::Signals;
 
 /// A control law. Parameters, memory and signals are lanes: several controllers of the family at once.
 pub trait Law {
@@ -72,6 +73,21 @@ impl Family {
     /// Number of commands that the law writes, n_u.
     pub fn commands(&self) -> usize {
         self.commands
+    }
+
+    /// Refuses signals of another number of states or commands.
+    pub(crate) fn check(&self, signals: &Signals) -> Result<()> {
+        if (self.states, self.commands) != (signals.states(), signals.commands()) {
+            return invalid(format!(
+                "controllers: expected controllers of {} states and {} commands, found {} and {}; make the family for \
+                 these signals",
+                signals.states(),
+                signals.commands(),
+                self.states,
+                self.commands
+            ));
+        }
+        Ok(())
     }
 }
 

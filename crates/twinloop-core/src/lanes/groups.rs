@@ -53,20 +53,98 @@ pub(crate) fn interleave<R: AsRef<[f64]>>(rows: &[R], lanes: usize) -> Vec<f64> 
 #[inline(always)]
 pub(crate) fn vectors<V: Vector>(interleaved: &[f64]) -> Vec<V> {
     let mut vectors = vec![V::splat(0.0); interleaved.len() / V::LANES];
-    fill(&mut vectors, interleaved);
-    vectors
-}
-
-/// Overwrites vectors by interleaved numbers.
-#[inline(always)]
-pub(crate) fn fill<V: Vector>(vectors: &mut [V], interleaved: &[f64]) {
     for (vector, values) in vectors.iter_mut().zip(interleaved.chunks_exact(V::LANES)) {
         *vector = V::load(values);
     }
+    vectors
 }
 
 /// Rows of equal length, one a lane.
 #[inline(always)]
 pub(crate) fn pack<V: Vector, R: AsRef<[f64]>>(rows: &[R]) -> Vec<V> {
     vectors(&interleave(rows, V::LANES))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::{Isa, Kernel, Width, dispatch};
+    use proptest::prelude::*;
+
+    /// The lanes that [`with_lanes!`] takes for a group.
+    struct Lanes(usize);
+
+    impl Kernel for Lanes {
+        type Output = usize;
+        #[inline(always)]
+        fn run<W: Isa>(self) -> usize {
+            with_lanes!(W, self.0, self.of())
+        }
+    }
+
+    impl Lanes {
+        #[inline(always)]
+        fn of<V: Vector>(&self) -> usize {
+            V::LANES
+        }
+    }
+
+    #[test]
+    fn every_group_gets_a_vector_with_a_lane_for_each_of_its_rows() {
+        for size in 1..=64 {
+            assert!(lanes_for(size) >= size);
+            for width in Width::available() {
+                assert_eq!(dispatch(width, Lanes(size)), lanes_for(size), "{size} rows, {width:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_vector_is_as_wide_as_its_name_says() {
+        struct Sizes;
+        impl Kernel for Sizes {
+            type Output = [usize; 5];
+            #[inline(always)]
+            fn run<W: Isa>(self) -> [usize; 5] {
+                [W::Of1::LANES, W::Of4::LANES, W::Of8::LANES, W::Of32::LANES, W::Of64::LANES]
+            }
+        }
+        for width in Width::available() {
+            assert_eq!(dispatch(width, Sizes), [1, 4, 8, 32, 64]);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn groups_are_all_tests_in_their_order(count in 0..300_usize) {
+            let groups = groups(count);
+            prop_assert_eq!(groups.iter().cloned().flatten().collect::<Vec<_>>(), (0..count).collect::<Vec<_>>());
+            prop_assert!(groups.iter().all(|group| !group.is_empty() && group.len() <= 32));
+            // Lanes are wasted in the last group only.
+            for group in groups.iter().rev().skip(1) {
+                prop_assert_eq!(lanes_for(group.len()), group.len());
+            }
+        }
+
+        #[test]
+        fn interleaved_rows_stand_side_by_side_and_the_last_fills_up(
+            rows in prop::collection::vec(prop::array::uniform3(any::<f64>()), 1..9),
+            spare in 0..4_usize,
+        ) {
+            let lanes = rows.len() + spare;
+            let interleaved = interleave(&rows, lanes);
+            prop_assert_eq!(interleaved.len(), 3 * lanes);
+            for l in 0..lanes {
+                for j in 0..3 {
+                    let expected = rows[l.min(rows.len() - 1)][j];
+                    prop_assert_eq!(interleaved[j * lanes + l].to_bits(), expected.to_bits());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_rows_are_no_numbers() {
+        assert!(interleave::<&[f64]>(&[], 8).is_empty());
+    }
 }

@@ -82,7 +82,11 @@ impl Grammar {
     }
 
     /// A copy in which each instruction has one field redrawn with the mutation rate, at least one instruction.
+    ///
+    /// # Panics
+    /// When the program is not one that [`check`](Self::check) accepts.
     pub fn mutate(&self, program: &Program, stream: &mut Stream) -> Program {
+        self.check(program).expect("a program of the grammar's registers");
         let mut child = program.clone();
         let length = child.len();
         if length == 0 {
@@ -103,7 +107,13 @@ impl Grammar {
     }
 
     /// Both programs with one page exchanged.
+    ///
+    /// # Panics
+    /// When one of the programs is not one that [`check`](Self::check) accepts.
     pub fn crossover(&self, first: &Program, second: &Program, stream: &mut Stream) -> (Program, Program) {
+        for program in [first, second] {
+            self.check(program).expect("a program of the grammar's registers");
+        }
         let (mut first, mut second) = (first.clone(), second.clone());
         let (m, n) = (first.pages().len(), second.pages().len());
         if m == 0 || n == 0 {

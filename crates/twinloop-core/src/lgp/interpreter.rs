@@ -5,11 +5,12 @@ use crate::lanes::Vector;
 
 /// One step: constants are registers behind those of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
 pub(super) struct Step {
-    pub operation: Operation,
     pub destination: u16,
     pub first: u16,
     pub second: u16,
+    pub operation: Operation,
 }
 
 /// `bank[destination] = bank[first] operation bank[second]` for each step in order.
@@ -19,7 +20,7 @@ pub(super) struct Step {
 #[inline(always)]
 #[allow(unsafe_code)]
 pub(super) unsafe fn interpret<V: Vector>(steps: &[Step], bank: &mut [V]) {
-    for &step in steps {
+    for step in steps {
         macro_rules! arms {
             ($($operation:ident)*) => {
                 // The operation is constant in each arm, which leaves only its own instructions there.
@@ -35,8 +36,8 @@ pub(super) unsafe fn interpret<V: Vector>(steps: &[Step], bank: &mut [V]) {
 
 #[inline(always)]
 #[allow(unsafe_code)]
-unsafe fn apply<V: Vector>(operation: Operation, step: Step, bank: &mut [V]) {
-    let Step { destination, first, second, .. } = step;
+unsafe fn apply<V: Vector>(operation: Operation, step: &Step, bank: &mut [V]) {
+    let Step { destination, first, second, .. } = *step;
     debug_assert!([destination, first, second].iter().all(|&register| usize::from(register) < bank.len()));
     for piece in 0..V::PIECES {
         // SAFETY: the caller promises registers of the bank. Checking three of them at each step costs a fifth of it.

@@ -25,14 +25,14 @@ pub fn divergence_penalty(lasted: usize, steps: usize) -> f64 {
 
 /// Both objectives of a model: open loop and closed loop of each selected test in turn (2 N).
 pub fn of_model(model: Model<'_>, selected: &SelectedTests, width: Width) -> Vec<f64> {
-    let open = dispatch(width, OpenLoop { dynamics: model, selected });
+    let open = dispatch(width, OpenLoop { model, selected });
     let closed = dispatch(width, ClosedLoop { dynamics: model, selected });
     open.into_iter().zip(closed).flat_map(|(open, closed)| [open, closed]).collect()
 }
 
 /// Open loop of each model on each selected test (models × N).
 pub fn open_loops(models: &[Model<'_>], selected: &SelectedTests, workers: &Workers) -> Vec<Vec<f64>> {
-    workers.map(models.len(), |i| dispatch(workers.width(), OpenLoop { dynamics: models[i], selected }))
+    workers.map(models.len(), |i| dispatch(workers.width(), OpenLoop { model: models[i], selected }))
 }
 
 /// Closed loop of each model on each selected test (models × N).

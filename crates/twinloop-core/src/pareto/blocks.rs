@@ -125,7 +125,9 @@ impl Kernel for Confront<'_> {
                 return Verdict::Dominated { block };
             }
             let places = (0..BLOCK).filter(|&lane| excess.least.lane(lane) >= 0.0);
-            beaten.extend(places.map(|lane| block * BLOCK + lane).filter(|&i| i < blocks.len && !blocks.is_vacant(i)));
+            beaten.extend(
+                places.map(|lane| block * BLOCK + lane).filter(|&i| i < blocks.len && !blocks.is_vacant(i)),
+            );
         }
         Verdict::Free { beaten }
     }

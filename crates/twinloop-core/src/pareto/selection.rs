@@ -149,7 +149,7 @@ mod tests {
         #[test]
         fn an_even_grid_of_draws_hits_each_position_as_often_as_it_should(
             count in 1..60_usize,
-            pressure in (1.0..2.0_f64).prop_map(|open| 3.0 - open),
+            pressure in prop_oneof![Just(1.0), 1.0..=2.0],
         ) {
             const DRAWS: usize = 20_000;
             let ranking = LinearRanking::new(count, pressure).unwrap();
@@ -166,7 +166,7 @@ mod tests {
         #[test]
         fn a_draw_is_the_inverse_of_the_summed_probabilities(
             count in 2..100_000_usize,
-            pressure in (1.0..2.0_f64).prop_map(|open| 3.0 - open),
+            pressure in prop_oneof![Just(1.0), 1.0..=2.0],
             uniform in 0.0..1.0_f64,
         ) {
             let position = LinearRanking::new(count, pressure).unwrap().draw(uniform);
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_pressure_out_of_range_is_refused() {
-        for pressure in [1.0, 2.1, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+        for pressure in [0.99, 2.1, 0.0, -1.0, f64::NAN, f64::INFINITY] {
             let sentence = LinearRanking::new(5, pressure).unwrap_err().to_string();
             assert!(sentence.contains(&format!("found {pressure}")), "{sentence}");
         }

@@ -1,0 +1,238 @@
+//! Roll-outs: closed loops side by side.
+
+use proptest::prelude::*;
+use twinloop_core::{
+    Code, Controller, Form, Frame, Model, Program, Task, Trajectory, Width, final_distances, record,
+};
+
+use crate::oracle::{Pids, all_same, close, run, step};
+use crate::worlds::{STATES, World, any_model, gains, one_worker, state};
+
+fn slices(rows: &[Vec<f64>]) -> Vec<&[f64]> {
+    rows.iter().map(|row| &row[..]).collect()
+}
+
+/// A learnt system and the runs of several controllers on it.
+struct Setting {
+    world: World,
+    frame: Frame,
+    code: Code,
+    program: Program,
+    task: Task,
+    limits: Vec<f64>,
+}
+
+impl Setting {
+    fn new(
+        form: Form,
+        program: Program,
+        [initial, target]: [Vec<f64>; 2],
+        steps: usize,
+        factor: f64,
+    ) -> Self {
+        let world = World::new();
+        Self {
+            frame: Frame::new(form, &world.signals),
+            code: Code::new(&program),
+            task: Task::new(initial, target, steps).unwrap(),
+            limits: world.signals.limits(factor),
+            world,
+            program,
+        }
+    }
+
+    fn record(&self, gains: &[Vec<f64>], noise: &[Vec<f64>]) -> Vec<Trajectory> {
+        let model = Model { code: &self.code, frame: &self.frame };
+        let (gains, noise) = (slices(gains), slices(noise));
+        record(&model, &self.world.family, &gains, &self.task, &self.limits, &noise, Width::widest())
+    }
+
+    fn expected(&self, gains: &[f64], noise: &[f64]) -> crate::oracle::Run {
+        let Task { initial, target, steps } = &self.task;
+        let step = |state: &[f64], command: &[f64]| {
+            step(&self.world, &self.program, self.frame.form(), state, command)
+        };
+        run(step, Pids::new(&self.world, gains), [initial, target], *steps, &self.limits, noise)
+    }
+}
+
+/// Adds a constant of its own to the first state of each lane: the command that its gain asks for, and nothing else.
+fn drift() -> Program {
+    "program inputs=5 outputs=3 registers=8\npage 1\nr5 = r3 * 0.5\n".parse().unwrap()
+}
+
+proptest! {
+    #[test]
+    fn a_run_is_that_of_a_single_loop_whatever_runs_beside_it(
+        (form, program) in any_model(),
+        ends in [state(), state()],
+        gains in prop::collection::vec(gains(), 1..45),
+        steps in 1..25_usize,
+        factor in 0.5..10.0,
+        noisy in any::<bool>(),
+    ) {
+        let setting = Setting::new(form, program, ends, steps, factor);
+        let noise = |gains: &Vec<f64>| (0..(steps + 1) * STATES).map(|i| 0.1 * gains[i % 6]).collect::<Vec<f64>>();
+        let noise: Vec<Vec<f64>> = if noisy { gains.iter().map(noise).collect() } else { vec![] };
+        let runs = setting.record(&gains, &noise);
+        prop_assert_eq!(runs.len(), gains.len());
+        for (l, (found, gains)) in runs.iter().zip(&gains).enumerate() {
+            let noise = noise.get(l).map_or(&[][..], |noise| noise);
+            let expected = setting.expected(gains, noise);
+            prop_assert_eq!(found.lasted, expected.lasted);
+            for (found, expected) in [
+                (&found.states, &expected.states),
+                (&found.measured, &expected.readings),
+                (&found.commands, &expected.commands),
+            ] {
+                // Zero and minus zero are one command.
+                let expected: Vec<f64> = expected.concat();
+                prop_assert!(found.len() >= expected.len());
+                prop_assert!(found.iter().zip(&expected).all(|(a, b)| a == b || (a.is_nan() && b.is_nan())));
+            }
+            if found.lasted == steps {
+                prop_assert_eq!(found.states.len(), (steps + 1) * STATES);
+                prop_assert_eq!(found.measured.len(), found.states.len());
+                prop_assert_eq!(found.commands.len(), steps * 2);
+            }
+        }
+    }
+
+    #[test]
+    fn a_run_has_the_same_bits_in_a_group_of_any_size(
+        (form, program) in any_model(),
+        ends in [state(), state()],
+        gains in prop::collection::vec(gains(), 32),
+        place in 0..32_usize,
+    ) {
+        let setting = Setting::new(form, program, ends, 12, 10.0);
+        let alone = setting.record(&gains[place..=place], &[]).remove(0);
+        for size in [4, 8, 32] {
+            let start = place / size * size;
+            let beside = setting.record(&gains[start..start + size], &[]).swap_remove(place % size);
+            prop_assert_eq!(beside.lasted, alone.lasted);
+            prop_assert!(all_same(&beside.states[..(alone.lasted + 1) * STATES], &alone.states[..(alone.lasted + 1) * STATES]));
+            prop_assert!(all_same(&beside.commands[..alone.lasted * 2], &alone.commands[..alone.lasted * 2]));
+        }
+    }
+
+    #[test]
+    fn a_single_controller_commands_what_the_lanes_commanded(
+        (form, program) in any_model(),
+        ends in [state(), state()],
+        gains in prop::collection::vec(gains(), 1..40),
+    ) {
+        let setting = Setting::new(form, program, ends, 20, 10.0);
+        for (run, gains) in setting.record(&gains, &[]).iter().zip(gains) {
+            let mut controller = Controller::new(setting.world.family.clone(), gains).unwrap();
+            for t in 0..run.lasted {
+                let command = controller.command(&run.measured[t * STATES..][..STATES], &setting.task.target);
+                prop_assert!(all_same(&command.unwrap(), &run.commands[t * 2..][..2]));
+            }
+        }
+    }
+
+    #[test]
+    fn the_final_distance_is_that_of_the_last_state_and_infinite_after_a_divergence(
+        models in prop::collection::vec(any_model(), 1..4),
+        ends in [state(), state()],
+        gains in prop::collection::vec(gains(), 1..70),
+        steps in 1..15_usize,
+    ) {
+        let form = models[0].0;
+        let models = models.into_iter().filter(|one| one.0 == form);
+        let settings: Vec<Setting> =
+            models.map(|(_, program)| Setting::new(form, program, ends.clone(), steps, 3.0)).collect();
+        let Setting { world, task, limits, .. } = &settings[0];
+        let dynamics: Vec<Model<'_>> = settings.iter().map(|s| Model { code: &s.code, frame: &s.frame }).collect();
+        let found = final_distances(&dynamics, &world.family, &slices(&gains), task, limits, &one_worker());
+        prop_assert_eq!(found.len(), settings.len());
+        for (found, setting) in found.iter().zip(&settings) {
+            prop_assert_eq!(found.len(), gains.len());
+            for (found, gains) in found.iter().zip(&gains) {
+                let run = setting.expected(gains, &[]);
+                let last = run.states[run.lasted].iter().zip(&task.target);
+                let distance = last.map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt();
+                let expected = if run.lasted < steps { f64::INFINITY } else { distance };
+                prop_assert!(close(*found, expected), "{found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lane_that_diverges_does_not_end_its_neighbours() {
+    // Lane l commands 0.1 + its gain, so the first state, 0 at first, grows by as much at each step and leaves 1.
+    for lanes in [1_usize, 2, 4, 5, 8, 9, 31, 32, 33, 40, 64, 65] {
+        let mut setting =
+            Setting::new(Form::Increment, drift(), [vec![0.0; 3], vec![1.0, 0.0, 0.0]], 30, 1.0);
+        // A controller that asks for K_P · (1 − 0) would see the state; the derivative gain of a zero rate sees nothing.
+        setting.limits = vec![1.0, 1e9, 1e9];
+        let gains: Vec<Vec<f64>> =
+            (0..lanes).map(|l| vec![0.02 * (l % 7) as f64, 0.0, 0.0, 0.0, 0.0, 0.0]).collect();
+        for (run, gains) in setting.record(&gains, &[]).iter().zip(&gains) {
+            let (mut x, mut expected) = (0.0_f64, 0);
+            while expected < 30 {
+                x += 0.1 + gains[0] * (1.0 - x);
+                if x.abs() >= 1.0 {
+                    break;
+                }
+                expected += 1;
+            }
+            assert_eq!(run.lasted, expected, "{lanes} lanes, gain {}", gains[0]);
+        }
+    }
+}
+
+#[test]
+fn a_run_lasts_until_the_state_reaches_a_limit_or_stops_being_a_number() {
+    // 0.125 a step from 0: at 1 after the eighth, exactly.
+    let counting: Program =
+        "program inputs=5 outputs=3 registers=8\npage 1\nr5 = r5 + 0.125\n".parse().unwrap();
+    let exploding: Program =
+        "program inputs=5 outputs=3 registers=8\npage 1\nr6 = r0 * 1e200\nr5 = r6 * r6\nr5 = r5 - r5\nr5 = r5 + 0.125\n"
+            .parse()
+            .unwrap();
+    let lasted = |program: &Program, limit: f64| {
+        let mut setting =
+            Setting::new(Form::Increment, program.clone(), [vec![0.0; 3], vec![1.0; 3]], 20, 1.0);
+        setting.limits = vec![limit, f64::INFINITY, f64::INFINITY];
+        setting.record(&[vec![0.0; 6]], &[])[0].lasted
+    };
+    assert_eq!(lasted(&counting, 1.0), 7);
+    assert_eq!(lasted(&counting, 1.0625), 8);
+    assert_eq!(lasted(&counting, 100.0), 20);
+    // inf − inf in the second step.
+    assert_eq!(lasted(&exploding, f64::INFINITY), 1);
+}
+
+#[test]
+fn noise_is_what_the_controller_reads_and_never_what_the_system_does() {
+    // Commands do not matter to this model, so noise must leave every true state where it was.
+    let program: Program =
+        "program inputs=5 outputs=3 registers=8\npage 1\nr5 = r0 * 0.5\nr6 = r1 - 0.25\n".parse().unwrap();
+    let setting = Setting::new(Form::Absolute, program, [vec![0.5; 3], vec![1.0; 3]], 10, 100.0);
+    let gains = vec![vec![1.0, 0.5, 0.25, 1.0, 0.5, 0.25]; 3];
+    let noise: Vec<Vec<f64>> = (0..3).map(|l| vec![0.01 * l as f64; 11 * STATES]).collect();
+    let (quiet, noisy) = (setting.record(&gains, &[]), setting.record(&gains, &noise));
+    for (l, (quiet, noisy)) in quiet.iter().zip(&noisy).enumerate() {
+        assert_eq!(quiet.states, quiet.measured);
+        assert_eq!(quiet.states, noisy.states);
+        let read = |(state, noise): (&f64, &f64)| state + noise;
+        assert_eq!(noisy.measured, noisy.states.iter().zip(&noise[l]).map(read).collect::<Vec<_>>());
+        assert_eq!(l == 0, quiet.commands == noisy.commands);
+    }
+}
+
+#[test]
+fn tasks_that_no_run_can_have_are_refused() {
+    let refusal =
+        |initial: Vec<f64>, target, steps| Task::new(initial, target, steps).unwrap_err().to_string();
+    assert!(refusal(vec![0.0], vec![0.0; 2], 1).contains("found 1 and 2"));
+    assert!(refusal(vec![], vec![], 1).contains("found 0 and 0"));
+    assert!(refusal(vec![f64::NAN], vec![0.0], 1).contains("finite states"));
+    assert!(refusal(vec![0.0], vec![f64::INFINITY], 1).contains("finite states"));
+    assert!(refusal(vec![0.0], vec![1.0], 0).contains("found 0"));
+    assert!(refusal(vec![0.0], vec![1.0], Task::MOST_STEPS + 1).contains("found 10000001"));
+    assert_eq!(Task::new(vec![1.0, 2.0], vec![4.0, -2.0], 1).unwrap().distance(), 5.0);
+}
