@@ -201,7 +201,7 @@ CAMPAIGNS = {
     "an operation that there is none of": {"options": {"operations": ["+", "pow"]}},
     "too many registers": {"options": {"spare_registers": 1000000}},
     "an elite of everyone": {"options": {"elite_share": 1.0}},
-    "no pressure at all": {"options": {"ranking_pressure": 1.0}},
+    "less pressure than none": {"options": {"ranking_pressure": 0.99}},
     "a negative seed": {"seed": -1},
     "a seed of 65 bits": {"seed": 2**64},
     "half a seed": {"seed": 0.5},
