@@ -75,6 +75,31 @@ class Command:
 
 
 @dataclass(frozen=True)
+class RigidBody:
+    """A prior: three angles of a rigid body are turned by its three body rates.
+
+    Args:
+        angles: names of roll, pitch and yaw, in rad, turned about z, then y, then x.
+        rates: names of the body rates about x, y and z, in rad/s.
+
+    Raises:
+        InvalidInput: not three names each, or one of them twice.
+    """
+
+    angles: Sequence[str]
+    rates: Sequence[str]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "angles", tuple(self.angles))
+        object.__setattr__(self, "rates", tuple(self.rates))
+        if len(self.angles) != 3 or len(self.rates) != 3 or len({*self.angles, *self.rates}) != 6:
+            raise InvalidInput(
+                f"RigidBody: expected three angles and three rates that differ, found {self.angles} and"
+                f" {self.rates}; name six states."
+            )
+
+
+@dataclass(frozen=True)
 class Signals:
     """The states and commands of a system, and the period at which commands are sent.
 
@@ -82,14 +107,16 @@ class Signals:
         states: n_x of them, in the order of a state vector.
         commands: n_u of them, in the order of a command vector.
         dt: period, s; a command is held for one period.
+        kinematics: which states are angles and body rates of a rigid body, if any are.
 
     Raises:
-        InvalidInput: none of a kind, a name used twice, or a `derivative_of` that makes no sense.
+        InvalidInput: none of a kind, a name used twice, or a `derivative_of` or `kinematics` that make no sense.
     """
 
     states: Sequence[State]
     commands: Sequence[Command]
     dt: float
+    kinematics: RigidBody | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", _members("states", State, self.states))
@@ -102,6 +129,14 @@ class Signals:
                     f"Signals: expected names that differ, found {name!r} twice; rename one of them."
                 )
         self._check_derivatives()
+        if self.kinematics is not None:
+            if not isinstance(self.kinematics, RigidBody):
+                raise InvalidInput(
+                    f"Signals, kinematics: expected a twinloop.RigidBody or None, found {self.kinematics!r}."
+                )
+            for name in (*self.kinematics.angles, *self.kinematics.rates):
+                if name not in self.state_names:
+                    raise unknown("state in the kinematics", name, self.state_names)
 
     def _check_derivatives(self) -> None:
         parents = {state.name: state.derivative_of for state in self.states}
@@ -146,6 +181,12 @@ class Signals:
         """Names of the commands, in order."""
         return tuple(command.name for command in self.commands)
 
+    def is_given(self, state: int) -> bool:
+        """Whether other states alone say how a state moves: it is the integral of one, or an angle of the body."""
+        name = self.state_names[state]
+        turned = self.kinematics is not None and name in self.kinematics.angles
+        return turned or any(other.derivative_of == name for other in self.states)
+
     @cached_property
     def engine(self) -> _core.Signals:
         """The same signals as numbers, for the native engine."""
@@ -160,6 +201,12 @@ class Signals:
                     None if state.derivative_of is None else index[state.derivative_of]
                     for state in self.states
                 ],
+                None
+                if self.kinematics is None
+                else (
+                    tuple(index[name] for name in self.kinematics.angles),
+                    tuple(index[name] for name in self.kinematics.rates),
+                ),
             )
 
 

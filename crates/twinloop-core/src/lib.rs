@@ -1,6 +1,7 @@
 //! The engine of Twinloop: models are programs that are evolved on experiments, tests are controllers that are evolved
 //! on models. It knows numbers only: no files, no clock, no Python, no global state.
 
+mod actuators;
 mod controller;
 mod dynamics;
 mod error;
@@ -13,6 +14,7 @@ mod model_loop;
 mod objective;
 pub mod pareto;
 mod plants;
+mod regression;
 mod rng;
 mod rollout;
 mod rows;
@@ -21,8 +23,10 @@ mod signals;
 mod task;
 mod test_loop;
 mod trajectory;
+mod tuning;
 mod workers;
 
+pub use actuators::{Actuator, effects};
 pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid};
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};
@@ -34,12 +38,17 @@ pub use model::{Form, Frame, Model};
 pub use model_loop::{Learnt, ModelSearch};
 pub use objective::{closed_loops, discrimination, final_distances, instability, of_model, open_loops};
 pub use plants::{Gyroscopic, Quadrotor};
+pub use regression::{
+    Annealing, Chain, Cholesky, Found, Gram, Noise, Prices, Record, Solution, likelihood, most_likely_noise,
+    search,
+};
 pub use rng::{Purpose, Stream};
 pub use rollout::{Seen, Start, Watch, rollout};
 pub use rows::{run_rows, step_rows};
 pub use selected::{Experiment, SelectedTests};
-pub use signals::Signals;
+pub use signals::{RigidBody, Signals};
 pub use task::{Task, distance};
 pub use test_loop::{TestSearch, TestSettings};
 pub use trajectory::{Trajectory, record};
+pub use tuning::{Observed, Recorded, Tuned, Tuning};
 pub use workers::Workers;

@@ -3,12 +3,13 @@
 use std::borrow::Cow;
 use std::str::FromStr;
 
+use crate::actuators::{Actuator, Line, all_direct};
 use crate::dynamics::Dynamics;
 use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
 use crate::lanes::{Vector, vectors};
 use crate::lgp::{Bank, Code, Inputs, Program};
-use crate::signals::Signals;
+use crate::signals::{RigidBody, Signals};
 
 /// What the outputs of a program mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +18,7 @@ pub enum Form {
     Absolute,
     /// What is added to the state.
     Increment,
-    /// The derivative of each state that no other state is declared the derivative of, integrated by RK4.
+    /// The derivative of each state whose motion no other states are declared to give, integrated by RK4.
     Acceleration,
 }
 
@@ -38,7 +39,7 @@ impl Form {
     pub fn shape(self, signals: &Signals) -> (usize, usize) {
         let outputs = match self {
             Self::Absolute | Self::Increment => signals.states(),
-            Self::Acceleration => signals.states() - signals.derivative_of.iter().flatten().count(),
+            Self::Acceleration => (0..signals.states()).filter(|&state| !signals.is_given(state)).count(),
         };
         (signals.states() + signals.commands(), outputs)
     }
@@ -63,6 +64,8 @@ impl FromStr for Form {
 enum Slope {
     State(usize),
     Output(usize),
+    /// The turning of one of the three angles of the rigid body.
+    Turn(usize),
 }
 
 /// How the outputs of programs become dynamics; shared by all models of a search.
@@ -72,6 +75,9 @@ pub struct Frame {
     dt: f64,
     command_factors: Vec<f64>,
     slopes: Vec<Slope>,
+    body: Option<RigidBody>,
+    /// One a command, or none at all where every command acts at once.
+    actuators: Vec<Actuator>,
 }
 
 impl Frame {
@@ -81,12 +87,35 @@ impl Frame {
         let slopes = (0..signals.states()).map(|state| {
             match signals.derivative_of.iter().position(|&of| of == Some(state)) {
                 Some(rate) => Slope::State(rate),
+                None if signals.is_given(state) => {
+                    let body = signals.kinematics.expect("a given state that is no integral");
+                    Slope::Turn(body.angles.iter().position(|&angle| angle == state).expect("an angle of it"))
+                }
                 None => Slope::Output(outputs.next().expect("endless")),
             }
         });
         let slopes = slopes.collect();
         let command_factors = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
-        Self { form, dt: signals.dt, command_factors, slopes }
+        Self { form, dt: signals.dt, command_factors, slopes, body: signals.kinematics, actuators: vec![] }
+    }
+
+    /// The same with actuators, one a command.
+    pub fn with_actuators(self, actuators: Vec<Actuator>) -> Result<Self> {
+        if actuators.len() != self.command_factors.len() {
+            return invalid(format!(
+                "actuators: expected one for each of {} commands, found {}",
+                self.command_factors.len(),
+                actuators.len()
+            ));
+        }
+        let actuators = actuators.into_iter().map(Actuator::validated).collect::<Result<Vec<_>>>()?;
+        let actuators = if all_direct(&actuators) { vec![] } else { actuators };
+        Ok(Self { actuators, ..self })
+    }
+
+    /// The actuators, one a command; empty where every command acts at once.
+    pub fn actuators(&self) -> &[Actuator] {
+        &self.actuators
     }
 
     /// What the outputs mean.
@@ -96,11 +125,16 @@ impl Frame {
 
     /// Whether these signals have the states, commands, period and derivatives of the frame.
     pub fn fits(&self, signals: &Signals) -> bool {
-        *self == Self::new(self.form, signals)
+        let plain = Self::new(self.form, signals);
+        *self == Self { actuators: self.actuators.clone(), ..plain }
     }
 
     fn states(&self) -> usize {
         self.slopes.len()
+    }
+
+    pub(crate) fn commands(&self) -> usize {
+        self.command_factors.len()
     }
 }
 
@@ -138,7 +172,7 @@ impl<'a> Model<'a> {
         state: &[f64],
         command: &[f64],
     ) -> Cow<'w, [V]> {
-        if self.frame.form == Form::Absolute {
+        if self.frame.form == Form::Absolute && self.frame.actuators.is_empty() {
             let inputs = Interleaved { state, command, factors: &self.frame.command_factors };
             return Cow::Borrowed(self.code.run(&mut workspace.bank, &inputs));
         }
@@ -192,48 +226,109 @@ impl<V: Vector> Inputs<V> for Interleaved<'_> {
 pub struct ModelWorkspace<V: Vector> {
     bank: Bank<V>,
     stages: Stages<V>,
+    /// What the actuators hold, where there are any.
+    line: Option<Line<V>>,
+}
+
+impl<'a> Model<'a> {
+    /// A workspace whose lanes are models of their own: constants of the code (each on lanes, in the code's order), and
+    /// lags of the actuators.
+    pub(crate) fn variants<V: Vector>(&self, constants: &[V], lags: &[V]) -> ModelWorkspace<V> {
+        let Frame { actuators, dt, .. } = self.frame;
+        ModelWorkspace {
+            bank: self.code.bank_of(constants),
+            stages: Stages::new(self.integrated()),
+            line: (!actuators.is_empty()).then(|| Line::new(actuators, *dt, Some(lags))),
+        }
+    }
+
+    fn integrated(&self) -> usize {
+        if self.frame.form == Form::Acceleration { self.frame.states() } else { 0 }
+    }
 }
 
 impl Dynamics for Model<'_> {
     type Workspace<V: Vector> = ModelWorkspace<V>;
 
     fn workspace<V: Vector>(&self) -> ModelWorkspace<V> {
-        let integrated = if self.frame.form == Form::Acceleration { self.frame.states() } else { 0 };
-        ModelWorkspace { bank: self.code.bank(), stages: Stages::new(integrated) }
+        let Frame { actuators, dt, .. } = self.frame;
+        ModelWorkspace {
+            bank: self.code.bank(),
+            stages: Stages::new(self.integrated()),
+            line: (!actuators.is_empty()).then(|| Line::new(actuators, *dt, None)),
+        }
     }
 
     #[inline(always)]
     fn step<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &mut [V], command: &[V]) {
-        let ModelWorkspace { bank, stages } = workspace;
+        let ModelWorkspace { bank, stages, line } = workspace;
+        let effects = match line {
+            None => [command; 3],
+            Some(line) => {
+                line.pass(command);
+                [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]]
+            }
+        };
         match self.frame.form {
-            Form::Absolute => state.copy_from_slice(self.outputs(bank, state, command)),
+            Form::Absolute => state.copy_from_slice(self.outputs(bank, state, effects[1])),
             Form::Increment => {
-                let increments = self.outputs(bank, state, command);
+                let increments = self.outputs(bank, state, effects[1]);
                 for (state, increment) in state.iter_mut().zip(increments) {
                     *state = *state + *increment;
                 }
             }
-            Form::Acceleration => rk4(state, self.frame.dt, stages, Held { model: self, bank, command }),
+            Form::Acceleration => {
+                let held = Held { model: self, bank, effects, stage: 0 };
+                rk4(state, self.frame.dt, stages, held);
+            }
         }
     }
 }
 
-/// A model under a command.
+/// A model in a period: the effect of the command is known at its start, middle and end.
 struct Held<'a, V: Vector> {
     model: &'a Model<'a>,
     bank: &'a mut Bank<V>,
-    command: &'a [V],
+    effects: [&'a [V]; 3],
+    stage: usize,
 }
+
+/// Which of the three effects each stage of the integrator sees.
+const STAGES: [usize; 4] = [0, 1, 1, 2];
 
 impl<V: Vector> Field<V> for Held<'_, V> {
     #[inline(always)]
     fn slope(&mut self, point: &[V], slope: &mut [V]) {
-        let outputs = self.model.outputs(self.bank, point, self.command);
-        for (slope, source) in slope.iter_mut().zip(&self.model.frame.slopes) {
+        let outputs = self.model.outputs(self.bank, point, self.effects[STAGES[self.stage]]);
+        self.stage += 1;
+        let frame = self.model.frame;
+        for (slope, source) in slope.iter_mut().zip(&frame.slopes) {
             *slope = match *source {
                 Slope::State(rate) => point[rate],
                 Slope::Output(output) => outputs[output],
+                Slope::Turn(angle) => turn(frame.body.as_ref().expect("a body that turns"), angle, point),
             };
         }
+    }
+}
+
+/// cos of the pitch at which Euler's angles are taken to have no more meaning.
+const GIMBAL: f64 = 1e-3;
+
+/// Derivative of roll, pitch or yaw under body rates (z-y-x angles; Diebel 2006, equation 79).
+#[inline(always)]
+fn turn<V: Vector>(body: &RigidBody, angle: usize, point: &[V]) -> V {
+    let [roll, pitch, _] = body.angles.map(|state| point[state]);
+    let [p, q, r] = body.rates.map(|state| point[state]);
+    let (sin, cos) = (roll.map(libm::sin), roll.map(libm::cos));
+    let yawing = q * sin + r * cos;
+    let cos_pitch = pitch.map(|pitch| {
+        let cos = libm::cos(pitch);
+        if cos.abs() < GIMBAL { GIMBAL.copysign(cos) } else { cos }
+    });
+    match angle {
+        0 => p + yawing * pitch.map(libm::sin) / cos_pitch,
+        1 => q * cos - r * sin,
+        _ => yawing / cos_pitch,
     }
 }

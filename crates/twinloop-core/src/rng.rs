@@ -18,6 +18,10 @@ pub enum Purpose {
     Tests = 4,
     /// The mutants that a generation of the test loop judges instability with.
     Mutants = 5,
+    /// Walks over subsets of features.
+    Subsets = 6,
+    /// Members of a committee.
+    Members = 7,
 }
 
 /// A stream of random numbers.
@@ -109,6 +113,8 @@ mod tests {
             Purpose::FirstTests,
             Purpose::Tests,
             Purpose::Mutants,
+            Purpose::Subsets,
+            Purpose::Members,
         ];
         let mut first = Vec::new();
         for seed in [0, 1, u64::MAX] {

@@ -15,6 +15,17 @@ pub struct Signals {
     pub command_scales: Vec<f64>,
     /// The state that each state is the derivative of, where that is known (n_x,).
     pub derivative_of: Vec<Option<usize>>,
+    /// Angles and rates of a rigid body, where the states hold them.
+    pub kinematics: Option<RigidBody>,
+}
+
+/// Three angles (roll, pitch, yaw; z-y-x) and the three body rates that turn them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RigidBody {
+    /// Their states.
+    pub angles: [usize; 3],
+    /// Their states.
+    pub rates: [usize; 3],
 }
 
 impl Signals {
@@ -41,6 +52,15 @@ impl Signals {
             of.is_some_and(|of| of >= states || of == state || std::mem::replace(&mut integrated[of], true))
         }) {
             "expected each state to be the integral of at most one other state".to_owned()
+        } else if self.kinematics.is_some_and(|body| {
+            let mut all = [body.angles, body.rates].concat();
+            all.sort_unstable();
+            all.windows(2).any(|pair| pair[0] == pair[1])
+                || all[5] >= states
+                || body.angles.iter().any(|&angle| integrated[angle])
+        }) {
+            "expected six different states in the kinematics, none of the angles the integral of another"
+                .to_owned()
         } else {
             return Ok(self);
         };
@@ -50,6 +70,12 @@ impl Signals {
     /// Number of states, n_x.
     pub fn states(&self) -> usize {
         self.state_scales.len()
+    }
+
+    /// Whether other states alone say how a state moves: it is the integral of one, or an angle of a rigid body.
+    pub fn is_given(&self, state: usize) -> bool {
+        self.derivative_of.contains(&Some(state))
+            || self.kinematics.is_some_and(|body| body.angles.contains(&state))
     }
 
     /// Number of commands, n_u.

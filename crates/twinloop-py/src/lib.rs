@@ -8,9 +8,11 @@ mod objective;
 mod pareto;
 mod plant;
 mod program;
+mod regression;
 mod rollout;
 mod search;
 mod selected;
+mod tuning;
 mod workers;
 
 /// Each evaluation of a model takes and gives back a few aligned kilobytes; the system's allocator would take longer over
@@ -24,7 +26,7 @@ mod _core {
     #[pymodule_export]
     use crate::controller::{PyController, PyFamily};
     #[pymodule_export]
-    use crate::model::{PyModel, PySignals};
+    use crate::model::{PyModel, PySignals, command_effects};
     #[pymodule_export]
     use crate::objective::{closed_loop, discrimination, final_distances, instability, open_loop};
     #[pymodule_export]
@@ -34,11 +36,15 @@ mod _core {
     #[pymodule_export]
     use crate::program::{PyGrammar, PyProgram};
     #[pymodule_export]
+    use crate::regression::{PyGram, PyRegression, search_subsets};
+    #[pymodule_export]
     use crate::rollout::{PyRuns, PyTask, rollout};
     #[pymodule_export]
     use crate::search::{PyModelSearch, PyTestSearch, PyTestSettings, PyVariation};
     #[pymodule_export]
     use crate::selected::PySelectedTests;
+    #[pymodule_export]
+    use crate::tuning::{predictions, tune};
     #[pymodule_export]
     use crate::workers::{PyWorkers, vector_widths};
     #[pymodule_export]

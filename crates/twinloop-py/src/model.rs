@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray2;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Form, Frame, Learnt, Model, Signals, step_rows};
+use twinloop_core::{Actuator, Form, Frame, Learnt, Model, RigidBody, Signals, effects, step_rows};
 
-use crate::arrays::{Matrix, Vector, rows, to_matrix, vector, views};
+use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector, views};
 use crate::error::{Result, misuse};
 use crate::program::PyProgram;
 use crate::workers::{PyWorkers, or_default};
@@ -18,12 +18,14 @@ pub struct PySignals(pub Arc<Signals>);
 #[pymethods]
 impl PySignals {
     #[new]
+    #[pyo3(signature = (dt, state_scales, command_bounds, command_scales, derivative_of, kinematics = None))]
     fn new(
         dt: f64,
         state_scales: Vector<'_>,
         command_bounds: Matrix<'_>,
         command_scales: Vector<'_>,
         derivative_of: Vec<Option<usize>>,
+        kinematics: Option<([usize; 3], [usize; 3])>,
     ) -> Result<Self> {
         let bounds = rows("command bounds", &command_bounds, 2)?;
         let signals = Signals {
@@ -32,6 +34,7 @@ impl PySignals {
             command_bounds: bounds.iter().map(|row| (row[0], row[1])).collect(),
             command_scales: vector(&command_scales),
             derivative_of,
+            kinematics: kinematics.map(|(angles, rates)| RigidBody { angles, rates }),
         };
         Ok(Self(Arc::new(signals.validated()?)))
     }
@@ -51,6 +54,27 @@ impl PyModel {
         Self { learnt, frame, signals }
     }
 
+    /// The same model without introns, with these constants and lags.
+    pub fn varied(&self, constants: &[f64], lags: &[f64]) -> Result<PyModel> {
+        let program = self.learnt.program.effective().with_constants(constants)?;
+        let mut actuators = self.frame.actuators().to_vec();
+        if actuators.len() != lags.len() {
+            return Err(misuse(format!("lags: expected {}, found {}", actuators.len(), lags.len())));
+        }
+        actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
+        let frame = if actuators.is_empty() {
+            self.frame.clone()
+        } else {
+            Arc::new((*self.frame).clone().with_actuators(actuators)?)
+        };
+        Ok(PyModel::of(Arc::new(Learnt::new(program)), frame, self.signals().clone()))
+    }
+
+    /// What it is a model of.
+    pub fn signals(&self) -> &Arc<Signals> {
+        &self.signals
+    }
+
     /// The engine's view of it.
     pub fn core(&self) -> Model<'_> {
         Model { code: &self.learnt.code, frame: &self.frame }
@@ -60,11 +84,26 @@ impl PyModel {
 #[pymethods]
 impl PyModel {
     #[new]
-    fn new(program: &PyProgram, form: &str, signals: &PySignals) -> Result<Self> {
+    #[pyo3(signature = (program, form, signals, actuators = None))]
+    fn new(
+        program: &PyProgram,
+        form: &str,
+        signals: &PySignals,
+        actuators: Option<Vec<(f64, usize, Option<f64>)>>,
+    ) -> Result<Self> {
         let form: Form = form.parse()?;
         Model::check(&program.0.program, form, &signals.0)?;
-        let frame = Arc::new(Frame::new(form, &signals.0));
-        Ok(Self::of(program.0.clone(), frame, signals.0.clone()))
+        let mut frame = Frame::new(form, &signals.0);
+        if let Some(actuators) = actuators {
+            frame = frame.with_actuators(actuators.into_iter().map(actuator).collect())?;
+        }
+        Ok(Self::of(program.0.clone(), Arc::new(frame), signals.0.clone()))
+    }
+
+    /// (lag, delay, rest) of each command's actuator; empty where every command acts at once.
+    #[getter]
+    fn actuators(&self) -> Vec<(f64, usize, Option<f64>)> {
+        self.frame.actuators().iter().map(|a| (a.lag, a.delay, a.rest)).collect()
     }
 
     #[staticmethod]
@@ -75,6 +114,18 @@ impl PyModel {
     #[getter]
     fn program(&self) -> PyProgram {
         PyProgram(self.learnt.clone())
+    }
+
+    /// Constants of the effective program, in its order.
+    #[getter]
+    fn constants<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        to_vector(py, self.learnt.code.constants().to_vec())
+    }
+
+    /// The same model without introns, with other constants and other lags (none: the same).
+    fn with_constants(&self, constants: Vec<f64>, lags: Option<Vec<f64>>) -> Result<PyModel> {
+        let kept = || self.frame.actuators().iter().map(|actuator| actuator.lag).collect();
+        self.varied(&constants, &lags.unwrap_or_else(kept))
     }
 
     #[getter]
@@ -97,6 +148,25 @@ impl PyModel {
         let next = py.detach(|| step_rows(&self.core(), &views(&states), &views(&commands), width));
         Ok(to_matrix(py, n_x, next))
     }
+}
+
+fn actuator((lag, delay, rest): (f64, usize, Option<f64>)) -> Actuator {
+    Actuator { lag, delay, rest }
+}
+
+/// Effects of commands (n, n_u) behind actuators (lag, delay, rest) at the start, the middle and the end of each period.
+#[pyfunction]
+pub fn command_effects<'py>(
+    py: Python<'py>,
+    actuators: Vec<(f64, usize, Option<f64>)>,
+    dt: f64,
+    commands: Matrix<'py>,
+) -> Result<[Bound<'py, PyArray2<f64>>; 3]> {
+    let columns = actuators.len();
+    let commands = rows("commands", &commands, columns)?.concat();
+    let actuators: Vec<_> =
+        actuators.into_iter().map(|a| actuator(a).validated()).collect::<std::result::Result<_, _>>()?;
+    Ok(effects(&actuators, dt, &commands).map(|values| to_matrix(py, columns, values)))
 }
 
 /// Refuses states and commands of different numbers of rows.

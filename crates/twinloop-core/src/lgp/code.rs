@@ -99,6 +99,18 @@ impl Code {
         Bank(registers)
     }
 
+    /// The same with constants of each lane's own, in the order of [`Code::constants`].
+    pub fn bank_of<V: Vector>(&self, constants: &[V]) -> Bank<V> {
+        let mut bank = self.bank();
+        bank.0[self.registers..].copy_from_slice(constants);
+        bank
+    }
+
+    /// Constants, in the order of the instructions that hold them.
+    pub fn constants(&self) -> &[f64] {
+        &self.constants
+    }
+
     /// Runs the code on inputs that are asked for only where they matter, and returns the outputs.
     #[inline(always)]
     #[allow(unsafe_code)]

@@ -86,6 +86,26 @@ impl Program {
         self.pages.iter().flat_map(|page| page.0.iter())
     }
 
+    /// The same program with other constants, in the order of the instructions that hold one.
+    pub fn with_constants(&self, constants: &[f64]) -> Result<Self> {
+        let mut values = constants.iter();
+        let mut pages = self.pages.clone();
+        for instruction in pages.iter_mut().flat_map(|page| &mut page.0) {
+            if let Some(Operand::Constant(constant)) = &mut instruction.second {
+                let Some(&value) = values.next() else {
+                    return invalid(
+                        "constants: expected one for each instruction that holds one, found fewer",
+                    );
+                };
+                *constant = value;
+            }
+        }
+        if values.next().is_some() {
+            return invalid("constants: expected one for each instruction that holds one, found more");
+        }
+        Self::new(self.shape, pages)
+    }
+
     /// Number of instructions.
     pub fn len(&self) -> usize {
         self.pages.iter().map(|page| page.0.len()).sum()

@@ -36,6 +36,7 @@ impl World {
             // Powers of two: dividing by them and multiplying by their inverse is the same.
             command_scales: vec![0.5, 2.0],
             derivative_of: vec![None, Some(0), None],
+            kinematics: None,
         };
         let signals = Arc::new(signals.validated().unwrap());
         let axes = vec![Axis { angle: 0, rate: Some(1) }, Axis { angle: 2, rate: None }];

@@ -1,0 +1,217 @@
+//! Whitened features and readings of all records, as inner products; and least squares on any subset of them.
+
+use super::chain::{Chain, LONGEST, Noise, Whitening};
+use super::cholesky::Cholesky;
+use crate::workers::Workers;
+
+/// A record of one chain.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// Readings, (n + 1) × states of the chain.
+    pub measured: Vec<f64>,
+    /// 1 for a reading that counts, 0 for one to be ignored, (n + 1) × states.
+    pub weights: Vec<f64>,
+    /// What each feature adds to each state in each period, n × features × states.
+    pub increments: Vec<f64>,
+}
+
+impl Record {
+    /// Readings and the features' values at the start, the middle and the end of each period (n × features each).
+    pub fn new(
+        chain: &Chain,
+        measured: Vec<f64>,
+        weights: Vec<f64>,
+        start: &[f64],
+        middle: &[f64],
+        end: &[f64],
+    ) -> Self {
+        let mut increments = Vec::with_capacity(start.len() * chain.states);
+        for ((&start, &middle), &end) in start.iter().zip(middle).zip(end) {
+            increments.extend_from_slice(&chain.increments(start, middle, end)[..chain.states]);
+        }
+        Self { measured, weights, increments }
+    }
+
+    /// Periods.
+    pub fn steps(&self, chain: &Chain) -> usize {
+        self.measured.len() / chain.states - 1
+    }
+
+    /// How far each state may be from 0 before the first reading.
+    pub(crate) fn spread(&self, chain: &Chain) -> Vec<f64> {
+        let largest = |i: usize| {
+            self.measured.iter().skip(i).step_by(chain.states).fold(0.0_f64, |a, b| a.max(b.abs()))
+        };
+        (0..chain.states).map(|i| largest(i) + f64::MIN_POSITIVE.sqrt()).collect()
+    }
+
+    /// Readings less what given coefficients (features) explain of them, (n + 1) × states.
+    pub fn residual(&self, chain: &Chain, coefficients: &[f64]) -> Vec<f64> {
+        let (d, p) = (chain.states, coefficients.len());
+        let mut residual = self.measured.clone();
+        let mut state = vec![0.0; d];
+        for k in 0..self.steps(chain) {
+            chain.coast(&mut state);
+            for (i, state) in state.iter_mut().enumerate() {
+                for (j, c) in coefficients.iter().enumerate() {
+                    *state += c * self.increments[(k * p + j) * d + i];
+                }
+            }
+            for i in 0..d {
+                residual[(k + 1) * d + i] -= state[i];
+            }
+        }
+        residual
+    }
+}
+
+/// Inner products of p features and the readings, whitened.
+#[derive(Clone, Debug)]
+pub struct Gram {
+    /// Number of features.
+    pub features: usize,
+    /// (p + 1) × (p + 1), the readings last; symmetric.
+    products: Vec<f64>,
+    /// Whitened readings.
+    pub readings: usize,
+}
+
+/// Least squares on a subset of features.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// Of the subset's features, in its order.
+    pub coefficients: Vec<f64>,
+    /// Covariance of them, where the noise is what whitening took it for (k × k).
+    pub covariance: Vec<f64>,
+    /// Sum of squares that is left, χ².
+    pub left: f64,
+}
+
+/// Rows that are multiplied into the products at once.
+const BLOCK: usize = 8;
+
+impl Gram {
+    /// Of all records.
+    pub fn new(chain: &Chain, records: &[Record], features: usize, noise: &Noise, workers: &Workers) -> Self {
+        let parts = workers.map(records.len(), |i| Self::of_record(chain, &records[i], features, noise));
+        let width = features + 1;
+        let mut sum = Self { features, products: vec![0.0; width * width], readings: 0 };
+        for part in parts {
+            sum.products.iter_mut().zip(&part.products).for_each(|(a, b)| *a += b);
+            sum.readings += part.readings;
+        }
+        sum
+    }
+
+    fn of_record(chain: &Chain, record: &Record, features: usize, noise: &Noise) -> Self {
+        let (d, p) = (chain.states, features);
+        let width = p + 1;
+        let whitening = Whitening::new(chain, noise, &record.weights, &record.spread(chain));
+        let mut products = vec![0.0; width * width];
+        // What the filter has not explained yet, column after column; that of the readings is their prediction.
+        let mut state = vec![0.0; d * width];
+        let mut rows: Vec<f64> = Vec::with_capacity(BLOCK * width);
+        let steps = record.steps(chain);
+        let mut moved = [0.0; LONGEST];
+        for k in 0..=steps {
+            let (gain, root) = (whitening.gain(k), whitening.root(k));
+            let first = rows.len();
+            rows.resize(first + d * width, 0.0);
+            for j in 0..width {
+                let column = &mut state[j * d..][..d];
+                // A feature's own response, or the readings less their prediction.
+                let mut innovation = [0.0; LONGEST];
+                for i in 0..d {
+                    innovation[i] = if j < p { column[i] } else { record.measured[k * d + i] - column[i] };
+                }
+                let sign = if j < p { -1.0 } else { 1.0 };
+                for i in 0..d {
+                    let mut white = 0.0;
+                    let mut step = 0.0;
+                    for l in 0..d {
+                        white += root[i * d + l] * innovation[l];
+                        step += gain[i * d + l] * innovation[l];
+                    }
+                    rows[first + i * width + j] = white;
+                    moved[i] = column[i] + sign * step;
+                }
+                chain.coast(&mut moved[..d]);
+                column.copy_from_slice(&moved[..d]);
+                if j < p && k < steps {
+                    let increments = &record.increments[(k * p + j) * d..][..d];
+                    column.iter_mut().zip(increments).for_each(|(a, b)| *a += b);
+                }
+            }
+            if rows.len() >= BLOCK * width || k == steps {
+                multiply(&rows, width, &mut products);
+                rows.clear();
+            }
+        }
+        for i in 0..width {
+            for j in 0..i {
+                products[i * width + j] = products[j * width + i];
+            }
+        }
+        Self { features, products, readings: whitening.readings }
+    }
+
+    /// ⟨feature i, feature j⟩; i or j may be `features` for the readings.
+    #[inline(always)]
+    pub fn product(&self, i: usize, j: usize) -> f64 {
+        self.products[i * (self.features + 1) + j]
+    }
+
+    /// Sum of squares of the whitened readings.
+    pub fn total(&self) -> f64 {
+        self.product(self.features, self.features)
+    }
+
+    /// Least squares on a subset, on columns of unit length; `ridge` is added to their diagonal.
+    pub fn solve(&self, subset: &[usize], ridge: f64) -> Option<Solution> {
+        let k = subset.len();
+        let lengths: Vec<f64> = subset.iter().map(|&j| self.product(j, j).sqrt()).collect();
+        if lengths.iter().any(|&length| !(length.is_finite() && length > 0.0)) {
+            return None;
+        }
+        let mut matrix = vec![0.0; k * k];
+        for (a, &i) in subset.iter().enumerate() {
+            for (b, &j) in subset.iter().enumerate() {
+                matrix[a * k + b] = self.product(i, j) / (lengths[a] * lengths[b]);
+            }
+            matrix[a * k + a] += ridge;
+        }
+        let right: Vec<f64> =
+            subset.iter().zip(&lengths).map(|(&j, length)| self.product(j, self.features) / length).collect();
+        let factor = Cholesky::new(&matrix, k, 1e-13)?;
+        let scaled = factor.solve(&right);
+        let explained: f64 = {
+            // With a ridge the plain product would not be what is explained.
+            let mut sum = 0.0;
+            for a in 0..k {
+                let row: f64 =
+                    (0..k).map(|b| (matrix[a * k + b] - if a == b { ridge } else { 0.0 }) * scaled[b]).sum();
+                sum += scaled[a] * (2.0 * right[a] - row);
+            }
+            sum
+        };
+        let inverse = factor.inverse();
+        Some(Solution {
+            coefficients: scaled.iter().zip(&lengths).map(|(c, length)| c / length).collect(),
+            covariance: (0..k * k).map(|ab| inverse[ab] / (lengths[ab / k] * lengths[ab % k])).collect(),
+            left: (self.total() - explained).max(0.0),
+        })
+    }
+}
+
+/// Adds the products of rows (each of `width`) to the upper triangle.
+fn multiply(rows: &[f64], width: usize, products: &mut [f64]) {
+    for i in 0..width {
+        let target = &mut products[i * width + i..(i + 1) * width];
+        for row in rows.chunks_exact(width) {
+            let factor = row[i];
+            if factor != 0.0 {
+                target.iter_mut().zip(&row[i..]).for_each(|(t, &r)| *t += factor * r);
+            }
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! How likely residuals are under given noise, and the noise under which they are most likely.
+
+use super::chain::{Chain, LONGEST, Noise, Whitening};
+use super::gram::Record;
+
+/// −2 log of the likelihood, up to a constant, of the records' residuals ((n + 1) × states each) if only noise made them.
+pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noise: &Noise) -> f64 {
+    let d = chain.states;
+    let mut total = 0.0;
+    for (record, residual) in records.iter().zip(residuals) {
+        let whitening = Whitening::new(chain, noise, &record.weights, &record.spread(chain));
+        total += whitening.log_determinant;
+        let mut state = vec![0.0; d];
+        for k in 0..residual.len() / d {
+            let (gain, root) = (whitening.gain(k), whitening.root(k));
+            let mut innovation = [0.0; LONGEST];
+            for i in 0..d {
+                innovation[i] = residual[k * d + i] - state[i];
+            }
+            for i in 0..d {
+                let white: f64 = (0..d).map(|l| root[i * d + l] * innovation[l]).sum();
+                total += white * white;
+                state[i] += (0..d).map(|l| gain[i * d + l] * innovation[l]).sum::<f64>();
+            }
+            chain.coast(&mut state);
+        }
+    }
+    total
+}
+
+/// Factors by which a variance is tried in turn, coarse to fine.
+const STEPS: [f64; 5] = [100.0, 10.0, 3.0, 1.5, 1.15];
+
+/// The noise under which residuals are most likely, by coordinate search from `start`; never below `smallest`.
+pub fn most_likely_noise(
+    chain: &Chain,
+    records: &[Record],
+    residuals: &[Vec<f64>],
+    start: &Noise,
+    smallest: &Noise,
+    fixed_sensors: bool,
+) -> (Noise, f64) {
+    let d = chain.states;
+    let mut best = start.clone();
+    let mut score = likelihood(chain, records, residuals, &best);
+    for step in STEPS {
+        for _ in 0..8 {
+            let mut moved = false;
+            for which in (if fixed_sensors { d } else { 0 })..=d {
+                for factor in [step, 1.0 / step] {
+                    let mut tried = best.clone();
+                    if which < d {
+                        tried.sensors[which] = (tried.sensors[which] * factor).max(smallest.sensors[which]);
+                    } else {
+                        tried.process = (tried.process * factor).max(smallest.process);
+                    }
+                    if tried == best {
+                        continue;
+                    }
+                    let found = likelihood(chain, records, residuals, &tried);
+                    if found < score {
+                        (best, score, moved) = (tried, found, true);
+                    }
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+    }
+    (best, score)
+}

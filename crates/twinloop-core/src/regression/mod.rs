@@ -1,0 +1,15 @@
+//! Regression: which sums of features explain what the sensors saw, with sensor noise and process noise told apart.
+
+mod chain;
+mod cholesky;
+mod gram;
+mod likelihood;
+mod subset;
+
+pub use chain::{Chain, Noise};
+pub use cholesky::Cholesky;
+pub use gram::{Gram, Record, Solution};
+pub use likelihood::{likelihood, most_likely_noise};
+pub use subset::{Annealing, Found, Prices, search};
+
+pub(crate) use chain::Whitening;

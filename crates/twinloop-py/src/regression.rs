@@ -1,0 +1,243 @@
+//! Regression on whitened features, and the search over their subsets.
+
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use twinloop_core::{
+    Annealing, Chain, Gram, Noise, Prices, Purpose, Record, Stream, likelihood, most_likely_noise, search,
+};
+
+use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector};
+use crate::error::{Result, misuse};
+use crate::workers::{PyWorkers, or_default};
+
+/// Readings, weights, and the features at the start, the middle and the end of each period.
+type RecordArrays<'py> = (Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>);
+
+/// Records of one chain of states with the features that may drive it.
+#[pyclass(frozen, name = "Regression", module = "twinloop._core")]
+pub struct PyRegression {
+    chain: Chain,
+    records: Vec<Record>,
+    features: usize,
+}
+
+#[pymethods]
+impl PyRegression {
+    #[new]
+    fn new(states: usize, dt: f64, integrated: bool, records: Vec<RecordArrays<'_>>) -> Result<Self> {
+        if !(1..=4).contains(&states) || !(dt.is_finite() && dt > 0.0) {
+            return Err(misuse(format!(
+                "chain: expected 1 to 4 states and a period above 0, found {states} and {dt}"
+            )));
+        }
+        let chain = Chain { states, dt, integrated };
+        let mut features = None;
+        let mut built = Vec::with_capacity(records.len());
+        for (measured, weights, start, middle, end) in &records {
+            let p = *features.get_or_insert(start.as_array().ncols());
+            let steps = start.as_array().nrows();
+            let shapes = [middle, end].iter().all(|m| m.as_array().dim() == (steps, p))
+                && start.as_array().dim() == (steps, p)
+                && [measured, weights].iter().all(|m| m.as_array().dim() == (steps + 1, states));
+            if !shapes {
+                return Err(misuse(format!(
+                    "record: expected n rows of {p} features three times and n + 1 rows of {states} readings and weights"
+                )));
+            }
+            let flat = |m: &Matrix<'_>, columns| rows("record", m, columns).map(|rows| rows.concat());
+            let record = Record::new(
+                &chain,
+                flat(measured, states)?,
+                flat(weights, states)?,
+                &flat(start, p)?,
+                &flat(middle, p)?,
+                &flat(end, p)?,
+            );
+            if !record.increments.iter().chain(&record.measured).all(|x| x.is_finite()) {
+                return Err(misuse("record: expected finite numbers, found NaN or an infinite one".into()));
+            }
+            built.push(record);
+        }
+        Ok(Self { chain, records: built, features: features.unwrap_or(0) })
+    }
+
+    /// Readings less what the coefficients explain, a matrix for each record.
+    fn residuals<'py>(
+        &self,
+        py: Python<'py>,
+        coefficients: Vector<'py>,
+    ) -> Result<Vec<Bound<'py, PyArray2<f64>>>> {
+        let coefficients = self.coefficients(&coefficients)?;
+        Ok(self
+            .records
+            .iter()
+            .map(|record| to_matrix(py, self.chain.states, record.residual(&self.chain, &coefficients)))
+            .collect())
+    }
+
+    fn likelihood(&self, coefficients: Vector<'_>, sensors: Vector<'_>, process: f64) -> Result<f64> {
+        let residuals = self.leftovers(&coefficients)?;
+        Ok(likelihood(&self.chain, &self.records, &residuals, &self.noise(&sensors, process)?))
+    }
+
+    #[pyo3(signature = (coefficients, sensors, process, smallest_sensors, smallest_process, fixed_sensors = false))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a start and a floor of each variance, by keyword in Python"
+    )]
+    fn most_likely_noise<'py>(
+        &self,
+        py: Python<'py>,
+        coefficients: Vector<'py>,
+        sensors: Vector<'py>,
+        process: f64,
+        smallest_sensors: Vector<'py>,
+        smallest_process: f64,
+        fixed_sensors: bool,
+    ) -> Result<(Bound<'py, PyArray1<f64>>, f64, f64)> {
+        let residuals = self.leftovers(&coefficients)?;
+        let start = self.noise(&sensors, process)?;
+        let smallest = self.noise(&smallest_sensors, smallest_process)?;
+        let (noise, score) = py.detach(|| {
+            most_likely_noise(&self.chain, &self.records, &residuals, &start, &smallest, fixed_sensors)
+        });
+        Ok((to_vector(py, noise.sensors), noise.process, score))
+    }
+
+    #[pyo3(signature = (sensors, process, workers = None))]
+    fn gram(
+        &self,
+        py: Python<'_>,
+        sensors: Vector<'_>,
+        process: f64,
+        workers: Option<&PyWorkers>,
+    ) -> Result<PyGram> {
+        let workers = or_default(workers)?;
+        let noise = self.noise(&sensors, process)?;
+        let gram = py.detach(|| Gram::new(&self.chain, &self.records, self.features, &noise, &workers));
+        Ok(PyGram(Arc::new(gram)))
+    }
+}
+
+impl PyRegression {
+    fn coefficients(&self, coefficients: &Vector<'_>) -> Result<Vec<f64>> {
+        let coefficients = vector(coefficients);
+        if coefficients.len() != self.features {
+            return Err(misuse(format!(
+                "expected {} coefficients, found {}",
+                self.features,
+                coefficients.len()
+            )));
+        }
+        Ok(coefficients)
+    }
+
+    fn leftovers(&self, coefficients: &Vector<'_>) -> Result<Vec<Vec<f64>>> {
+        let coefficients = self.coefficients(coefficients)?;
+        Ok(self.records.iter().map(|record| record.residual(&self.chain, &coefficients)).collect())
+    }
+
+    fn noise(&self, sensors: &Vector<'_>, process: f64) -> Result<Noise> {
+        let sensors = vector(sensors);
+        let positive = sensors.iter().all(|x| x.is_finite() && *x > 0.0);
+        if sensors.len() != self.chain.states || !positive || !(process.is_finite() && process >= 0.0) {
+            return Err(misuse(format!(
+                "noise: expected {} sensor variances above 0 and a process variance, found {sensors:?} and {process}",
+                self.chain.states
+            )));
+        }
+        Ok(Noise { sensors, process })
+    }
+}
+
+/// Inner products of whitened features and readings.
+#[pyclass(frozen, name = "Gram", module = "twinloop._core")]
+pub struct PyGram(pub Arc<Gram>);
+
+#[pymethods]
+impl PyGram {
+    #[getter]
+    fn features(&self) -> usize {
+        self.0.features
+    }
+
+    #[getter]
+    fn readings(&self) -> usize {
+        self.0.readings
+    }
+
+    #[getter]
+    fn total(&self) -> f64 {
+        self.0.total()
+    }
+
+    /// Coefficients, their covariance and what is left; none where the features are collinear.
+    #[pyo3(signature = (subset, ridge = 0.0))]
+    #[expect(clippy::type_complexity, reason = "coefficients, covariance, χ²")]
+    fn solve<'py>(
+        &self,
+        py: Python<'py>,
+        subset: Vec<usize>,
+        ridge: f64,
+    ) -> Result<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64)>> {
+        if subset.iter().any(|&j| j >= self.0.features) {
+            return Err(misuse(format!("subset: expected features below {}", self.0.features)));
+        }
+        let k = subset.len();
+        Ok(self.0.solve(&subset, ridge).map(|solution| {
+            (to_vector(py, solution.coefficients), to_matrix(py, k, solution.covariance), solution.left)
+        }))
+    }
+}
+
+/// For each of the problems, subsets with their energies, best first: annealed `starts` times from different streams.
+#[pyfunction]
+#[pyo3(signature = (grams, prices, scales, *, moves, largest, starts, seed, iteration, coldest = 2.0, workers = None))]
+#[expect(clippy::too_many_arguments, reason = "the settings of a search, named by keyword in Python")]
+pub fn search_subsets(
+    py: Python<'_>,
+    grams: Vec<Bound<'_, PyGram>>,
+    prices: Vec<Vector<'_>>,
+    scales: Vec<f64>,
+    moves: usize,
+    largest: usize,
+    starts: usize,
+    seed: u64,
+    iteration: u64,
+    coldest: f64,
+    workers: Option<&PyWorkers>,
+) -> Result<Vec<Vec<(Vec<usize>, f64)>>> {
+    let workers = or_default(workers)?;
+    let grams: Vec<_> = grams.iter().map(|gram| gram.get().0.clone()).collect();
+    if prices.len() != grams.len() || scales.len() != grams.len() || starts == 0 {
+        return Err(misuse(
+            "search_subsets: expected prices and a scale for each problem and at least 1 start".into(),
+        ));
+    }
+    let prices: Vec<_> = prices
+        .iter()
+        .zip(&scales)
+        .map(|(prices, &scale)| Prices { features: vector(prices), scale, fixed: vec![] })
+        .collect();
+    if prices.iter().zip(&grams).any(|(prices, gram)| prices.features.len() != gram.features) {
+        return Err(misuse("search_subsets: expected a price for each feature".into()));
+    }
+    let annealing = Annealing { moves, largest, coldest };
+    let walks = py.detach(|| {
+        workers.map(grams.len() * starts, |unit| {
+            let problem = unit / starts;
+            let mut stream =
+                Stream::new(seed, Purpose::Subsets, iteration, problem as u64, (unit % starts) as u64);
+            search(&grams[problem], &prices[problem], &annealing, &mut stream)
+        })
+    });
+    let merged = walks.chunks(starts).map(|walks| {
+        let mut all: Vec<_> = walks.concat();
+        all.sort_by(|a, b| a.energy.total_cmp(&b.energy).then_with(|| a.subset.cmp(&b.subset)));
+        all.dedup_by(|a, b| a.subset == b.subset);
+        all.into_iter().map(|found| (found.subset, found.energy)).collect()
+    });
+    Ok(merged.collect())
+}

@@ -1,0 +1,144 @@
+//! Tuning of a model's constants on recorded runs.
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use twinloop_core::{Chain, Learnt, Noise, Observed, Purpose, Recorded, Stream, Tuning};
+
+use crate::arrays::{Matrix, rows, to_matrix};
+use crate::error::{Result, misuse};
+use crate::model::PyModel;
+use crate::workers::{PyWorkers, or_default};
+
+/// States, sensor variances, process variance and whether features are derivatives, for each chain.
+type Chains = Vec<(Vec<usize>, Vec<f64>, f64, bool)>;
+/// Readings, weights and commands of each run.
+type Records<'py> = Vec<(Matrix<'py>, Matrix<'py>, Matrix<'py>)>;
+
+fn observer(chains: Chains, dt: f64) -> Result<Vec<Observed>> {
+    let of_chain = |(states, sensors, process, integrated): (Vec<usize>, Vec<f64>, f64, bool)| {
+        if !(1..=4).contains(&states.len())
+            || sensors.iter().any(|s| !(s.is_finite() && *s > 0.0))
+            || !(process >= 0.0)
+        {
+            return Err(misuse(
+                "chain: expected 1 to 4 states, sensor variances above 0 and a process variance".into(),
+            ));
+        }
+        let chain = Chain { states: states.len(), dt, integrated };
+        Ok(Observed { states, chain, noise: Noise { sensors, process } })
+    };
+    chains.into_iter().map(of_chain).collect()
+}
+
+fn recorded(records: &Records<'_>, n_x: usize, n_u: usize) -> Result<Vec<Recorded>> {
+    records
+        .iter()
+        .map(|(states, weights, commands)| {
+            Ok(Recorded {
+                states: rows("states", states, n_x)?.concat(),
+                weights: rows("weights", weights, n_x)?.concat(),
+                commands: rows("commands", commands, n_u)?.concat(),
+            })
+        })
+        .collect()
+}
+
+/// The model with constants, and lags of its actuators, that leave the least; what is left, readings, covariance of the
+/// free values, and members drawn from it.
+#[pyfunction]
+#[pyo3(signature = (
+    model, chains, records, *, free, lags, iterations, draws = 0, spread = 1.0, seed = 0, iteration = 0, unit = 0,
+    divergence_factor = 10.0, workers = None,
+))]
+#[expect(clippy::too_many_arguments, reason = "what tuning needs, named by keyword in Python")]
+#[expect(clippy::type_complexity, reason = "a model, χ², readings, covariance, and the free values")]
+pub fn tune<'py>(
+    py: Python<'py>,
+    model: &PyModel,
+    chains: Chains,
+    records: Records<'py>,
+    free: Vec<usize>,
+    lags: Vec<Vec<usize>>,
+    iterations: usize,
+    draws: usize,
+    spread: f64,
+    seed: u64,
+    iteration: u64,
+    unit: u64,
+    divergence_factor: f64,
+    workers: Option<&PyWorkers>,
+) -> Result<(PyModel, f64, usize, Bound<'py, PyArray2<f64>>, Vec<PyModel>)> {
+    let workers = or_default(workers)?;
+    let signals = model.signals();
+    let effective = Learnt::new(model.learnt.program.effective());
+    let observer = observer(chains, signals.dt)?;
+    let records = recorded(&records, signals.states(), signals.commands())?;
+    let tuning = Tuning {
+        code: &effective.code,
+        frame: &model.frame,
+        observer: &observer,
+        records: &records,
+        limits: &signals.limits(divergence_factor),
+        free: &free,
+        lags: &lags,
+    };
+    tuning.check()?;
+    let tuned = py.detach(|| tuning.tune(iterations, &workers));
+    let size = free.len() + lags.len();
+    let covariance = to_matrix(py, size, tuned.covariance.clone());
+    let (left, readings) = (tuned.left, tuned.readings);
+    let finished = model.varied(&tuned.constants, &tuned.lags)?;
+    let mut members = Vec::with_capacity(draws);
+    for draw in 0..draws {
+        let mut stream = Stream::new(seed, Purpose::Members, iteration, unit, draw as u64);
+        let (constants, lags) = tuned.drawn(&tuning, spread, &mut stream);
+        members.push(model.varied(&constants, &lags)?);
+    }
+    Ok((finished, left, readings, covariance, members))
+}
+
+/// Whitened prediction errors (n + 1, n_x) and states once each reading was used (n + 1, n_x) of each run; none where
+/// the model diverges on one of them.
+#[pyfunction]
+#[pyo3(signature = (model, chains, records, *, divergence_factor = 10.0, workers = None))]
+#[expect(clippy::type_complexity, reason = "two matrices for each run")]
+pub fn predictions<'py>(
+    py: Python<'py>,
+    model: &PyModel,
+    chains: Chains,
+    records: Records<'py>,
+    divergence_factor: f64,
+    workers: Option<&PyWorkers>,
+) -> Result<Option<Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)>>> {
+    let workers = or_default(workers)?;
+    let signals = model.signals();
+    let observer = observer(chains, signals.dt)?;
+    let n_x = signals.states();
+    let records = recorded(&records, n_x, signals.commands())?;
+    let limits = signals.limits(divergence_factor);
+    let core = model.core();
+    let tuning = Tuning {
+        code: core.code,
+        frame: core.frame,
+        observer: &observer,
+        records: &records,
+        limits: &limits,
+        free: &[],
+        lags: &[],
+    };
+    tuning.check()?;
+    let order: Vec<usize> = observer.iter().flat_map(|observed| observed.states.clone()).collect();
+    let runs = py.detach(|| tuning.predictions(&workers));
+    Ok(runs.map(|runs| {
+        runs.into_iter()
+            .map(|(errors, states)| {
+                // From the order of the chains to that of the states.
+                let mut sorted = vec![0.0; errors.len()];
+                for (at, error) in errors.iter().enumerate() {
+                    sorted[at / n_x * n_x + order[at % n_x]] = *error;
+                }
+                (to_matrix(py, n_x, sorted), to_matrix(py, n_x, states))
+            })
+            .collect()
+    }))
+}

@@ -1,0 +1,137 @@
+"""Evolved features: a linear program of which every register is a feature; what read-outs use survives.
+
+Where no library holds the law, expressions are grown from what was useful so far: products and other operations of
+inputs and survivors. A found expression, up to the whole sum that drives another output, is one node and costs one term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.identification.chains import Chain
+from twinloop.identification.pool import UNARY, Pool
+from twinloop.identification.structure import Problem, Sum, search
+
+PRODUCTS = 0.5
+"""Share of new nodes that are products: most laws of machines are made of them."""
+CONSTANTS = 0.15
+"""Share of new nodes that hold a constant of their own."""
+
+
+def evolve(
+    problem: Problem,
+    chains: Sequence[Chain],
+    known: Sequence[Sum | None],
+    terms: Sequence[int],
+    scales: Floats,
+    *,
+    operators: Sequence[str],
+    generations: int,
+    population: int,
+    longest: float,
+    moves: int,
+    largest: int,
+    seed: int,
+    iteration: int,
+) -> list[Sum]:
+    """Grows terms for a number of generations.
+
+    Args:
+        problem: of all chains.
+        chains: with their noise.
+        known: the best sum of each chain so far, or None.
+        terms: the nodes to begin with.
+        scales: of all states (n_x,).
+        operators: that new nodes may use.
+        generations: how often new nodes are drawn.
+        population: nodes that are judged at once.
+        longest: description length, in nats, of an expression at most.
+        moves: of each search over subsets.
+        largest: number of terms of a sum at most.
+        seed: of the campaign.
+        iteration: which stream of random numbers.
+
+    Returns:
+        The best sum of each chain, never worse than the known one.
+    """
+    pool = problem.pool
+    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 77, iteration])))
+    best: list[Sum | None] = list(known)
+    survivors: dict[int, int] = dict.fromkeys(terms, 0)
+    lengths: dict[int, float] = {}
+    for generation in range(generations):
+        parents = list(survivors)
+        candidates = dict.fromkeys(parents)
+        tries = 0
+        while len(candidates) < population and tries < 20 * population:
+            tries += 1
+            node = _drawn(pool, parents, operators, stream)
+            if node is not None and pool.length(node) <= longest:
+                candidates.setdefault(node)
+        wholes = [_whole(pool, found, lengths) if found is not None else {} for found in best]
+        # A chain may use what drives another one; its own sum would be a law that nobody has paid for.
+        favoured = [
+            {node: length for j, whole in enumerate(wholes) if j != i for node, length in whole.items()}
+            for i in range(len(wholes))
+        ]
+        usable = problem.usable([*candidates, *(node for whole in wholes for node in whole)])
+        sums = search(
+            problem, [s.chain if s else c for s, c in zip(best, chains, strict=True)], usable, best, scales,
+            moves=moves, starts=2, largest=largest, seed=seed, iteration=iteration * 1000 + generation,
+            favoured=favoured, forbidden=[set(whole) for whole in wholes],
+            fixed_noise=generation % 4 != 0 and generation != generations - 1,
+        )  # fmt: skip
+        best = list(sums)
+        # A node survives where a good subset uses it, and a few generations after that.
+        used: set[int] = set()
+        for found in sums:
+            used.update(found.weights)
+            for subset, above in found.others:
+                if above < 10.0:
+                    used.update(subset)
+        aged = {term: age + 1 for term, age in survivors.items() if age < 3 and term not in used}
+        kept = dict.fromkeys(sorted(used), 0) | dict(list(aged.items())[: population // 4])
+        survivors = dict.fromkeys(range(pool.inputs), 0) | {pool.one: 0} | kept
+    return [found for found in best if found is not None]
+
+
+def _drawn(
+    pool: Pool, parents: Sequence[int], operators: Sequence[str], stream: np.random.Generator
+) -> int | None:
+    """A new node of inputs and parents; None where it makes no sense."""
+
+    def pick() -> int:
+        if stream.random() < 0.5:
+            return int(stream.integers(pool.inputs))
+        return parents[int(stream.integers(len(parents)))]
+
+    a, b = pick(), pick()
+    if "*" in operators and stream.random() < PRODUCTS:
+        return None if pool.one in (a, b) else pool.product(a, b)
+    operation = operators[int(stream.integers(len(operators)))]
+    if stream.random() < CONSTANTS:
+        size = float(np.exp(stream.uniform(np.log(0.1), np.log(10.0))))
+        a = pool.add(("+" if stream.random() < 0.5 else "*", a, size if stream.random() < 0.5 else -size))
+    if a == pool.one:
+        return None
+    if operation in UNARY:
+        return pool.add((operation, a, None))
+    if b == pool.one or (operation in ("-", "/", "min", "max") and a == b):
+        return None
+    return pool.add((operation, a, b))
+
+
+def _whole(pool: Pool, found: Sum, lengths: dict[int, float]) -> dict[int, float]:
+    """The sum that drives another output, as one node at the price of one choice."""
+    if len(found.weights) < 2:
+        return {}
+    node: int | None = None
+    for term, weight in found.weights.items():
+        part = pool.add(("*", term, weight))
+        node = part if node is None else pool.add(("+", node, part))
+    assert node is not None
+    lengths.setdefault(node, float(np.log(pool.inputs + len(lengths) + 1)))
+    return {node: lengths[node]}

@@ -1,0 +1,108 @@
+"""The ladder: libraries of terms that many machines' laws are made of, from the plainest up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import combinations_with_replacement
+
+from twinloop.identification.pool import Pool
+from twinloop.signals import Signals
+
+Terms = list[int]
+
+
+def linear(pool: Pool, signals: Signals) -> Terms:
+    """1, every state, every command."""
+    return [pool.one, *range(pool.inputs)]
+
+
+def quadratic(pool: Pool, signals: Signals) -> Terms:
+    """Products of two inputs."""
+    return [pool.product(*pair) for pair in combinations_with_replacement(range(pool.inputs), 2)]
+
+
+def damping(pool: Pool, signals: Signals) -> Terms:
+    """|x| x of each input, and each speed times the length of the vector of its kind."""
+    terms = [pool.product(pool.add(("abs", i, None)), i) for i in range(pool.inputs)]
+    for group in speeds(signals):
+        if len(group) > 1:
+            total = pool.product(group[0], group[0])
+            for i in group[1:]:
+                total = pool.add(("+", total, pool.product(i, i)))
+            length = pool.add(("sqrt", total, None))
+            terms += [pool.product(length, i) for i in group]
+    return terms
+
+
+def trigonometric(pool: Pool, signals: Signals) -> Terms:
+    """sin and cos of angles, alone and times every input."""
+    terms: Terms = []
+    for i, state in enumerate(signals.states):
+        if state.unit == "rad":
+            for function in ("sin", "cos"):
+                wave = pool.add((function, i, None))
+                terms += [wave, *(pool.product(j, wave) for j in range(pool.inputs) if j != i)]
+    return terms
+
+
+def cubic(pool: Pool, signals: Signals) -> Terms:
+    """Products of three inputs; none where there would be more than 600 of them."""
+    if pool.inputs > 13:
+        return []
+    return [pool.product(*triple) for triple in combinations_with_replacement(range(pool.inputs), 3)]
+
+
+LIBRARIES: dict[str, Callable[[Pool, Signals], Terms]] = {
+    "linear": linear,
+    "quadratic": quadratic,
+    "damping": damping,
+    "trigonometric": trigonometric,
+    "cubic": cubic,
+}
+"""Libraries by name, in the order in which they are tried."""
+
+
+def speeds(signals: Signals) -> list[list[int]]:
+    """States that are derivatives or body rates, by their unit."""
+    names = {state.derivative_of for state in signals.states} - {None}
+    rates = [i for i, state in enumerate(signals.states) if state.derivative_of is not None]
+    if signals.kinematics is not None:
+        rates += [signals.state_names.index(name) for name in signals.kinematics.rates]
+    if not rates and not names:
+        rates = list(range(signals.n_x))
+    groups: dict[str, list[int]] = {}
+    for i in sorted(set(rates)):
+        groups.setdefault(signals.states[i].unit, []).append(i)
+    return list(groups.values())
+
+
+def rungs(pool: Pool, signals: Signals, names: Sequence[str], most: int) -> list[Terms]:
+    """Growing sets of terms: each rung has the terms of those below it.
+
+    Linear and quadratic terms are one rung, and so are damping and trigonometric ones.
+
+    Args:
+        pool: where the terms are entered.
+        signals: they say which states are angles and speeds.
+        names: of the libraries.
+        most: a rung of more terms than this is left out.
+
+    Returns:
+        Terms of each rung, without repetition.
+    """
+    ladder: list[Terms] = []
+    below: Terms = []
+    for name in LIBRARIES:
+        if name not in names:
+            continue
+        terms = list(dict.fromkeys([*below, *LIBRARIES[name](pool, signals)]))
+        if len(terms) > most or len(terms) == len(below):
+            continue
+        if ladder and name in ("quadratic", "trigonometric"):
+            ladder.pop()
+        ladder.append(terms)
+        below = terms
+    for number, terms in enumerate(ladder):
+        for term in terms:
+            pool.rungs.setdefault(term, number)
+    return ladder

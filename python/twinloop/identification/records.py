@@ -1,0 +1,87 @@
+"""Recorded runs as regression needs them: readings, weights, and the inputs of a model within each period."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.signals import Signals
+
+Actuator = tuple[float, int, "float | None"]
+"""(lag in s, delay in periods, command whose effect is there at the start or None for the first)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One recorded run.
+
+    Args:
+        states: readings (n + 1, n_x).
+        commands: (n, n_u).
+        weights: 1 for a reading that counts, 0 for one that is ignored (n + 1, n_x).
+        smooth: what the states are taken to have been (n + 1, n_x); the readings until a model knows better.
+    """
+
+    states: Floats
+    commands: Floats
+    weights: Floats
+    smooth: Floats
+
+    @staticmethod
+    def of(states: Floats, commands: Floats) -> Run:
+        """A run of which every reading counts."""
+        return Run(states, commands, np.ones_like(states), states)
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """Inputs of a model at the start, the middle and the end of each period (rows, inputs), all runs in one."""
+
+    start: Floats
+    middle: Floats
+    end: Floats
+    runs: tuple[slice, ...]
+
+
+def stages(runs: Sequence[Run], signals: Signals, actuators: Sequence[Actuator]) -> Stages:
+    """What a model sees within each period: states, and the effects of commands in units of their scale.
+
+    The state in the middle is Hermite's where a state's derivative is another, and the mean elsewhere.
+
+    Args:
+        runs: recorded.
+        signals: of the system.
+        actuators: one a command.
+
+    Returns:
+        The three sets of inputs.
+    """
+    scales = np.array([command.size for command in signals.commands])
+    parts: list[tuple[Floats, Floats, Floats]] = []
+    slices, first = [], 0
+    for run in runs:
+        before, after = run.smooth[:-1], run.smooth[1:]
+        middle = 0.5 * (before + after)
+        for i, state in enumerate(signals.states):
+            if state.derivative_of is not None:
+                parent = signals.state_names.index(state.derivative_of)
+                middle[:, parent] += signals.dt / 8.0 * (before[:, i] - after[:, i])
+        effects = [e / scales for e in _core.command_effects(list(actuators), signals.dt, run.commands)]
+        parts.append(
+            tuple(  # type: ignore[arg-type]
+                np.hstack([x, u]) for x, u in zip((before, middle, after), effects, strict=True)
+            )
+        )
+        slices.append(slice(first, first + len(before)))
+        first += len(before)
+    start, middle, end = (np.concatenate(stage) for stage in zip(*parts, strict=True))
+    return Stages(start, middle, end, tuple(slices))
+
+
+def direct(signals: Signals) -> list[Actuator]:
+    """Actuators that act at once."""
+    return [(0.0, 0, None)] * signals.n_u

@@ -1,0 +1,62 @@
+"""Options of the identification; each is one idea that can be switched off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twinloop.signals import Signals
+
+FORMS = ("auto", "absolute", "increment", "acceleration")
+
+
+@dataclass(frozen=True)
+class IdentificationOptions:
+    """How a twin is learnt.
+
+    Args:
+        form: what a program's outputs mean; "auto": accelerations where the signals declare derivatives or a rigid
+            body, else increments.
+        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "trigonometric", "cubic"; none:
+            evolved programs only.
+        operators: that evolved programs may use.
+        generations: of evolved features; 0: none.
+        restarts: of the evolution.
+        population: features that are judged at once.
+        longest: description length of an evolved expression at most, nats.
+        moves: of a walk over subsets of terms.
+        starts: walks for each output.
+        largest: terms of an output at most.
+        most_terms: of a library at most; a larger one is left out.
+        lags: whether lags and delays of the actuators are searched.
+        longest_delay: of an actuator, periods.
+        tuning: whether constants are tuned on predictions.
+        tuning_steps: at most.
+        passes: how often terms are selected; from the second on with states that the model has smoothed.
+        committee_size: models that judge tests, the best included.
+        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+    """
+
+    form: str = "auto"
+    libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "trigonometric", "cubic")
+    operators: tuple[str, ...] = ("+", "-", "*", "/", "abs", "sqrt", "sin", "cos", "min", "max")
+    generations: int = 6
+    restarts: int = 1
+    population: int = 120
+    longest: float = 20.0
+    moves: int = 20_000
+    starts: int = 4
+    largest: int = 16
+    most_terms: int = 450
+    lags: bool = True
+    longest_delay: int = 2
+    tuning: bool = True
+    tuning_steps: int = 20
+    passes: int = 2
+    committee_size: int = 8
+    divergence_factor: float = 10.0
+
+    def form_for(self, signals: Signals) -> str:
+        """The form, where "auto" is decided by the signals."""
+        if self.form != "auto":
+            return self.form
+        return "acceleration" if any(signals.is_given(i) for i in range(signals.n_x)) else "increment"

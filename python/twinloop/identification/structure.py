@@ -1,0 +1,263 @@
+"""Which terms drive each chain: a search over subsets on whitened features, up a ladder of libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.identification.chains import Chain
+from twinloop.identification.pool import Pool
+from twinloop.identification.records import Run, Stages
+
+Weights = dict[int, float]
+"""Coefficients of a sum, by node."""
+NOISE_ROUNDS = 3
+RIDGE = 1e-9
+RUNG = 20.0
+"""What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
+
+
+@dataclass(eq=False)
+class Sum:
+    """A sum of terms that drives a chain.
+
+    Args:
+        weights: coefficients by node.
+        energy: its description length: −2 log of the likelihood at `chain`'s noise, and the price of its terms.
+        chain: with the noise under which it was found.
+        left: χ², what whitening leaves.
+        others: other subsets that are nearly as good, with their energies above the best's.
+    """
+
+    weights: Weights
+    energy: float
+    chain: Chain
+    left: float = 0.0
+    others: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
+
+
+class Problem:
+    """Readings of all runs and the inputs within each period; makes regressions of terms.
+
+    Args:
+        pool: of all expressions.
+        runs: recorded.
+        stages: their inputs within each period.
+        dt: period, s.
+        workers: how the work is carried out.
+    """
+
+    def __init__(
+        self, pool: Pool, runs: Sequence[Run], stages: Stages, dt: float, workers: _core.Workers
+    ) -> None:
+        self.pool = pool
+        self.runs = runs
+        self.stages = stages
+        self.dt = dt
+        self.workers = workers
+        self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
+
+    def usable(self, terms: Sequence[int]) -> list[int]:
+        """Terms whose values are finite on all rows, evaluated."""
+        new = [term for term in terms if term not in self._values]
+        if new:
+            stages = [
+                self.pool.values(new, s) for s in (self.stages.start, self.stages.middle, self.stages.end)
+            ]
+            for i, term in enumerate(new):
+                columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
+                self._values[term] = columns  # type: ignore[assignment]
+        return [
+            term for term in terms if all(np.abs(column).max() < 1e100 for column in self._values[term])
+        ]
+
+    def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
+        """Of one chain on terms that were found usable."""
+        stages = [np.stack([self._values[term][s] for term in terms], axis=1) for s in range(3)]
+        states = list(chain.states)
+        records = [
+            (run.states[:, states], run.weights[:, states], *(stage[rows] for stage in stages))
+            for run, rows in zip(self.runs, self.stages.runs, strict=True)
+        ]
+        with engine_input():
+            return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+    def readings(self, chain: Chain) -> int:
+        """Readings of a chain that count."""
+        return int(sum(run.weights[:, list(chain.states)].sum() for run in self.runs))
+
+
+def prices(pool: Pool, terms: Sequence[int], readings: int, favoured: Mapping[int, float]) -> Floats:
+    """What each term costs, in units of χ²: a coefficient, and the description of its expression.
+
+    Args:
+        pool: of the terms.
+        terms: to be priced.
+        readings: whose number gives a coefficient's precision.
+        favoured: description lengths in nats of terms that are known from elsewhere.
+
+    Returns:
+        Prices (terms,).
+    """
+    lengths = [favoured.get(term, pool.length(term)) for term in terms]
+    return np.log(max(readings, 2)) + 2.0 * np.array(lengths)
+
+
+def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, float]:
+    """Variances below which noise is not believed: rounding and integration leave that much."""
+    sensors = (1e-7 * scales[list(chain.states)]) ** 2
+    return sensors, 1e-9 * float(sensors[0]) / (dt if chain.integrated else 1.0)
+
+
+def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], scales: Floats) -> Chain:
+    """The noise that a fit of all terms leaves, with the freedom that it used up given back.
+
+    Args:
+        problem: of the chain.
+        chain: with a first guess of its sensors' noise.
+        terms: usable ones.
+        scales: of all states (n_x,).
+
+    Returns:
+        The chain with its noise estimated.
+    """
+    regression = problem.regression(chain, terms)
+    low, slow = floor_of(chain, scales, problem.dt)
+    period = problem.dt if chain.integrated else 1.0
+    sensors = np.maximum(chain.sensors, low)
+    process = max(1e-3 * float(sensors[0]) / period, slow)
+    readings = problem.readings(chain)
+    for _ in range(2):
+        gram = regression.gram(sensors, process, problem.workers)
+        solved = gram.solve(list(range(len(terms))), RIDGE)
+        if solved is None:
+            break
+        sensors, process, _ = regression.most_likely_noise(
+            solved[0], sensors, process, smallest_sensors=low, smallest_process=slow
+        )
+        used = min(len(terms), 0.7 * readings)
+        sensors, process = sensors * readings / (readings - used), process
+    return chain.with_noise(sensors, process)
+
+
+def search(
+    problem: Problem,
+    chains: Sequence[Chain],
+    terms: Sequence[int],
+    known: Sequence[Sum | None],
+    scales: Floats,
+    *,
+    moves: int,
+    starts: int,
+    largest: int,
+    seed: int,
+    iteration: int,
+    favoured: Sequence[Mapping[int, float]] = (),
+    forbidden: Sequence[set[int]] = (),
+    fixed_noise: bool = False,
+) -> list[Sum]:
+    """The best sum of terms for each chain, with the noise estimated along.
+
+    Args:
+        problem: of all chains.
+        chains: with the noise to begin with.
+        terms: to choose from.
+        known: for each chain a sum that is already known, or None; the answer is never worse.
+        scales: of all states (n_x,).
+        moves: of each walk.
+        starts: walks for each chain.
+        largest: number of terms at most.
+        seed: of the campaign.
+        iteration: which stream of random numbers.
+        favoured: for each chain, description lengths in nats of terms that are known from elsewhere.
+        forbidden: for each chain, terms that it may not use.
+        fixed_noise: whether the chains' noise is to be believed.
+
+    Returns:
+        A sum for each chain.
+    """
+    usable = problem.usable(list(dict.fromkeys([*terms, *(t for s in known if s for t in s.weights)])))
+    known_elsewhere = favoured or [{}] * len(chains)
+    costs = [
+        prices(problem.pool, usable, problem.readings(chain), elsewhere)
+        for chain, elsewhere in zip(chains, known_elsewhere, strict=True)
+    ]
+    place = {term: i for i, term in enumerate(usable)}
+    for cost, terms_out in zip(costs, forbidden or [set()] * len(costs), strict=True):
+        cost[[place[term] for term in terms_out if term in place]] = np.inf
+    regressions = [problem.regression(chain, usable) for chain in chains]
+    best: list[Sum] = []
+    current = list(chains)
+    for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
+        grams = [
+            r.gram(c.sensors, c.process, problem.workers) for r, c in zip(regressions, current, strict=True)
+        ]
+        with engine_input():
+            walks = _core.search_subsets(
+                grams,
+                costs,
+                [1.0] * len(grams),
+                moves=moves if round_ == 0 else moves // 2,
+                largest=largest,
+                starts=starts if round_ == 0 else max(1, starts // 2),
+                seed=seed,
+                iteration=iteration * NOISE_ROUNDS + round_,
+                workers=problem.workers,
+            )
+        best = []
+        changed = False
+        for i, (gram, walk, chain) in enumerate(zip(grams, walks, current, strict=True)):
+            previous = known[i]
+            subsets = [tuple(subset) for subset, _ in walk]
+            if previous is not None and all(t in place for t in previous.weights):
+                subsets.append(tuple(sorted(place[t] for t in previous.weights)))
+            judged = sorted(
+                (found for found in (_judged(gram, s, costs[i]) for s in dict.fromkeys(subsets)) if found),
+                key=lambda found: (
+                    found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]),
+                    found[0],
+                ),
+            )
+            subset, energy, left, weights = judged[0]
+            others = [
+                (tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _, _ in judged[1:40]
+            ]
+            coefficients = np.zeros(len(usable))
+            coefficients[list(subset)] = weights
+            noisy = chain
+            if not fixed_noise:
+                low, slow = floor_of(chain, scales, problem.dt)
+                sensors, process, _ = regressions[i].most_likely_noise(
+                    coefficients, chain.sensors, max(chain.process, slow), low, slow
+                )
+                readings = problem.readings(chain)
+                sensors = sensors * readings / max(1.0, readings - len(subset))
+                changed |= bool(
+                    np.any(np.abs(np.log(sensors / chain.sensors)) > 0.3)
+                    or abs(np.log((process + slow) / (chain.process + slow))) > 1.0
+                )
+                noisy = chain.with_noise(sensors, process)
+            score = regressions[i].likelihood(coefficients, noisy.sensors, noisy.process)
+            rung = RUNG * problem.pool.rung(usable[j] for j in subset)
+            total = rung + score + float(costs[i][list(subset)].sum())
+            chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}
+            best.append(Sum(chosen, total, noisy, left, others))
+        current = [found.chain for found in best]
+        if not changed:
+            break
+    return best
+
+
+def _judged(
+    gram: _core.Gram, subset: tuple[int, ...], costs: Floats
+) -> tuple[tuple[int, ...], float, float, Floats] | None:
+    solved = gram.solve(list(subset))
+    if solved is None:
+        return None
+    weights, _, left = solved
+    return subset, left + float(costs[list(subset)].sum()), left, weights
