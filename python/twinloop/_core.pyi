@@ -170,7 +170,8 @@ class Family:
         """One PID an axis (angle, rate or None); genes (K_P, K_I, K_D) per axis; matrix (n_u, axes)."""
     @property
     def size(self) -> int: ...
-    def controller(self, parameters: ArrayLike) -> Controller: ...
+    def controller(self, parameters: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
+        """excitation (n, n_u): a row is added to each command in turn, nothing after the last."""
 
 @final
 class Controller:
@@ -212,13 +213,16 @@ def rollout(
     signals: Signals,
     *,
     noise: ArrayLike | None = None,
+    excitation: ArrayLike | None = None,
+    disturbance: ArrayLike | None = None,
     divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> Runs:
     """Closes the loop of each controller (m, size) around the dynamics.
 
-    noise (m, n + 1, n_x) is added to what the controller reads. A Python callable takes a state (n_x,) and a
-    command (n_u,), returns the next state, and is called on this thread.
+    noise (m, n + 1, n_x) is added to what the controller reads, excitation (m, n, n_u) to what it commands
+    before the bounds clip it, disturbance (m, n, n_x) to the true state after each step. A Python callable
+    takes a state (n_x,) and a command (n_u,), returns the next state, and is called on this thread.
     """
 
 @final
@@ -227,9 +231,14 @@ class SelectedTests:
 
     def __new__(cls, signals: Signals, family: Family, divergence_factor: float = 10.0) -> SelectedTests: ...
     def with_test(
-        self, parameters: ArrayLike, target: ArrayLike, states: ArrayLike, commands: ArrayLike
+        self,
+        parameters: ArrayLike,
+        target: ArrayLike,
+        states: ArrayLike,
+        commands: ArrayLike,
+        excitation: ArrayLike | None = None,
     ) -> SelectedTests:
-        """These and one more: states (n + 1, n_x) as measured, commands (n, n_u)."""
+        """These and one more: states (n + 1, n_x) as measured, commands (n, n_u), excitation (≥ n, n_u)."""
     def __len__(self) -> int: ...
 
 def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:

@@ -41,5 +41,5 @@ pub use selected::{Experiment, SelectedTests};
 pub use signals::Signals;
 pub use task::{Task, distance};
 pub use test_loop::{TestSearch, TestSettings};
-pub use trajectory::{Trajectory, record};
+pub use trajectory::{Influences, Trajectory, record};
 pub use workers::Workers;

@@ -33,6 +33,21 @@ pub fn rows(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<Vec<f6
     Ok(array.rows().into_iter().map(|row| row.iter().copied().collect()).collect())
 }
 
+/// The rows of a matrix that may be left out; none then.
+pub fn optional_rows(name: &str, array: Option<Matrix<'_>>, columns: usize) -> Result<Vec<Vec<f64>>> {
+    array.map_or_else(|| Ok(vec![]), |array| rows(name, &array, columns))
+}
+
+/// The blocks of an array that may be left out, each as one row; none then.
+pub fn optional_blocks(name: &str, array: Option<Cube<'_>>, expected: [usize; 3]) -> Result<Vec<Vec<f64>>> {
+    let Some(array) = array else { return Ok(vec![]) };
+    let array = array.as_array();
+    if array.shape() != expected {
+        return Err(misuse(format!("{name}: expected shape {expected:?}, found {:?}", array.shape())));
+    }
+    Ok(array.outer_iter().map(|block| block.iter().copied().collect()).collect())
+}
+
 /// Views of rows.
 pub fn views(rows: &[Vec<f64>]) -> Vec<&[f64]> {
     rows.iter().map(Vec::as_slice).collect()
