@@ -13,11 +13,13 @@ __all__ = [
     "Archive",
     "Controller",
     "Family",
+    "Flights",
     "Grammar",
     "Model",
     "ModelSearch",
     "Program",
     "Quadrotor",
+    "Quality",
     "Runs",
     "SelectedTests",
     "Signals",
@@ -30,11 +32,13 @@ __all__ = [
     "best_tradeoff",
     "closed_loop",
     "crowding_distances",
+    "disagreements",
     "discrimination",
     "final_distances",
     "ideal_point",
     "instability",
     "open_loop",
+    "qualities",
     "ranks",
     "rollout",
     "select",
@@ -264,6 +268,63 @@ def discrimination(distances: ArrayLike, cap: float) -> _Floats:
 
 def instability(distances: ArrayLike, cap: float) -> _Floats:
     """Variance over mutants (tests,) of distances (mutants, tests); one at the cap counts as cap squared."""
+
+@final
+class Flights:
+    """Candidate flights of one length, each with its own gains, start, target and excitation."""
+
+    def __new__(
+        cls,
+        signals: Signals,
+        family: Family,
+        parameters: ArrayLike,
+        initial_states: ArrayLike,
+        target_states: ArrayLike,
+        steps: int,
+        *,
+        excitation: ArrayLike | None = None,
+        divergence_factor: float = 10.0,
+    ) -> Flights:
+        """parameters (K, size), initial and target states (K, n_x), excitation (K, steps, n_u)."""
+    @property
+    def steps(self) -> int: ...
+    def __len__(self) -> int: ...
+
+@final
+class Quality:
+    """What a flight is judged by: "iae", "ise" or "final_distance", plus what commands cost."""
+
+    def __new__(
+        cls, kind: str, weights: ArrayLike, *, effort: float = 0.0, effort_rate: float = 0.0
+    ) -> Quality: ...
+    @property
+    def kind(self) -> str: ...
+
+def qualities(
+    dynamics: Sequence[Model] | Quadrotor,
+    flights: Flights,
+    quality: Quality,
+    envelope: Sequence[tuple[float, float] | None],
+    *,
+    noise: ArrayLike | None = None,
+    offsets: ArrayLike | None = None,
+    workers: Workers | None = None,
+) -> tuple[_Floats, _Floats]:
+    """Quality and usage of the envelope of every flight, both (members, draws, K).
+
+    noise (D, n + 1, n_x) is added to what the controllers read, offsets (D, n_x) to the initial states; both
+    are the same for all candidates and members.
+    """
+
+def disagreements(
+    models: Sequence[Model],
+    flights: Flights,
+    sds: ArrayLike,
+    *,
+    cap: float = 100.0,
+    workers: Workers | None = None,
+) -> tuple[_Floats, _Integers]:
+    """log det(I + D Dᵀ) of each flight (K,), and where members are the furthest apart (K, 4)."""
 
 def ranks(objectives: ArrayLike) -> _Integers: ...
 def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> _Floats: ...

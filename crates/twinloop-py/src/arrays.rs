@@ -73,3 +73,10 @@ pub fn to_cube(py: Python<'_>, shape: [usize; 3], values: Vec<f64>) -> Bound<'_,
 pub fn to_integers(py: Python<'_>, values: impl IntoIterator<Item = usize>) -> Bound<'_, PyArray1<i64>> {
     to_vector(py, values.into_iter().map(|value| value as i64).collect())
 }
+
+/// Rows of indices for Python.
+pub fn to_integer_rows<const N: usize>(py: Python<'_>, rows: Vec<[usize; N]>) -> Bound<'_, PyArray2<i64>> {
+    let shape = (rows.len(), N);
+    let values = rows.into_iter().flatten().map(|value| value as i64).collect();
+    Array2::from_shape_vec(shape, values).expect("whole rows").into_pyarray(py)
+}
