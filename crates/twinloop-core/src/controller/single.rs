@@ -33,7 +33,7 @@ impl Controller {
     /// The same with an excitation (n × n_u): a row is added to the command of each period, then the bounds clip it.
     pub fn excited(self, excitation: &[f64]) -> Result<Self> {
         let commands = self.family.commands();
-        if excitation.len() % commands != 0 || !excitation.iter().all(|x| x.is_finite()) {
+        if !excitation.len().is_multiple_of(commands) || !excitation.iter().all(|x| x.is_finite()) {
             return invalid(format!(
                 "controller: expected an excitation of n × {commands} finite numbers, found {} numbers; give a row \
                  for each period",

@@ -38,12 +38,37 @@ impl Envelope {
         self.states
     }
 
-    /// The larger of what was used so far and what a state (n_x) uses: 0 in the middle, 1 at a bound.
+    /// How far flights got that start at a state (n_x).
     #[inline(always)]
-    pub(super) fn usage<V: Vector>(&self, so_far: V, state: &[V]) -> V {
-        let mut most = so_far;
-        for &Band { state: i, middle, half_width } in &self.bands {
-            let used = (state[i] - V::splat(middle)).abs() / half_width;
+    pub(super) fn reach<V: Vector>(&self, initial: &[V]) -> Reach<'_, V> {
+        let mut reach = Reach { bands: &self.bands, farthest: vec![V::splat(0.0); self.bands.len()] };
+        reach.see(initial);
+        reach
+    }
+}
+
+/// How far from the middle of its envelope each state that has one ever was.
+pub(super) struct Reach<'a, V> {
+    bands: &'a [Band],
+    farthest: Vec<V>,
+}
+
+impl<V: Vector> Reach<'_, V> {
+    /// Looks at a state (n_x).
+    #[inline(always)]
+    pub(super) fn see(&mut self, state: &[V]) {
+        for (farthest, band) in self.farthest.iter_mut().zip(self.bands) {
+            let distance = (state[band.state] - V::splat(band.middle)).abs();
+            *farthest = farthest.select_less(distance, distance, *farthest);
+        }
+    }
+
+    /// The largest share of an envelope that was used: 0 in the middle, 1 at a bound.
+    #[inline(always)]
+    pub(super) fn usage(&self) -> V {
+        let mut most = V::splat(0.0);
+        for (farthest, band) in self.farthest.iter().zip(self.bands) {
+            let used = *farthest / band.half_width;
             most = most.select_less(used, used, most);
         }
         most

@@ -1,6 +1,6 @@
 //! Qualities: how well every candidate flies on every member of a committee, under every draw of noise.
 
-use super::envelope::Envelope;
+use super::envelope::{Envelope, Reach};
 use super::quality::{Quality, Tally};
 use super::{Flights, Group};
 use crate::dynamics::Dynamics;
@@ -116,11 +116,10 @@ impl<D: Dynamics> OfGroup<'_, D> {
         }
         let mut judge = Judge {
             tally: self.quality.tally(self.flights.signals(), &lanes.target),
-            envelope: self.envelope,
-            usage: self.envelope.usage(V::splat(0.0), &lanes.initial),
+            reach: self.envelope.reach(&lanes.initial),
         };
         let lasted = rollout(self.dynamics, &self.flights.start(&lanes, &noise), &mut judge);
-        let (quality, usage) = (judge.tally.total(), judge.usage);
+        let (quality, usage) = (judge.tally.total(), judge.reach.usage());
         let of_lane = |l: usize| {
             if lasted[l] < self.flights.steps {
                 Judged { quality: f64::INFINITY, usage: f64::INFINITY }
@@ -132,17 +131,16 @@ impl<D: Dynamics> OfGroup<'_, D> {
     }
 }
 
-/// Tallies the quality and the usage of the envelope.
+/// Tallies the quality and follows the envelope.
 struct Judge<'a, V> {
     tally: Tally<'a, V>,
-    envelope: &'a Envelope,
-    usage: V,
+    reach: Reach<'a, V>,
 }
 
 impl<V: Vector> Watch<V> for Judge<'_, V> {
     #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
         self.tally.add(seen.step, seen.command, seen.next);
-        self.usage = self.envelope.usage(self.usage, seen.next);
+        self.reach.see(seen.next);
     }
 }

@@ -72,17 +72,30 @@ impl Quality {
 
     /// Nothing flown yet.
     #[inline(always)]
-    pub(super) fn tally<'a, V: Vector>(&'a self, signals: &'a Signals, target: &'a [V]) -> Tally<'a, V> {
+    pub(super) fn tally<'a, V: Vector>(&'a self, signals: &Signals, target: &'a [V]) -> Tally<'a, V> {
         let zero = V::splat(0.0);
+        let factors = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
         let last = vec![zero; signals.commands()];
-        Tally { quality: self, signals, target, error: zero, effort: zero, change: zero, last }
+        Tally {
+            quality: self,
+            dt: signals.dt,
+            factors,
+            target,
+            error: zero,
+            effort: zero,
+            change: zero,
+            last,
+        }
     }
 }
 
 /// The sums of a quality, as far as flights have come.
 pub(super) struct Tally<'a, V> {
     quality: &'a Quality,
-    signals: &'a Signals,
+    /// Period, s.
+    dt: f64,
+    /// 1 / scale of each command (n_u).
+    factors: Vec<f64>,
     target: &'a [V],
     error: V,
     effort: V,
@@ -106,8 +119,8 @@ impl<V: Vector> Tally<'_, V> {
         if *effort == 0.0 && *effort_rate == 0.0 {
             return;
         }
-        for ((last, command), &scale) in self.last.iter_mut().zip(command).zip(&self.signals.command_scales) {
-            let command = *command / scale;
+        for ((last, command), &factor) in self.last.iter_mut().zip(command).zip(&self.factors) {
+            let command = *command * factor;
             let change = command - *last;
             self.effort = self.effort + command * command;
             if step > 0 {
@@ -121,8 +134,7 @@ impl<V: Vector> Tally<'_, V> {
     #[inline(always)]
     pub(super) fn total(&self) -> V {
         let Quality { kind, effort, effort_rate, .. } = *self.quality;
-        let dt = self.signals.dt;
-        let error = if kind == QualityKind::FinalDistance { self.error.sqrt() } else { self.error * dt };
-        error + self.effort * (effort * dt) + self.change * (effort_rate / dt)
+        let error = if kind == QualityKind::FinalDistance { self.error.sqrt() } else { self.error * self.dt };
+        error + self.effort * (effort * self.dt) + self.change * (effort_rate / self.dt)
     }
 }
