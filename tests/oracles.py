@@ -142,14 +142,20 @@ class Pid:
         return np.clip(raised, self.bounds[:, 0], self.bounds[:, 1])
 
 
-def close_loop(step, controller, initial, target, steps, limits, noise=None):
+def close_loop(
+    step, controller, initial, target, steps, limits, noise=None, excitation=None, disturbance=None
+):
     """States, readings, commands of a run, and how many steps it lasted; cut where it diverged."""
     state = np.asarray(initial, dtype=float)
     noise = np.zeros((steps + 1, len(state))) if noise is None else noise
     states, readings, commands = [state], [state + noise[0]], []
     for k in range(steps):
         command = controller.command(readings[-1], target)
+        if excitation is not None:
+            command = np.clip(command + excitation[k], controller.bounds[:, 0], controller.bounds[:, 1])
         state = np.asarray(step(state, command), dtype=float)
+        if disturbance is not None:
+            state = state + disturbance[k]
         if not (np.abs(state) < limits).all():
             break
         commands.append(command)

@@ -1,5 +1,7 @@
 """The double loop, counted in experiments: ask, fly, tell; what is learnt when; what interrupts it."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -440,3 +442,33 @@ def test_the_named_trade_off_chooses_the_best_model(new_campaign, pendulum):
             assert campaign.models.best == pareto.best_tradeoff(rows, tradeoff == "normalised")
             differ += pareto.best_tradeoff(rows) != pareto.best_tradeoff(rows, True)
     assert differ > 0  # or the test would say nothing
+
+
+def test_an_excitation_is_flown_learnt_and_replayed(new_campaign, pendulum):
+    campaign = new_campaign()
+    excitation = 0.3 * np.random.default_rng(0).normal(size=(20, 1))
+    test, plain = campaign.test(GAINS, excitation=excitation), campaign.test(GAINS)
+    assert test.excitation is not None and plain.excitation is None
+    assert same_bits(test.excitation, excitation)
+    run = pendulum.run(test)
+    assert not same_bits(run.commands, pendulum.run(plain).commands)
+    controller = test.controller()
+    by_hand = [controller.command(state, test.target_state) for state in run.states[:-1]]
+    assert same_bits(by_hand, run.commands)
+    campaign.tell(test, run)
+    replayed = campaign.twin.simulate(test)
+    error = np.mean((replayed.states[1:] - run.states[1:]) ** 2)
+    assert campaign.twin.errors[0].closed_loop == pytest.approx(error, rel=1e-9)
+    assert campaign.best_test.number == test.number and campaign.best_test.excitation is None
+    near = [0.9, 0.0]
+    assert not same_bits(*(c.command(near, [1.0, 0.0]) for c in (campaign.controller, test.controller())))
+
+
+def test_a_test_with_another_excitation_is_another_test(new_campaign, pendulum):
+    campaign = new_campaign()
+    test = campaign.test(GAINS, excitation=np.zeros((20, 1)))
+    for other in (test.quiet(), dataclasses.replace(test, excitation=np.ones((20, 1)))):
+        assert not test.same_as(other) and not other.same_as(test)
+        with pytest.raises(tl.InvalidInput, match="as it was made"):
+            campaign.tell(other, pendulum.run(other))
+    assert test.same_as(dataclasses.replace(test))

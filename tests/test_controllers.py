@@ -70,6 +70,35 @@ def test_reset_forgets_the_run_before(quadrotor, quadrotor_family):
     assert not same_bits(first, on)
 
 
+def test_an_excitation_is_added_row_after_row_and_starts_again_with_the_run(
+    pendulum_signals, pendulum_controller
+):
+    family = pendulum_controller.bind(pendulum_signals)
+    plain, excited = (
+        family.controller([1.0, 0.0, 0.0]),
+        family.controller([1.0, 0.0, 0.0], [[0.5], [-9.0], [0.25]]),
+    )
+    state, target = [0.25, 0.0], [0.5, 0.0]
+    assert plain.command(state, target).tolist() == [0.25]
+    for _ in range(2):
+        excited.reset()
+        found = [excited.command(state, target)[0] for _ in range(5)]
+        assert found == [0.75, -2.0, 0.5, 0.25, 0.25]
+
+
+def test_a_refused_reading_does_not_use_up_a_row_of_the_excitation(pendulum_signals, pendulum_controller):
+    controller = pendulum_controller.bind(pendulum_signals).controller([1.0, 0.0, 0.0], [[0.5]])
+    with pytest.raises(tl.InvalidInput):
+        controller.command([np.nan, 0.0], [0.5, 0.0])
+    assert controller.command([0.25, 0.0], [0.5, 0.0]).tolist() == [0.75]
+
+
+@pytest.mark.parametrize("excitation", [[0.5], [[0.5, 0.5]], [[np.nan]], "none"])
+def test_an_excitation_of_another_shape_is_refused(pendulum_signals, pendulum_controller, excitation):
+    with pytest.raises(tl.InvalidInput, match="Excitation"):
+        pendulum_controller.bind(pendulum_signals).controller([1.0, 0.0, 0.0], excitation)
+
+
 def test_a_command_stays_in_its_bounds_and_saturates_at_them(pendulum_signals, pendulum_controller):
     controller = pendulum_controller.bind(pendulum_signals).controller([6.0, 0.0, 0.0])
     assert controller.command([0.0, 0.0], [10.0, 0.0])[0] == 2.0

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import twinloop as tl
 from oracles import Pid, quadrotor_derivative, same_bits
+from twinloop.flight import fly
 from twinloop.objectives import frozen_error
 from twinloop.test import final_distance
 
@@ -167,3 +168,12 @@ def test_without_noise_the_true_states_are_the_recorded_ones(quadrotor, first_te
     flight = quadrotor.run(first_test)
     assert same_bits(flight.states, flight.true_states)
     assert same_bits(quadrotor.run(first_test).states, flight.states)
+
+
+def test_a_gust_moves_the_true_state(quadrotor, first_test):
+    gusts = np.zeros((100, 6))
+    gusts[60] = [0.1, 0.0, 0.0, 0.0, -1.0, 0.0]
+    calm, gusty = fly(quadrotor.dynamics, first_test), fly(quadrotor.dynamics, first_test, disturbance=gusts)
+    assert same_bits(calm.states[:61], gusty.states[:61])
+    assert same_bits(gusty.true_states[61], calm.states[61] + gusts[60])
+    assert not same_bits(calm.commands[61], gusty.commands[61])

@@ -31,11 +31,11 @@ def models(rig, form, count=3):
     return [_core.Model(program, form, rig) for program in programs]
 
 
-def expected_run(model, genes, steps, start=START, target=TARGET, noise=None):
+def expected_run(model, genes, steps, start=START, target=TARGET, **influences):
     def step(x, u):
         return model_step(model.program, model.form, x, u, SCALES, DERIVATIVES, DT)
 
-    return close_loop(step, pid(genes), start, target, steps, LIMITS, noise)
+    return close_loop(step, pid(genes), start, target, steps, LIMITS, **influences)
 
 
 def agree(form, found, expected):
@@ -73,6 +73,41 @@ def test_the_controller_reads_the_noise_and_the_model_does_not(rig, rig_family, 
         assert same_bits(runs.states[i, : lasted + 1], states)
         assert same_bits(runs.measured[i, : lasted + 1], readings)
         assert same_bits(runs.commands[i, :lasted], commands)
+
+
+@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("count", GROUPS)
+def test_excitation_moves_the_commands_and_disturbance_the_true_state(rig, rig_family, form, count):
+    stream, steps = np.random.default_rng(4), 12
+    shapes = {"noise": (steps + 1, 2), "excitation": (steps, 2), "disturbance": (steps, 2)}
+    influences = {name: stream.normal(0.0, 0.3, (count, *shape)) for name, shape in shapes.items()}
+    influences["excitation"] *= 5.0
+    task, genes = _core.Task(START, TARGET, steps), drawn(count)
+    for model in models(rig, form):
+        runs = _core.rollout(model, rig_family, genes, task, rig, **influences)
+        for i in range(count):
+            alone = {name: values[i] for name, values in influences.items()}
+            states, readings, commands, lasted = expected_run(model, genes[i], steps, **alone)
+            assert lasted == runs.lasted[i]
+            agree(form, runs.states[i, : lasted + 1], states)
+            agree(form, runs.measured[i, : lasted + 1], readings)
+            agree(form, runs.commands[i, :lasted], commands)
+
+
+def test_an_excitation_is_clipped_to_the_bounds_of_the_commands(rig, rig_family):
+    task, genes = _core.Task(START, TARGET, 4), drawn(1)
+    excitation = np.array([[[9.0, -9.0], [-9.0, 9.0], [0.0, 0.0], [np.inf, -np.inf]]])
+    model = models(rig, "increment")[1]
+    runs = _core.rollout(model, rig_family, genes, task, rig, excitation=excitation, divergence_factor=1e6)
+    assert runs.commands[0, [0, 1, 3]].tolist() == [[1.0, -3.0], [-1.0, 2.0], [1.0, -3.0]]
+
+
+@pytest.mark.parametrize("excitation", [None, 0.0])
+def test_no_excitation_and_one_of_nothing_fly_alike(rig, rig_family, excitation):
+    task, genes, model = _core.Task(START, TARGET, 12), drawn(3), models(rig, "absolute")[1]
+    values = None if excitation is None else np.full((3, 12, 2), excitation)
+    runs = _core.rollout(model, rig_family, genes, task, rig, excitation=values)
+    assert np.array_equal(runs.states, _core.rollout(model, rig_family, genes, task, rig).states)
 
 
 def test_a_python_function_is_rolled_out_like_a_model(rig, rig_family):
@@ -149,6 +184,24 @@ def test_the_closed_loop_error_is_that_of_the_free_run_under_the_tests_controlle
             assert row[k] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("count", GROUPS)
+def test_the_closed_loop_of_an_excited_test_replays_its_excitation(rig, rig_family, count):
+    """Every second test carries one; some recordings are shorter than their test."""
+    model, stream = models(rig, "acceleration")[1], np.random.default_rng(8)
+    tests = _core.SelectedTests(rig, rig_family)
+    for i, genes in enumerate(drawn(count)):
+        steps, task = 12, _core.Task(START, TARGET, 12)
+        excitation = stream.normal(0.0, 1.0, (1, steps, 2)) if i % 2 == 0 else None
+        runs = _core.rollout(model, rig_family, genes[None], task, rig, excitation=excitation)
+        kept = min(int(runs.lasted[0]), steps - i % 3)
+        assert kept > 0
+        added = None if excitation is None else excitation[0]
+        tests = tests.with_test(genes, TARGET, runs.states[0, : kept + 1], runs.commands[0, :kept], added)
+    assert (_core.closed_loop([model], tests) == 0.0).all()
+    others = models(rig, "acceleration", 6)
+    assert (_core.closed_loop(others, tests)[[0, 2, 3]] != 0.0).any()
+
+
 @pytest.mark.parametrize(("factor", "steps"), [(3.0, 2), (3.0, 20), (1.5, 8), (20.0, 5)])
 def test_a_run_that_blows_up_is_worth_the_time_it_lasted(rig, rig_family, factor, steps):
     program = _core.Program.parse(program_text(4, 2, 6, [[f"r4 = r0 * {factor}", "r5 = r1 * 1.0"]]))
@@ -203,6 +256,9 @@ def test_arguments_of_another_shape_are_refused(rig, rig_family):
         _core.rollout(model, rig_family, np.ones((1, 5)), task, rig)
     with pytest.raises(ValueError, match="noise: expected shape"):
         _core.rollout(model, rig_family, np.ones((1, 6)), task, rig, noise=np.zeros((1, 5, 2)))
+    for name in ("excitation", "disturbance"):
+        with pytest.raises(ValueError, match=f"{name}: expected shape"):
+            _core.rollout(model, rig_family, np.ones((1, 6)), task, rig, **{name: np.zeros((1, 6, 2))})
     with pytest.raises(ValueError, match="expected 2 states"):
         _core.rollout(model, rig_family, np.ones((1, 6)), _core.Task([0.0], [1.0], 5), rig)
     for wrong in ([0.0, np.nan], [0.0, np.inf]):

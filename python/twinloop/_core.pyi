@@ -13,11 +13,13 @@ __all__ = [
     "Archive",
     "Controller",
     "Family",
+    "Flights",
     "Grammar",
     "Model",
     "ModelSearch",
     "Program",
     "Quadrotor",
+    "Quality",
     "Runs",
     "SelectedTests",
     "Signals",
@@ -30,11 +32,13 @@ __all__ = [
     "best_tradeoff",
     "closed_loop",
     "crowding_distances",
+    "disagreements",
     "discrimination",
     "final_distances",
     "ideal_point",
     "instability",
     "open_loop",
+    "qualities",
     "ranks",
     "rollout",
     "select",
@@ -170,7 +174,8 @@ class Family:
         """One PID an axis (angle, rate or None); genes (K_P, K_I, K_D) per axis; matrix (n_u, axes)."""
     @property
     def size(self) -> int: ...
-    def controller(self, parameters: ArrayLike) -> Controller: ...
+    def controller(self, parameters: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
+        """excitation (n, n_u): a row is added to each command in turn, nothing after the last."""
 
 @final
 class Controller:
@@ -212,13 +217,16 @@ def rollout(
     signals: Signals,
     *,
     noise: ArrayLike | None = None,
+    excitation: ArrayLike | None = None,
+    disturbance: ArrayLike | None = None,
     divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> Runs:
     """Closes the loop of each controller (m, size) around the dynamics.
 
-    noise (m, n + 1, n_x) is added to what the controller reads. A Python callable takes a state (n_x,) and a
-    command (n_u,), returns the next state, and is called on this thread.
+    noise (m, n + 1, n_x) is added to what the controller reads, excitation (m, n, n_u) to what it commands
+    before the bounds clip it, disturbance (m, n, n_x) to the true state after each step. A Python callable
+    takes a state (n_x,) and a command (n_u,), returns the next state, and is called on this thread.
     """
 
 @final
@@ -227,9 +235,14 @@ class SelectedTests:
 
     def __new__(cls, signals: Signals, family: Family, divergence_factor: float = 10.0) -> SelectedTests: ...
     def with_test(
-        self, parameters: ArrayLike, target: ArrayLike, states: ArrayLike, commands: ArrayLike
+        self,
+        parameters: ArrayLike,
+        target: ArrayLike,
+        states: ArrayLike,
+        commands: ArrayLike,
+        excitation: ArrayLike | None = None,
     ) -> SelectedTests:
-        """These and one more: states (n + 1, n_x) as measured, commands (n, n_u)."""
+        """These and one more: states (n + 1, n_x) as measured, commands (n, n_u), excitation (≥ n, n_u)."""
     def __len__(self) -> int: ...
 
 def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:
@@ -255,6 +268,63 @@ def discrimination(distances: ArrayLike, cap: float) -> _Floats:
 
 def instability(distances: ArrayLike, cap: float) -> _Floats:
     """Variance over mutants (tests,) of distances (mutants, tests); one at the cap counts as cap squared."""
+
+@final
+class Flights:
+    """Candidate flights of one length, each with its own gains, start, target and excitation."""
+
+    def __new__(
+        cls,
+        signals: Signals,
+        family: Family,
+        parameters: ArrayLike,
+        initial_states: ArrayLike,
+        target_states: ArrayLike,
+        steps: int,
+        *,
+        excitation: ArrayLike | None = None,
+        divergence_factor: float = 10.0,
+    ) -> Flights:
+        """parameters (K, size), initial and target states (K, n_x), excitation (K, steps, n_u)."""
+    @property
+    def steps(self) -> int: ...
+    def __len__(self) -> int: ...
+
+@final
+class Quality:
+    """What a flight is judged by: "iae", "ise" or "final_distance", plus what commands cost."""
+
+    def __new__(
+        cls, kind: str, weights: ArrayLike, *, effort: float = 0.0, effort_rate: float = 0.0
+    ) -> Quality: ...
+    @property
+    def kind(self) -> str: ...
+
+def qualities(
+    dynamics: Sequence[Model] | Quadrotor,
+    flights: Flights,
+    quality: Quality,
+    envelope: Sequence[tuple[float, float] | None],
+    *,
+    noise: ArrayLike | None = None,
+    offsets: ArrayLike | None = None,
+    workers: Workers | None = None,
+) -> tuple[_Floats, _Floats]:
+    """Quality and usage of the envelope of every flight, both (members, draws, K).
+
+    noise (D, n + 1, n_x) is added to what the controllers read, offsets (D, n_x) to the initial states; both
+    are the same for all candidates and members.
+    """
+
+def disagreements(
+    models: Sequence[Model],
+    flights: Flights,
+    sds: ArrayLike,
+    *,
+    cap: float = 100.0,
+    workers: Workers | None = None,
+) -> tuple[_Floats, _Integers]:
+    """log det(I + D Dᵀ) of each flight (K,), and where members are the furthest apart (K, 4)."""
 
 def ranks(objectives: ArrayLike) -> _Integers: ...
 def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> _Floats: ...

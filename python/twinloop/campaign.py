@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, whole
+from twinloop.arrays import Floats, floats, whole
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.history import Experiment, Iteration, Progress
@@ -107,25 +107,25 @@ class Campaign:
 
     # Ask and tell
 
-    def test(self, gains: Mapping[str, float] | ArrayLike, excitation: None = None) -> Test:
+    def test(self, gains: Mapping[str, float] | ArrayLike, excitation: ArrayLike | None = None) -> Test:
         """A test with gains of your own: the first one, a controller that you already trust.
 
         Args:
             gains: all gains by name, or (size,) in order; in their units and bounds.
-            excitation: None; this preset adds none.
+            excitation: what is added to the controller's commands (steps, n_u), in their units; the sum is
+                clipped to the commands' bounds. None: nothing.
 
         Returns:
             The test, to be flown and told.
 
         Raises:
-            InvalidInput: gains that cannot be used, or an excitation.
+            InvalidInput: gains or an excitation that cannot be used.
         """
+        genes = self.family.genes(gains)
         if excitation is not None:
-            raise InvalidInput(
-                f"Campaign.test, excitation: expected None, found {type(excitation).__name__}; "
-                f"the preset {self.setup.preset!r} adds no excitation, leave it out."
-            )
-        return self._book.new_test(self.family.genes(gains))
+            shape = (self.setup.steps, self.signals.n_u)
+            excitation = floats("Campaign.test, excitation (steps, commands)", excitation, shape)
+        return self._book.new_test(genes, excitation=excitation)
 
     def ask(self) -> Test:
         """Learns from all that was told, then picks the test on which the best models disagree.
@@ -154,7 +154,7 @@ class Campaign:
             for moved, left in chunks(search, lambda s, n: s.advance(n, self._workers), total):
                 search = moved
                 self._report("tests", total - left, total, search.archive_size, search.evaluations)
-        test = self._book.new_test(search.best_genes, self._predicted(models, search.best_genes))
+        test = self._book.new_test(search.best_genes, predicted=self._predicted(models, search.best_genes))
         self._book.enter_loop(self._learning.iteration, test, search)
         return test
 
@@ -231,9 +231,10 @@ class Campaign:
         """The controller to fly: the flown test that ended nearest to its target.
 
         It carries the final distance that the twin predicts, after learning all that was told, and the
-        measured one. Runs that were cut do not count, unless there are no others.
+        measured one. Runs that were cut do not count, unless there are no others. It carries no excitation:
+        to fly and tell it where it was flown with one, make a test of it with `campaign.test`.
         """
-        models, best = self._learnt(), self._book.best()
+        models, best = self._learnt(), self._book.best().quiet()
         return best.judged(self._predicted(models, best.genes), self._book.measured(best.number))
 
     @property

@@ -20,14 +20,17 @@ def fly(
     test: Test,
     *,
     noise: Floats | None = None,
+    disturbance: Floats | None = None,
     divergence_factor: float = 10.0,
 ) -> Trajectory:
-    """Closes the loop of the test's controller around dynamics.
+    """Closes the loop of the test's controller around dynamics, with the test's excitation.
 
     Args:
         dynamics: an engine's model or plant, or a function (state (n_x,), command (n_u,)) -> next state.
         test: what to fly.
         noise: what the sensors add to each state (n + 1, n_x), in the units of the states; None: nothing.
+        disturbance: what is added to the true state after each step (n, n_x), such as process noise or gusts,
+            in the units of the states; None: nothing.
         divergence_factor: multiple of a state's scale beyond which the run counts as diverged and is cut.
 
     Returns:
@@ -44,7 +47,9 @@ def fly(
             test.genes[np.newaxis],
             test.task,
             signals.engine,
-            noise=None if noise is None else noise[np.newaxis],
+            noise=_one(noise),
+            excitation=_one(test.excitation),
+            disturbance=_one(disturbance),
             divergence_factor=divergence_factor,
         )
     lasted = int(runs.lasted[0])
@@ -65,3 +70,8 @@ def fly(
         reason=reason,
         true_states=runs.states[0, : lasted + 1],
     )
+
+
+def _one(rows: Floats | None) -> Floats | None:
+    """What acts on the one run, as the engine wants it: an axis of runs first."""
+    return None if rows is None else rows[np.newaxis]

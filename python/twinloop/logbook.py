@@ -32,11 +32,14 @@ class Logbook:
         self.selected = setup.none_selected()
         self._identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
 
-    def new_test(self, genes: Floats, predicted: float | None = None) -> Test:
+    def new_test(
+        self, genes: Floats, *, excitation: Floats | None = None, predicted: float | None = None
+    ) -> Test:
         """Enters a test.
 
         Args:
             genes: gains (size,), in their units.
+            excitation: what is added to the controller's commands (n, n_u), in their units; None: nothing.
             predicted: final distance that is expected.
 
         Returns:
@@ -48,6 +51,7 @@ class Logbook:
             self.setup.initial_state,
             self.setup.target_state,
             self.setup.steps,
+            excitation,
             number=len(self.tests),
             campaign=self._identity,
             predicted=predicted,
@@ -92,7 +96,8 @@ class Logbook:
         known = self._known(test)
         check_recorded(trajectory, self.setup.signals, known.steps, self.setup.options.divergence_factor)
         with engine_input():
-            run = (known.genes, known.target_state, trajectory.states, trajectory.commands)
+            states, commands = trajectory.states, trajectory.commands
+            run = (known.genes, known.target_state, states, commands, known.excitation)
             selected = self.selected.with_test(*run)
             before = judge(self.setup.none_selected().with_test(*run))
         complete = trajectory.ended == "completed" and trajectory.steps == known.steps
@@ -156,7 +161,8 @@ class Logbook:
         assert isinstance(test, Test)  # check_signals has refused everything else
         if test.number >= len(self.tests) or not self.tests[test.number].same_as(test):
             raise InvalidInput(
-                f"Campaign.tell: expected a test of this campaign, found test {test.number} of another; "
+                f"Campaign.tell: expected a test of this campaign as it was made, found test {test.number} "
+                "of another one, or changed; "
                 "tell it to the campaign that made it, or make it here with campaign.test(gains)."
             )
         return self.tests[test.number]

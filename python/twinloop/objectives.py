@@ -42,7 +42,7 @@ def selected_tests(
         selected = _core.SelectedTests(family.signals.engine, family.engine, divergence_factor)
         for test, trajectory in zip(tests, trajectories, strict=True):
             selected = selected.with_test(
-                test.genes, test.target_state, trajectory.states, trajectory.commands
+                test.genes, test.target_state, trajectory.states, trajectory.commands, test.excitation
             )
     return selected
 

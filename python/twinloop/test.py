@@ -25,6 +25,8 @@ class Test:
         initial_state: state to start from (n_x,), SI units, radians.
         target_state: state to lead to (n_x,), the same units.
         steps: number of commands, n.
+        excitation: what is added to the controller's commands (n, n_u), in their units; the sum is clipped to
+            the commands' bounds. None: nothing.
         number: its number in the campaign, from 0.
         campaign: identity of the campaign that it belongs to; empty if none.
         predicted: final distance that the twin predicts, where it was asked; infinite if it diverges.
@@ -41,6 +43,7 @@ class Test:
     initial_state: Floats
     target_state: Floats
     steps: int
+    excitation: Floats | None = None
     number: int = 0
     campaign: str = ""
     predicted: float | None = None
@@ -52,6 +55,9 @@ class Test:
         object.__setattr__(self, "initial_state", floats("Test.initial_state", self.initial_state, (n_x,)))
         object.__setattr__(self, "target_state", floats("Test.target_state", self.target_state, (n_x,)))
         object.__setattr__(self, "steps", whole("Test.steps", self.steps, least=1))
+        if self.excitation is not None:
+            shape = (self.steps, self.family.signals.n_u)
+            object.__setattr__(self, "excitation", floats("Test.excitation", self.excitation, shape))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -59,18 +65,13 @@ class Test:
         return self.family.parameters(self.genes)
 
     @property
-    def excitation(self) -> None:
-        """What is added to the controller's commands: nothing."""
-        return None
-
-    @property
     def task(self) -> _core.Task:
         """Start, target and length, for the native engine."""
         return _core.Task(self.initial_state, self.target_state, self.steps)
 
     def controller(self) -> Controller:
-        """A fresh controller for one run: `.reset()`, then `.command(state, target)` once a period."""
-        return self.family.controller(self.genes)
+        """A fresh controller for one run: `.command(state, target)` once a period, the excitation in it."""
+        return self.family.controller(self.genes, self.excitation)
 
     def judged(self, predicted: float | None, measured: float | None) -> Test:
         """The same test with its final distances.
@@ -84,6 +85,10 @@ class Test:
         """
         return dataclasses.replace(self, predicted=predicted, measured=measured)
 
+    def quiet(self) -> Test:
+        """The same test without its excitation: what is flown once nothing is to be learnt any more."""
+        return dataclasses.replace(self, excitation=None)
+
     def same_as(self, other: Test) -> bool:
         """Whether both stand for the same experiment of the same campaign."""
         return (
@@ -91,6 +96,7 @@ class Test:
             and self.genes.tobytes() == other.genes.tobytes()
             and self.initial_state.tobytes() == other.initial_state.tobytes()
             and self.target_state.tobytes() == other.target_state.tobytes()
+            and _bits(self.excitation) == _bits(other.excitation)
         )
 
     def __repr__(self) -> str:
@@ -114,6 +120,10 @@ def final_distance(last_state: ArrayLike, target_state: ArrayLike) -> float:
     for gap in gaps.tolist():
         total += gap * gap
     return math.sqrt(total)
+
+
+def _bits(values: Floats | None) -> bytes | None:
+    return None if values is None else values.tobytes()
 
 
 def check_signals(test: object, signals: Signals) -> None:

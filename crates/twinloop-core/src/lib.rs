@@ -6,6 +6,7 @@ mod controller;
 mod dynamics;
 mod error;
 mod evolution;
+mod flights;
 mod integrator;
 mod lanes;
 mod lgp;
@@ -31,6 +32,9 @@ pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid};
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};
 pub use evolution::{Problem, Search, Variation};
+pub use flights::{
+    Candidate, Disagreement, Draws, Envelope, Flights, Judged, Quality, QualityKind, disagreements, qualities,
+};
 pub use integrator::{Field, Stages, rk4};
 pub use lanes::{Isa, Kernel, Piece, Scalar, Vector, Wide, Width, dispatch};
 pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};
@@ -49,6 +53,6 @@ pub use selected::{Experiment, SelectedTests};
 pub use signals::{RigidBody, Signals};
 pub use task::{Task, distance};
 pub use test_loop::{TestSearch, TestSettings};
-pub use trajectory::{Trajectory, record};
+pub use trajectory::{Influences, Trajectory, record};
 pub use tuning::{Observed, Recorded, Tuned, Tuning};
 pub use workers::Workers;

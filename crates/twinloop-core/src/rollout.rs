@@ -20,6 +20,10 @@ pub struct Start<'a, V> {
     pub limits: &'a [f64],
     /// What the sensors add to the state that the controller reads, (n + 1) × n_x; empty for perfect sensors.
     pub noise: &'a [V],
+    /// What is added to the commands before they are clipped to their bounds, n × n_u; empty for nothing.
+    pub excitation: &'a [V],
+    /// What is added to the true state after each step, n × n_x: process noise, gusts; empty for nothing.
+    pub disturbance: &'a [V],
 }
 
 /// One step of the loops, as it is shown to a watcher.
@@ -28,7 +32,7 @@ pub struct Seen<'a, V> {
     pub step: usize,
     /// What the controllers read before it (n_x).
     pub reading: &'a [V],
-    /// What they commanded (n_u).
+    /// What was sent (n_u): what they commanded and the excitation, within the bounds.
     pub command: &'a [V],
     /// The true state after it (n_x).
     pub next: &'a [V],
@@ -48,24 +52,28 @@ pub fn rollout<D: Dynamics, V: Vector>(
     start: &Start<'_, V>,
     watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
-    let Start { family, parameters, initial, target, steps, limits, noise } = *start;
-    let states = initial.len();
+    let Start { family, parameters, initial, target, steps, limits, noise, excitation, disturbance } = *start;
+    let (states, commands) = (initial.len(), family.commands());
     let mut workspace = dynamics.workspace::<V>();
     let mut memory = vec![V::splat(0.0); family.memory()];
     let mut state = initial.to_vec();
     let mut reading = initial.to_vec();
-    let mut command = vec![V::splat(0.0); family.commands()];
+    let mut command = vec![V::splat(0.0); commands];
     let mut alive = V::splat(1.0);
     let mut lasted = vec![steps; V::LANES];
     for step in 0..steps {
         reading.copy_from_slice(&state);
         if !noise.is_empty() {
-            for (reading, noise) in reading.iter_mut().zip(&noise[step * states..]) {
-                *reading = *reading + *noise;
-            }
+            add(&mut reading, &noise[step * states..]);
         }
         family.command(parameters, &mut memory, &reading, target, &mut command);
+        if !excitation.is_empty() {
+            family.excite(&mut command, &excitation[step * commands..]);
+        }
         dynamics.step(&mut workspace, &mut state, &command);
+        if !disturbance.is_empty() {
+            add(&mut state, &disturbance[step * states..]);
+        }
         watch.see(Seen { step, reading: &reading, command: &command, next: &state });
         let before = alive;
         for (state, &limit) in state.iter().zip(limits) {
@@ -84,4 +92,12 @@ pub fn rollout<D: Dynamics, V: Vector>(
         }
     }
     lasted
+}
+
+/// Adds the first terms to as many sums.
+#[inline(always)]
+fn add<V: Vector>(sums: &mut [V], terms: &[V]) {
+    for (sum, term) in sums.iter_mut().zip(terms) {
+        *sum = *sum + *term;
+    }
 }

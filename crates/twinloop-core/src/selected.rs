@@ -19,6 +19,9 @@ pub struct Experiment {
     pub states: Vec<f64>,
     /// Commands, n × n_u.
     pub commands: Vec<f64>,
+    /// What the test added to its controller's commands, a row of n_u for each step, as many as were recorded or
+    /// more; empty for nothing.
+    pub excitation: Vec<f64>,
 }
 
 /// Transitions (η_t, ω_t, η_{t+1}) of neighbouring rows, one a lane.
@@ -45,6 +48,8 @@ pub(crate) struct Loops {
     pub initial: Vec<f64>,
     /// n_x × lanes
     pub target: Vec<f64>,
+    /// n × n_u × lanes, n that of the longest; empty if no test of the group has any.
+    pub excitation: Vec<f64>,
     /// Recorded states, (n + 1) × n_x × lanes, n that of the longest.
     pub recorded: Vec<f64>,
     /// Steps that were recorded of each test.
@@ -85,7 +90,8 @@ impl SelectedTests {
         let mut experiments = self.experiments.clone();
         experiments.push(Arc::new(experiment));
         let (blocks, rows) = transitions(&experiments, self.signals.states(), self.signals.commands());
-        let of_group = |group: Range<usize>| loops(&experiments[group], self.signals.states());
+        let of_group =
+            |group: Range<usize>| loops(&experiments[group], self.signals.states(), self.signals.commands());
         let loops = groups(experiments.len()).into_iter().map(of_group).collect();
         let (signals, family, limits) = (self.signals.clone(), self.family.clone(), self.limits.clone());
         Ok(Self { signals, family, experiments, limits, blocks, rows, loops })
@@ -128,7 +134,7 @@ impl SelectedTests {
     }
 
     fn check(&self, experiment: &Experiment) -> Result<()> {
-        let Experiment { parameters, target, states, commands } = experiment;
+        let Experiment { parameters, target, states, commands, excitation } = experiment;
         let (n_x, n_u) = (self.signals.states(), self.signals.commands());
         let steps = commands.len() / n_u;
         if steps == 0 || commands.len() != steps * n_u || states.len() != (steps + 1) * n_x {
@@ -147,7 +153,15 @@ impl SelectedTests {
                 target.len()
             ));
         }
-        if ![parameters, target, states, commands].into_iter().flatten().all(|x| x.is_finite()) {
+        let rows = excitation.len() / n_u;
+        if !excitation.is_empty() && (excitation.len() != rows * n_u || rows < steps) {
+            return invalid(format!(
+                "test: expected no excitation, or {n_u} numbers for each of at least the {steps} recorded steps, found \
+                 {} numbers",
+                excitation.len()
+            ));
+        }
+        if ![parameters, target, states, commands, excitation].into_iter().flatten().all(|x| x.is_finite()) {
             return invalid(
                 "trajectory: expected finite numbers, found NaN or an infinite one; cut the bad samples",
             );
@@ -179,24 +193,30 @@ fn transitions(experiments: &[Arc<Experiment>], n_x: usize, n_u: usize) -> (Vec<
 }
 
 /// The closed loops of a group of tests.
-fn loops(group: &[Arc<Experiment>], n_x: usize) -> Loops {
+fn loops(group: &[Arc<Experiment>], n_x: usize, n_u: usize) -> Loops {
     let lanes = lanes_for(group.len());
-    let longest = group.iter().map(|experiment| experiment.states.len()).max().unwrap_or(0);
+    let steps: Vec<usize> = group.iter().map(|experiment| experiment.states.len() / n_x - 1).collect();
+    let longest = steps.iter().copied().max().unwrap_or(0);
     let part = |of: fn(&Experiment) -> &[f64]| {
         interleave(&group.iter().map(|experiment| of(experiment)).collect::<Vec<_>>(), lanes)
     };
-    let padded = group.iter().map(|experiment| {
-        let mut states = experiment.states.clone();
-        states.resize(longest, 0.0);
-        states
-    });
+    let recorded = group.iter().map(|experiment| resized(&experiment.states, (longest + 1) * n_x, 0.0));
+    // Minus zero is the one number that leaves every command as it is to the bit, a zero of either sign too.
+    let excitation = group.iter().map(|experiment| resized(&experiment.excitation, longest * n_u, -0.0));
+    let excited = group.iter().any(|experiment| !experiment.excitation.is_empty());
     let initial: Vec<&[f64]> = group.iter().map(|experiment| &experiment.states[..n_x]).collect();
     Loops {
         tests: group.len(),
         parameters: part(|experiment| &experiment.parameters),
         initial: interleave(&initial, lanes),
         target: part(|experiment| &experiment.target),
-        recorded: interleave(&padded.collect::<Vec<_>>(), lanes),
-        steps: group.iter().map(|experiment| experiment.states.len() / n_x - 1).collect(),
+        excitation: if excited { interleave(&excitation.collect::<Vec<_>>(), lanes) } else { vec![] },
+        recorded: interleave(&recorded.collect::<Vec<_>>(), lanes),
+        steps,
     }
+}
+
+/// Cut to a length, or filled up to it.
+fn resized(values: &[f64], length: usize, filling: f64) -> Vec<f64> {
+    values.iter().copied().chain(std::iter::repeat(filling)).take(length).collect()
 }

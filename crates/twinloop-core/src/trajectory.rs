@@ -1,5 +1,7 @@
 //! Trajectories: what runs leave behind when every step is kept.
 
+use std::ops::Range;
+
 use crate::controller::Family;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, Width, dispatch, groups, pack, with_lanes};
@@ -19,21 +21,43 @@ pub struct Trajectory {
     pub lasted: usize,
 }
 
-/// Runs the controller of each parameter vector on the dynamics. `noise`, empty or (n + 1) × n_x for each run, is
-/// what its sensors add to the state.
+/// What acts on runs from outside; each empty, or a row for each run.
+#[derive(Clone, Copy, Default)]
+pub struct Influences<'a> {
+    /// What the sensors add to the state, (n + 1) × n_x a run.
+    pub noise: &'a [&'a [f64]],
+    /// What is added to the commands before they are clipped, n × n_u a run.
+    pub excitation: &'a [&'a [f64]],
+    /// What is added to the true state after each step, n × n_x a run.
+    pub disturbance: &'a [&'a [f64]],
+}
+
+impl<'a> Influences<'a> {
+    /// Those of some of the runs.
+    pub fn of(&self, runs: &Range<usize>) -> Self {
+        let part = |all: &'a [&'a [f64]]| if all.is_empty() { all } else { &all[runs.clone()] };
+        Self {
+            noise: part(self.noise),
+            excitation: part(self.excitation),
+            disturbance: part(self.disturbance),
+        }
+    }
+}
+
+/// Runs the controller of each parameter vector on the dynamics.
 pub fn record<D: Dynamics>(
     dynamics: &D,
     family: &Family,
     parameters: &[&[f64]],
     task: &Task,
     limits: &[f64],
-    noise: &[&[f64]],
+    influences: Influences<'_>,
     width: Width,
 ) -> Vec<Trajectory> {
     let runs = groups(parameters.len()).into_iter().flat_map(|group| {
-        let noise = if noise.is_empty() { noise } else { &noise[group.clone()] };
+        let influences = influences.of(&group);
         let parameters = &parameters[group];
-        dispatch(width, Record { dynamics, family, parameters, task, limits, noise })
+        dispatch(width, Record { dynamics, family, parameters, task, limits, influences })
     });
     runs.collect()
 }
@@ -44,7 +68,7 @@ struct Record<'a, D> {
     parameters: &'a [&'a [f64]],
     task: &'a Task,
     limits: &'a [f64],
-    noise: &'a [&'a [f64]],
+    influences: Influences<'a>,
 }
 
 impl<D: Dynamics> Kernel for Record<'_, D> {
@@ -60,7 +84,7 @@ impl<D: Dynamics> Record<'_, D> {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> Vec<Trajectory> {
         let Task { initial, target, steps } = self.task;
-        let noise: Vec<V> = pack(self.noise);
+        let noise: Vec<V> = pack(self.influences.noise);
         let start = Start {
             family: self.family,
             parameters: &pack::<V, _>(self.parameters),
@@ -69,6 +93,8 @@ impl<D: Dynamics> Record<'_, D> {
             steps: *steps,
             limits: self.limits,
             noise: &noise,
+            excitation: &pack::<V, _>(self.influences.excitation),
+            disturbance: &pack::<V, _>(self.influences.disturbance),
         };
         let empty = || Trajectory { states: initial.clone(), measured: vec![], commands: vec![], lasted: 0 };
         let mut runs: Vec<_> = self.parameters.iter().map(|_| empty()).collect();

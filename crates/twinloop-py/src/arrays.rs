@@ -33,6 +33,21 @@ pub fn rows(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<Vec<f6
     Ok(array.rows().into_iter().map(|row| row.iter().copied().collect()).collect())
 }
 
+/// The rows of a matrix that may be left out; none then.
+pub fn optional_rows(name: &str, array: Option<Matrix<'_>>, columns: usize) -> Result<Vec<Vec<f64>>> {
+    array.map_or_else(|| Ok(vec![]), |array| rows(name, &array, columns))
+}
+
+/// The blocks of an array that may be left out, each as one row; none then.
+pub fn optional_blocks(name: &str, array: Option<Cube<'_>>, expected: [usize; 3]) -> Result<Vec<Vec<f64>>> {
+    let Some(array) = array else { return Ok(vec![]) };
+    let array = array.as_array();
+    if array.shape() != expected {
+        return Err(misuse(format!("{name}: expected shape {expected:?}, found {:?}", array.shape())));
+    }
+    Ok(array.outer_iter().map(|block| block.iter().copied().collect()).collect())
+}
+
 /// Views of rows.
 pub fn views(rows: &[Vec<f64>]) -> Vec<&[f64]> {
     rows.iter().map(Vec::as_slice).collect()
@@ -57,4 +72,11 @@ pub fn to_cube(py: Python<'_>, shape: [usize; 3], values: Vec<f64>) -> Bound<'_,
 /// Indices for Python.
 pub fn to_integers(py: Python<'_>, values: impl IntoIterator<Item = usize>) -> Bound<'_, PyArray1<i64>> {
     to_vector(py, values.into_iter().map(|value| value as i64).collect())
+}
+
+/// Rows of indices for Python.
+pub fn to_integer_rows<const N: usize>(py: Python<'_>, rows: Vec<[usize; N]>) -> Bound<'_, PyArray2<i64>> {
+    let shape = (rows.len(), N);
+    let values = rows.into_iter().flatten().map(|value| value as i64).collect();
+    Array2::from_shape_vec(shape, values).expect("whole rows").into_pyarray(py)
 }

@@ -6,7 +6,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use twinloop_core::{Axis, Controller, Family, Mixer, Parameters, Pid};
 
-use crate::arrays::{Matrix, Vector, rows, to_vector, vector};
+use crate::arrays::{Matrix, Vector, optional_rows, rows, to_vector, vector};
 use crate::error::{Result, misuse};
 use crate::model::PySignals;
 
@@ -49,9 +49,11 @@ impl PyFamily {
         self.0.parameters().len()
     }
 
-    fn controller(&self, parameters: Vector<'_>) -> Result<PyController> {
+    #[pyo3(signature = (parameters, excitation = None))]
+    fn controller(&self, parameters: Vector<'_>, excitation: Option<Matrix<'_>>) -> Result<PyController> {
         let controller = Controller::new(self.0.clone(), vector(&parameters))?;
-        Ok(PyController(Mutex::new(controller)))
+        let excitation = optional_rows("excitation", excitation, self.0.commands())?.concat();
+        Ok(PyController(Mutex::new(controller.excited(&excitation)?)))
     }
 }
 

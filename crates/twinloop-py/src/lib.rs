@@ -3,6 +3,7 @@
 mod arrays;
 mod controller;
 mod error;
+mod flights;
 mod model;
 mod objective;
 mod pareto;
@@ -25,6 +26,8 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 mod _core {
     #[pymodule_export]
     use crate::controller::{PyController, PyFamily};
+    #[pymodule_export]
+    use crate::flights::{PyFlights, PyQuality, disagreements, qualities};
     #[pymodule_export]
     use crate::model::{PyModel, PySignals, command_effects};
     #[pymodule_export]

@@ -4,9 +4,11 @@ use std::cell::RefCell;
 
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
-use twinloop_core::{Dynamics, Task, Trajectory, Vector as Lanes, record};
+use twinloop_core::{Dynamics, Influences, Task, Trajectory, Vector as Lanes, record};
 
-use crate::arrays::{Cube, Matrix, Vector, rows, to_cube, to_integers, to_vector, vector, views};
+use crate::arrays::{
+    Cube, Matrix, Vector, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
+};
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
 use crate::model::{PyModel, PySignals};
@@ -78,7 +80,10 @@ impl PyRuns {
 
 /// Closes the loop of each controller around the dynamics.
 #[pyfunction]
-#[pyo3(signature = (dynamics, family, parameters, task, signals, *, noise = None, divergence_factor = 10.0, workers = None))]
+#[pyo3(signature = (
+    dynamics, family, parameters, task, signals, *,
+    noise = None, excitation = None, disturbance = None, divergence_factor = 10.0, workers = None
+))]
 #[expect(clippy::too_many_arguments, reason = "what a roll-out needs, named by keyword in Python")]
 pub fn rollout(
     py: Python<'_>,
@@ -88,6 +93,8 @@ pub fn rollout(
     task: &PyTask,
     signals: &PySignals,
     noise: Option<Cube<'_>>,
+    excitation: Option<Cube<'_>>,
+    disturbance: Option<Cube<'_>>,
     divergence_factor: f64,
     workers: Option<&PyWorkers>,
 ) -> PyResult<PyRuns> {
@@ -97,22 +104,27 @@ pub fn rollout(
     if task.0.initial.len() != states {
         return Err(misuse(format!("task: expected {states} states, found {}", task.0.initial.len())).into());
     }
-    let noise = noise_rows(noise, [parameters.len(), steps + 1, states])?;
+    let count = parameters.len();
+    let noise = optional_blocks("noise", noise, [count, steps + 1, states])?;
+    let excitation = optional_blocks("excitation", excitation, [count, steps, commands])?;
+    let disturbance = optional_blocks("disturbance", disturbance, [count, steps, states])?;
     let limits = signals.0.limits(divergence_factor);
     let (parameters, noise) = (views(&parameters), views(&noise));
+    let (excitation, disturbance) = (views(&excitation), views(&disturbance));
+    let influences = Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
     let (family, task, width) = (&*family.0, &task.0, workers.width());
     let runs = if let Ok(model) = dynamics.cast::<PyModel>() {
         let model = model.get();
-        py.detach(|| record(&model.core(), family, &parameters, task, &limits, &noise, width))
+        py.detach(|| record(&model.core(), family, &parameters, task, &limits, influences, width))
     } else if let Ok(plant) = dynamics.cast::<PyQuadrotor>() {
         let plant = plant.get();
-        py.detach(|| record(&plant.0, family, &parameters, task, &limits, &noise, width))
+        py.detach(|| record(&plant.0, family, &parameters, task, &limits, influences, width))
     } else {
         let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
         let mut runs = Vec::new();
         for (i, parameters) in parameters.iter().enumerate() {
-            let noise = noise.get(i..=i).unwrap_or(&[]);
-            runs.extend(record(&step, family, &[parameters], task, &limits, noise, width));
+            let influences = influences.of(&(i..i + 1));
+            runs.extend(record(&step, family, &[parameters], task, &limits, influences, width));
             if let Some(error) = step.failure.take() {
                 return Err(error);
             }
@@ -120,16 +132,6 @@ pub fn rollout(
         runs
     };
     Ok(PyRuns { runs, steps, states, commands })
-}
-
-/// The noise of each run, or none at all.
-fn noise_rows(noise: Option<Cube<'_>>, expected: [usize; 3]) -> Result<Vec<Vec<f64>>> {
-    let Some(noise) = noise else { return Ok(vec![]) };
-    let noise = noise.as_array();
-    if noise.shape() != expected {
-        return Err(misuse(format!("noise: expected shape {expected:?}, found {:?}", noise.shape())));
-    }
-    Ok(noise.outer_iter().map(|run| run.iter().copied().collect()).collect())
 }
 
 /// A step function in Python, called on the thread that asked for the roll-out.

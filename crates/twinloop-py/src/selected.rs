@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use twinloop_core::{Experiment, SelectedTests};
 
-use crate::arrays::{Matrix, Vector, rows, vector};
+use crate::arrays::{Matrix, Vector, optional_rows, rows, vector};
 use crate::controller::PyFamily;
 use crate::error::Result;
 use crate::model::PySignals;
@@ -23,12 +23,14 @@ impl PySelectedTests {
         Ok(Self(Arc::new(selected)))
     }
 
+    #[pyo3(signature = (parameters, target, states, commands, excitation = None))]
     fn with_test(
         &self,
         parameters: Vector<'_>,
         target: Vector<'_>,
         states: Matrix<'_>,
         commands: Matrix<'_>,
+        excitation: Option<Matrix<'_>>,
     ) -> Result<Self> {
         let signals = self.0.signals();
         let experiment = Experiment {
@@ -36,6 +38,7 @@ impl PySelectedTests {
             target: vector(&target),
             states: rows("states", &states, signals.states())?.concat(),
             commands: rows("commands", &commands, signals.commands())?.concat(),
+            excitation: optional_rows("excitation", excitation, signals.commands())?.concat(),
         };
         Ok(Self(Arc::new(self.0.with_test(experiment)?)))
     }

@@ -126,19 +126,23 @@ class Family:
         """
         return dict(zip(self.names, floats("Genes", genes, (self.size,)).tolist(), strict=True))
 
-    def controller(self, genes: ArrayLike) -> Controller:
+    def controller(self, genes: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
         """One controller of the family, reset.
 
         Args:
             genes: (size,), in the units of the gains.
+            excitation: what is added to its commands, a row a period (n, n_u), in the units of the commands;
+                nothing after the last row. None: nothing.
 
         Returns:
             A controller with a memory of its own.
 
         Raises:
-            InvalidInput: another number of genes, or one that is not finite.
+            InvalidInput: another number of genes or columns, or a number that is not finite.
         """
-        return Controller(self, floats("Genes", genes, (self.size,)))
+        if excitation is not None:
+            excitation = floats("Excitation (periods, commands)", excitation, (None, self.signals.n_u))
+        return Controller(self, floats("Genes", genes, (self.size,)), excitation)
 
 
 class Controller:
@@ -147,13 +151,15 @@ class Controller:
     Args:
         family: what it is one of.
         genes: its gains (size,), in their units.
+        excitation: what is added to its commands, a row a period (n, n_u); None: nothing.
     """
 
-    def __init__(self, family: Family, genes: Floats) -> None:
+    def __init__(self, family: Family, genes: Floats, excitation: Floats | None = None) -> None:
         self.family = family
         self.genes = genes
+        self.excitation = excitation
         with engine_input():
-            self._law = family.engine.controller(genes)
+            self._law = family.engine.controller(genes, excitation)
         self.reset()
 
     @property
@@ -162,7 +168,7 @@ class Controller:
         return self.family.parameters(self.genes)
 
     def reset(self) -> None:
-        """Forgets the run so far; call it at the start of every run."""
+        """Forgets the run so far, and starts the excitation again; call it at the start of every run."""
         self._law.reset()
 
     def command(self, state: ArrayLike, target: ArrayLike) -> Floats:
@@ -173,7 +179,7 @@ class Controller:
             target: state to lead to (n_x,), the same units.
 
         Returns:
-            Command (n_u,), within its bounds, in its units.
+            Command (n_u,), the excitation of this period in it, within its bounds, in its units.
 
         Raises:
             InvalidInput: another shape, or a number that is not finite; the memory is unchanged.

@@ -55,9 +55,9 @@ impl Mixer {
         Self::new((0..axes).map(unit).collect(), vec![0.0; axes], 1.0, bounds, axes)
     }
 
-    /// Number of commands, n_u.
-    pub fn commands(&self) -> usize {
-        self.bounds.len()
+    /// Smallest and largest value of each command (n_u).
+    pub fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
     }
 
     /// Writes the commands of the axes' outputs, which stand `stride` apart.
@@ -76,9 +76,7 @@ impl Mixer {
             } else {
                 signed(v, v.abs().map(|v| libm::pow(v, self.power)))
             };
-            // Nothing is less than a NaN, so a NaN stays one and ends the run.
-            let above = raised.select_less(V::splat(low), V::splat(low), raised);
-            command[i] = V::splat(high).select_less(above, V::splat(high), above);
+            command[i] = raised.clamp(low, high);
         }
     }
 }

@@ -36,13 +36,13 @@ enum AnyLaw {
     Pid(Pid),
 }
 
-/// A law, the box of its parameters and the sizes of its signals.
+/// A law, the box of its parameters, and the states and commands that it is for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Family {
     law: AnyLaw,
     parameters: Parameters,
     states: usize,
-    commands: usize,
+    bounds: Vec<(f64, f64)>,
 }
 
 impl Family {
@@ -56,8 +56,8 @@ impl Family {
             ));
         }
         pid.check(states)?;
-        let commands = pid.output.commands();
-        Ok(Self { law: AnyLaw::Pid(pid), parameters, states, commands })
+        let bounds = pid.output.bounds().to_vec();
+        Ok(Self { law: AnyLaw::Pid(pid), parameters, states, bounds })
     }
 
     /// The box of the parameters.
@@ -72,19 +72,27 @@ impl Family {
 
     /// Number of commands that the law writes, n_u.
     pub fn commands(&self) -> usize {
-        self.commands
+        self.bounds.len()
+    }
+
+    /// Adds an excitation (n_u) to what the law commanded (n_u), and clips the sum to the bounds of the commands.
+    #[inline(always)]
+    pub fn excite<V: Vector>(&self, command: &mut [V], excitation: &[V]) {
+        for ((command, excitation), &(low, high)) in command.iter_mut().zip(excitation).zip(&self.bounds) {
+            *command = (*command + *excitation).clamp(low, high);
+        }
     }
 
     /// Refuses signals of another number of states or commands.
     pub(crate) fn check(&self, signals: &Signals) -> Result<()> {
-        if (self.states, self.commands) != (signals.states(), signals.commands()) {
+        if (self.states, self.commands()) != (signals.states(), signals.commands()) {
             return invalid(format!(
                 "controllers: expected controllers of {} states and {} commands, found {} and {}; make the family for \
                  these signals",
                 signals.states(),
                 signals.commands(),
                 self.states,
-                self.commands
+                self.commands()
             ));
         }
         Ok(())

@@ -11,6 +11,10 @@ pub struct Controller {
     family: Arc<Family>,
     parameters: Vec<Scalar>,
     memory: Vec<Scalar>,
+    /// What is added to the commands, n × n_u; nothing after the last row.
+    excitation: Vec<Scalar>,
+    /// Commands given since the start of the run.
+    period: usize,
 }
 
 impl Controller {
@@ -23,7 +27,20 @@ impl Controller {
             ));
         }
         let memory = vec![Scalar::splat(0.0); family.memory()];
-        Ok(Self { parameters: parameters.into_iter().map(Scalar::splat).collect(), memory, family })
+        Ok(Self { parameters: lanes(&parameters), memory, excitation: vec![], period: 0, family })
+    }
+
+    /// The same with an excitation (n × n_u): a row is added to the command of each period, then the bounds clip it.
+    pub fn excited(self, excitation: &[f64]) -> Result<Self> {
+        let commands = self.family.commands();
+        if !excitation.len().is_multiple_of(commands) || !excitation.iter().all(|x| x.is_finite()) {
+            return invalid(format!(
+                "controller: expected an excitation of n × {commands} finite numbers, found {} numbers; give a row \
+                 for each period",
+                excitation.len()
+            ));
+        }
+        Ok(Self { excitation: lanes(excitation), ..self })
     }
 
     /// The parameter vector (size).
@@ -34,6 +51,7 @@ impl Controller {
     /// Back to the start of a run.
     pub fn reset(&mut self) {
         self.memory.fill(Scalar::splat(0.0));
+        self.period = 0;
     }
 
     /// The command (n_u) for a state and a target (n_x); to be called once a period.
@@ -50,10 +68,16 @@ impl Controller {
                 "controller: expected finite states and targets, found NaN or an infinite one; stop the run",
             );
         }
-        let lanes =
-            |values: &[f64]| values.iter().map(|&value| Scalar::splat(value)).collect::<Vec<Scalar>>();
         let mut command = vec![Scalar::splat(0.0); self.family.commands()];
         self.family.command(&self.parameters, &mut self.memory, &lanes(state), &lanes(target), &mut command);
+        if let Some(row) = self.excitation.chunks_exact(command.len()).nth(self.period) {
+            self.family.excite(&mut command, row);
+        }
+        self.period += 1;
         Ok(command.iter().map(|lane| lane.lane(0)).collect())
     }
+}
+
+fn lanes(values: &[f64]) -> Vec<Scalar> {
+    values.iter().map(|&value| Scalar::splat(value)).collect()
 }

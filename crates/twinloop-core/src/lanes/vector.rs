@@ -42,6 +42,14 @@ pub trait Vector:
     /// Whether self < other in any lane.
     fn any_less(self, other: Self) -> bool;
 
+    /// The nearest number from `low` to `high`; nothing is less than a NaN, so a NaN stays one.
+    #[inline(always)]
+    fn clamp(self, low: f64, high: f64) -> Self {
+        let (low, high) = (Self::splat(low), Self::splat(high));
+        let above = self.select_less(low, low, self);
+        high.select_less(above, high, above)
+    }
+
     /// `f` of each lane by itself: for functions that have no vector instruction.
     #[inline(always)]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {
@@ -183,6 +191,7 @@ mod tests {
                 a.abs().sqrt(),
                 a.select_less(b, a, b),
                 a.map(|x| x + 1.0),
+                a.clamp(-1.0, 2.0),
                 W::Of8::splat(f64::from(u8::from(a.any_less(b)))),
             ];
             let to_vec = |v: W::Of8| (0..8).map(|l| v.lane(l)).collect();
@@ -207,6 +216,7 @@ mod tests {
                 zip(|a, _| a.abs().sqrt()),
                 zip(|a, b| if a < b { a } else { b }),
                 zip(|a, _| a + 1.0),
+                zip(|a, _| a.clamp(-1.0, 2.0)),
                 vec![f64::from(u8::from(any)); 8],
             ];
             for width in Width::available() {

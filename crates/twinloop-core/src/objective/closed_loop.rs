@@ -37,6 +37,8 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
             steps: loops.steps.iter().copied().max().unwrap_or(0),
             limits: self.selected.limits(),
             noise: &[],
+            excitation: &vectors::<V>(&loops.excitation),
+            disturbance: &[],
         };
         let steps = (0..V::LANES).map(|l| loops.steps.get(l).map_or(0.0, |&steps| steps as f64));
         let steps = V::load(&steps.collect::<Vec<_>>());

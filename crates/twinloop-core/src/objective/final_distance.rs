@@ -55,6 +55,8 @@ impl<D: Dynamics> OfGroup<'_, D> {
             steps: *steps,
             limits: self.limits,
             noise: &[],
+            excitation: &[],
+            disturbance: &[],
         };
         let mut last = LastStep { steps: *steps, target: &target, squared: V::splat(0.0) };
         let lasted = rollout(self.dynamics, &start, &mut last);

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Frame, Model, Task, Trajectory, Width, Workers, closed_loops, final_distances, open_loops, record,
-    run_rows, step_rows,
+    Code, Frame, Influences, Model, Task, Trajectory, Width, Workers, closed_loops, final_distances,
+    open_loops, record, run_rows, step_rows,
 };
 
 use crate::oracle::{all_same, evaluate};
@@ -69,8 +69,15 @@ proptest! {
         let model = Model { code: &Code::new(&program), frame: &frame };
         let task = Task::new(initial, target, steps).unwrap();
         let limits = world.signals.limits(10.0);
-        let noise: Vec<Vec<f64>> = gains.iter().map(|g| (0..3 * (steps + 1)).map(|i| 0.1 * g[i % 6]).collect()).collect();
-        let runs = |width| record(&model, &world.family, &slices(&gains), &task, &limits, &slices(&noise), width);
+        let rows = |count: usize, factor: f64| -> Vec<Vec<f64>> {
+            gains.iter().map(|g| (0..count).map(|i| factor * g[i % 6]).collect()).collect()
+        };
+        let (noise, excitation, disturbance) =
+            (rows(3 * (steps + 1), 0.1), rows(2 * steps, 0.3), rows(3 * steps, -0.02));
+        let (noise, excitation, disturbance) = (slices(&noise), slices(&excitation), slices(&disturbance));
+        let influences =
+            Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
+        let runs = |width| record(&model, &world.family, &slices(&gains), &task, &limits, influences, width);
         let equal = |a: &[Trajectory], b: &[Trajectory]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same_run(a, b))
         };

@@ -42,7 +42,8 @@ fn selected(count: usize) -> SelectedTests {
         let target = vec![0.4, 0.0, -0.3];
         let steps = 15 + 5 * (i % 3);
         let run = run(step, Pids::new(&world, &gains), [&[0.0; 3], &target], steps, &[1e9; 3], &[]);
-        Experiment { states: run.states.concat(), commands: run.commands.concat(), parameters: gains, target }
+        let (states, commands) = (run.states.concat(), run.commands.concat());
+        Experiment { states, commands, parameters: gains, target, excitation: vec![] }
     };
     world.selected(&(0..count).map(experiment).collect::<Vec<_>>())
 }

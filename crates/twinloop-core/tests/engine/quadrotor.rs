@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Axis, Family, Gyroscopic, Mixer, Parameters, Pid, Quadrotor, Scalar, Task, Trajectory, Vector, Width,
-    record, step_rows,
+    Axis, Family, Gyroscopic, Influences, Mixer, Parameters, Pid, Quadrotor, Scalar, Task, Trajectory,
+    Vector, Width, record, step_rows,
 };
 
 use crate::oracle::rk4;
@@ -38,7 +38,7 @@ fn first_flight(gyroscopic: Gyroscopic) -> Trajectory {
     let target = vec![degrees(-30.0), degrees(30.0), degrees(-70.0), 0.0, 0.0, 0.0];
     let task = Task::new(vec![0.0; 6], target, 100).unwrap();
     let gains = [0.03, 0.004, 0.024, 0.03, 0.004, 0.024, 0.052, 0.004, 0.0416];
-    record(&plant, &family, &[&gains], &task, &[1e9; 6], &[], Width::widest()).remove(0)
+    record(&plant, &family, &[&gains], &task, &[1e9; 6], Influences::default(), Width::widest()).remove(0)
 }
 
 fn final_distance(flight: &Trajectory) -> f64 {

@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Controller, Form, Frame, Model, Program, Task, Trajectory, Width, final_distances, record,
+    Code, Controller, Form, Frame, Influences, Model, Program, Task, Trajectory, Width, final_distances,
+    record,
 };
 
 use crate::oracle::{Pids, all_same, close, run, step};
@@ -44,7 +45,8 @@ impl Setting {
     fn record(&self, gains: &[Vec<f64>], noise: &[Vec<f64>]) -> Vec<Trajectory> {
         let model = Model { code: &self.code, frame: &self.frame };
         let (gains, noise) = (slices(gains), slices(noise));
-        record(&model, &self.world.family, &gains, &self.task, &self.limits, &noise, Width::widest())
+        let influences = Influences { noise: &noise, ..Influences::default() };
+        record(&model, &self.world.family, &gains, &self.task, &self.limits, influences, Width::widest())
     }
 
     fn expected(&self, gains: &[f64], noise: &[f64]) -> crate::oracle::Run {

@@ -12,6 +12,7 @@ fn experiment(steps: usize) -> Experiment {
         target: vec![0.0; STATES],
         states: vec![0.0; (steps + 1) * STATES],
         commands: vec![0.0; steps * COMMANDS],
+        excitation: vec![0.0; steps * COMMANDS],
     }
 }
 
@@ -27,13 +28,16 @@ fn a_further_test_makes_a_new_value() {
 #[test]
 fn recordings_that_do_not_fit_are_refused() {
     type Spoil = fn(&mut Experiment);
-    let table: [(Spoil, &str); 10] = [
+    let table: [(Spoil, &str); 13] = [
         (|e| (e.commands, e.states) = (vec![], vec![0.0; STATES]), "n ≥ 1 steps"),
         (|e| e.commands.truncate(5), "n × 2 commands, found 12 and 5 numbers"),
         (|e| e.states.truncate(11), "found 11 and 6 numbers"),
         (|e| e.states.extend([0.0; STATES]), "found 15 and 6 numbers"),
         (|e| e.parameters.push(0.0), "expected 6 parameters and a target of 3 states, found 7 and 3"),
         (|e| e.target.truncate(2), "found 6 and 2"),
+        (|e| e.excitation.truncate(5), "at least the 3 recorded steps, found 5 numbers"),
+        (|e| e.excitation.truncate(4), "at least the 3 recorded steps, found 4 numbers"),
+        (|e| e.excitation[2] = f64::NAN, "cut the bad samples"),
         (|e| e.states[4] = f64::NAN, "cut the bad samples"),
         (|e| e.commands[1] = f64::INFINITY, "cut the bad samples"),
         (|e| e.target[0] = f64::NAN, "cut the bad samples"),

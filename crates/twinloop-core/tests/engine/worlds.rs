@@ -137,6 +137,7 @@ pub fn experiment(steps: Range<usize>) -> impl Strategy<Value = Experiment> {
             target,
             states,
             commands,
+            excitation: vec![],
         })
     })
 }

@@ -1,0 +1,76 @@
+//! The envelope: what of its room each state uses up.
+
+use crate::error::{Result, invalid};
+use crate::lanes::Vector;
+
+/// Bounds that states may safely move in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Envelope {
+    states: usize,
+    bands: Vec<Band>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Band {
+    state: usize,
+    middle: f64,
+    half_width: f64,
+}
+
+impl Envelope {
+    /// Smallest and largest safe value of each state; none where any will do.
+    pub fn new(bounds: &[Option<(f64, f64)>]) -> Result<Self> {
+        let mut bands = Vec::new();
+        for (state, bounds) in bounds.iter().enumerate() {
+            let Some((low, high)) = *bounds else { continue };
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                return invalid(format!(
+                    "envelope of state {state}: expected finite low < high, found {low} and {high}; widen it"
+                ));
+            }
+            bands.push(Band { state, middle: 0.5 * (low + high), half_width: 0.5 * (high - low) });
+        }
+        Ok(Self { states: bounds.len(), bands })
+    }
+
+    /// Number of states, with an envelope or without.
+    pub fn states(&self) -> usize {
+        self.states
+    }
+
+    /// How far flights got that start at a state (n_x).
+    #[inline(always)]
+    pub(super) fn reach<V: Vector>(&self, initial: &[V]) -> Reach<'_, V> {
+        let mut reach = Reach { bands: &self.bands, farthest: vec![V::splat(0.0); self.bands.len()] };
+        reach.see(initial);
+        reach
+    }
+}
+
+/// How far from the middle of its envelope each state that has one ever was.
+pub(super) struct Reach<'a, V> {
+    bands: &'a [Band],
+    farthest: Vec<V>,
+}
+
+impl<V: Vector> Reach<'_, V> {
+    /// Looks at a state (n_x).
+    #[inline(always)]
+    pub(super) fn see(&mut self, state: &[V]) {
+        for (farthest, band) in self.farthest.iter_mut().zip(self.bands) {
+            let distance = (state[band.state] - V::splat(band.middle)).abs();
+            *farthest = farthest.select_less(distance, distance, *farthest);
+        }
+    }
+
+    /// The largest share of an envelope that was used: 0 in the middle, 1 at a bound.
+    #[inline(always)]
+    pub(super) fn usage(&self) -> V {
+        let mut most = V::splat(0.0);
+        for (farthest, band) in self.farthest.iter().zip(self.bands) {
+            let used = *farthest / band.half_width;
+            most = most.select_less(used, used, most);
+        }
+        most
+    }
+}

@@ -1,0 +1,171 @@
+//! Flights: candidates that differ in gains, start, target and excitation, flown side by side and judged on a committee.
+
+mod disagreement;
+mod envelope;
+mod log_determinant;
+mod qualities;
+mod quality;
+
+pub use disagreement::{Disagreement, disagreements};
+pub use envelope::Envelope;
+pub use qualities::{Draws, Judged, qualities};
+pub use quality::{Quality, QualityKind};
+
+use std::sync::Arc;
+
+use crate::controller::Family;
+use crate::error::{Result, invalid};
+use crate::lanes::{Vector, groups, interleave, lanes_for, vectors};
+use crate::rollout::Start;
+use crate::signals::Signals;
+use crate::task::Task;
+
+/// One flight that could be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Parameters of the controller (size).
+    pub parameters: Vec<f64>,
+    /// First state (n_x).
+    pub initial: Vec<f64>,
+    /// State to lead to (n_x).
+    pub target: Vec<f64>,
+    /// What is added to the commands before they are clipped, n × n_u; empty for nothing.
+    pub excitation: Vec<f64>,
+}
+
+/// Candidates of one length, laid out for lanes.
+#[derive(Clone, Debug)]
+pub struct Flights {
+    signals: Arc<Signals>,
+    family: Arc<Family>,
+    steps: usize,
+    limits: Vec<f64>,
+    groups: Vec<Group>,
+}
+
+impl Flights {
+    /// Candidates that fly `steps` steps each, all with an excitation or none of them. A flight that leaves
+    /// `divergence_factor` times the scale of a state counts as diverged.
+    pub fn new(
+        signals: Arc<Signals>,
+        family: Arc<Family>,
+        candidates: &[Candidate],
+        steps: usize,
+        divergence_factor: f64,
+    ) -> Result<Self> {
+        family.check(&signals)?;
+        if candidates.is_empty() || !(1..=Task::MOST_STEPS).contains(&steps) {
+            return invalid(format!(
+                "flights: expected at least one candidate of 1 to {} steps, found {} of {steps}",
+                Task::MOST_STEPS,
+                candidates.len()
+            ));
+        }
+        if !(divergence_factor.is_finite() && divergence_factor > 0.0) {
+            return invalid(format!(
+                "divergence factor: expected a number above 0, found {divergence_factor}"
+            ));
+        }
+        let excitation = if candidates[0].excitation.is_empty() { 0 } else { steps * signals.commands() };
+        let lengths = [family.parameters().len(), signals.states(), signals.states(), excitation];
+        for (i, Candidate { parameters, initial, target, excitation }) in candidates.iter().enumerate() {
+            let parts = [parameters, initial, target, excitation];
+            let found = parts.map(Vec::len);
+            if found != lengths || !parts.into_iter().flatten().all(|x| x.is_finite()) {
+                return invalid(format!(
+                    "flight {i}: expected finite numbers, {lengths:?} of them as parameters, start, target and \
+                     excitation, found {found:?}"
+                ));
+            }
+        }
+        let limits = signals.limits(divergence_factor);
+        let groups =
+            groups(candidates.len()).into_iter().map(|group| Group::new(&candidates[group])).collect();
+        Ok(Self { signals, family, steps, limits, groups })
+    }
+
+    /// Number of candidates, K.
+    pub fn len(&self) -> usize {
+        self.groups.iter().map(|group| group.candidates).sum()
+    }
+
+    /// Never: there is at least one candidate.
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// Steps of each, n.
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// The signals of the system.
+    pub fn signals(&self) -> &Arc<Signals> {
+        &self.signals
+    }
+
+    /// What a roll-out of a group starts from.
+    #[inline(always)]
+    fn start<'a, V: Vector>(&'a self, lanes: &'a GroupLanes<V>, noise: &'a [V]) -> Start<'a, V> {
+        Start {
+            family: &self.family,
+            parameters: &lanes.parameters,
+            initial: &lanes.initial,
+            target: &lanes.target,
+            steps: self.steps,
+            limits: &self.limits,
+            noise,
+            excitation: &lanes.excitation,
+            disturbance: &[],
+        }
+    }
+}
+
+/// Neighbouring candidates, one a lane.
+#[derive(Clone, Debug)]
+struct Group {
+    /// Candidates in the group; further lanes repeat the last.
+    candidates: usize,
+    /// size × lanes
+    parameters: Vec<f64>,
+    /// n_x × lanes
+    initial: Vec<f64>,
+    /// n_x × lanes
+    target: Vec<f64>,
+    /// n × n_u × lanes, or empty.
+    excitation: Vec<f64>,
+}
+
+impl Group {
+    fn new(candidates: &[Candidate]) -> Self {
+        let lanes = lanes_for(candidates.len());
+        let part = |of: fn(&Candidate) -> &Vec<f64>| {
+            interleave(&candidates.iter().map(of).collect::<Vec<_>>(), lanes)
+        };
+        Self {
+            candidates: candidates.len(),
+            parameters: part(|candidate| &candidate.parameters),
+            initial: part(|candidate| &candidate.initial),
+            target: part(|candidate| &candidate.target),
+            excitation: part(|candidate| &candidate.excitation),
+        }
+    }
+
+    #[inline(always)]
+    fn lanes<V: Vector>(&self) -> GroupLanes<V> {
+        GroupLanes {
+            parameters: vectors(&self.parameters),
+            initial: vectors(&self.initial),
+            target: vectors(&self.target),
+            excitation: vectors(&self.excitation),
+        }
+    }
+}
+
+/// A group as vectors.
+struct GroupLanes<V> {
+    parameters: Vec<V>,
+    initial: Vec<V>,
+    target: Vec<V>,
+    excitation: Vec<V>,
+}

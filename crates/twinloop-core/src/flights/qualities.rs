@@ -1,0 +1,146 @@
+//! Qualities: how well every candidate flies on every member of a committee, under every draw of noise.
+
+use super::envelope::{Envelope, Reach};
+use super::quality::{Quality, Tally};
+use super::{Flights, Group};
+use crate::dynamics::Dynamics;
+use crate::error::{Result, invalid};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, with_lanes};
+use crate::rollout::{Seen, Watch, rollout};
+use crate::workers::Workers;
+
+/// Common random numbers: each draw is the same for all candidates and members, so that they differ by what they are.
+#[derive(Clone, Copy, Default)]
+pub struct Draws<'a> {
+    /// What the sensors add to the state, (n + 1) × n_x a draw; empty for perfect sensors.
+    pub noise: &'a [&'a [f64]],
+    /// What is added to the initial states, n_x a draw; empty for nothing.
+    pub offsets: &'a [&'a [f64]],
+}
+
+impl Draws<'_> {
+    /// Flights of each candidate on each member: one without noise where there are no draws.
+    pub fn count(&self) -> usize {
+        self.noise.len().max(self.offsets.len()).max(1)
+    }
+
+    fn check(&self, flights: &Flights) -> Result<()> {
+        let (n, n_x) = (flights.steps(), flights.signals().states());
+        let (count, noise) = (self.count(), (n + 1) * n_x);
+        let fits = |rows: &[&[f64]], length: usize| {
+            (rows.is_empty() || rows.len() == count)
+                && rows.iter().all(|row| row.len() == length && row.iter().all(|x| x.is_finite()))
+        };
+        if !fits(self.noise, noise) || !fits(self.offsets, n_x) {
+            return invalid(format!(
+                "draws: expected none or {count} of noise, {noise} finite numbers each, and none or as many of \
+                 offsets, {n_x} each, found {} and {}",
+                self.noise.len(),
+                self.offsets.len()
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// What a flight is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judged {
+    /// Its quality, to be minimised; infinite if it diverged.
+    pub quality: f64,
+    /// The most that a true state, the first one included, used of its envelope: 1 at a bound; infinite if it diverged.
+    pub usage: f64,
+}
+
+/// Every flight (members × draws × candidates, the last fastest).
+pub fn qualities<D: Dynamics + Sync>(
+    dynamics: &[D],
+    flights: &Flights,
+    quality: &Quality,
+    envelope: &Envelope,
+    draws: Draws<'_>,
+    workers: &Workers,
+) -> Result<Vec<Judged>> {
+    let n_x = flights.signals().states();
+    if quality.weights.len() != n_x || envelope.states() != n_x {
+        let (weights, bounds) = (quality.weights.len(), envelope.states());
+        return invalid(format!(
+            "qualities: expected weights and an envelope of {n_x} states, found {weights} and {bounds}"
+        ));
+    }
+    draws.check(flights)?;
+    let (groups, count) = (flights.groups.len(), draws.count());
+    let judged = workers.map(dynamics.len() * count * groups, |unit| {
+        let (draw, group) = (unit / groups % count, &flights.groups[unit % groups]);
+        let dynamics = &dynamics[unit / groups / count];
+        let row = |rows: &[&'_ [f64]]| rows.get(draw).map_or(vec![], |row| row.to_vec());
+        let (noise, offset) = (row(draws.noise), row(draws.offsets));
+        let of_group =
+            OfGroup { dynamics, flights, group, quality, envelope, noise: &noise, offset: &offset };
+        dispatch(workers.width(), of_group)
+    });
+    Ok(judged.concat())
+}
+
+struct OfGroup<'a, D> {
+    dynamics: &'a D,
+    flights: &'a Flights,
+    group: &'a Group,
+    quality: &'a Quality,
+    envelope: &'a Envelope,
+    /// (n + 1) × n_x, or empty.
+    noise: &'a [f64],
+    /// n_x, or empty.
+    offset: &'a [f64],
+}
+
+impl<D: Dynamics> Kernel for OfGroup<'_, D> {
+    type Output = Vec<Judged>;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Vec<Judged> {
+        with_lanes!(W, self.group.candidates, self.lanes())
+    }
+}
+
+impl<D: Dynamics> OfGroup<'_, D> {
+    #[inline(always)]
+    fn lanes<V: Vector>(&self) -> Vec<Judged> {
+        let mut lanes = self.group.lanes::<V>();
+        for (initial, &offset) in lanes.initial.iter_mut().zip(self.offset) {
+            *initial = *initial + V::splat(offset);
+        }
+        let mut noise = vec![V::splat(0.0); self.noise.len()];
+        for (lanes, &noise) in noise.iter_mut().zip(self.noise) {
+            *lanes = V::splat(noise);
+        }
+        let mut judge = Judge {
+            tally: self.quality.tally(self.flights.signals(), &lanes.target),
+            reach: self.envelope.reach(&lanes.initial),
+        };
+        let lasted = rollout(self.dynamics, &self.flights.start(&lanes, &noise), &mut judge);
+        let (quality, usage) = (judge.tally.total(), judge.reach.usage());
+        let of_lane = |l: usize| {
+            if lasted[l] < self.flights.steps {
+                Judged { quality: f64::INFINITY, usage: f64::INFINITY }
+            } else {
+                Judged { quality: quality.lane(l), usage: usage.lane(l) }
+            }
+        };
+        (0..self.group.candidates).map(of_lane).collect()
+    }
+}
+
+/// Tallies the quality and follows the envelope.
+struct Judge<'a, V> {
+    tally: Tally<'a, V>,
+    reach: Reach<'a, V>,
+}
+
+impl<V: Vector> Watch<V> for Judge<'_, V> {
+    #[inline(always)]
+    fn see(&mut self, seen: Seen<'_, V>) {
+        self.tally.add(seen.step, seen.command, seen.next);
+        self.reach.see(seen.next);
+    }
+}

@@ -1,0 +1,183 @@
+//! Flights, and how committees judge them.
+
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use twinloop_core::{
+    Candidate, Disagreement, Draws, Envelope, Flights, Model, Quality, disagreements as core_disagreements,
+    qualities as core_qualities,
+};
+
+use crate::arrays::{
+    Cube, Matrix, Vector, optional_blocks, optional_rows, rows, to_cube, to_integer_rows, to_vector, vector,
+    views,
+};
+use crate::controller::PyFamily;
+use crate::error::{Result, misuse};
+use crate::model::{PyModel, PySignals};
+use crate::plant::PyQuadrotor;
+use crate::workers::{PyWorkers, or_default};
+
+/// Candidate flights of one length, each with its own gains, start, target and excitation.
+#[pyclass(frozen, name = "Flights", module = "twinloop._core")]
+pub struct PyFlights(Flights);
+
+#[pymethods]
+impl PyFlights {
+    #[new]
+    #[pyo3(signature = (
+        signals, family, parameters, initial_states, target_states, steps, *,
+        excitation = None, divergence_factor = 10.0
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "what flights differ by, named by keyword in Python")]
+    fn new(
+        signals: &PySignals,
+        family: &PyFamily,
+        parameters: Matrix<'_>,
+        initial_states: Matrix<'_>,
+        target_states: Matrix<'_>,
+        steps: usize,
+        excitation: Option<Cube<'_>>,
+        divergence_factor: f64,
+    ) -> Result<Self> {
+        let (n_x, n_u) = (signals.0.states(), signals.0.commands());
+        let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
+        let initial = rows("initial states", &initial_states, n_x)?;
+        let target = rows("target states", &target_states, n_x)?;
+        let count = parameters.len();
+        if initial.len() != count || target.len() != count {
+            return Err(misuse(format!(
+                "flights: expected as many initial and target states as parameters, found {}, {} and {count}",
+                initial.len(),
+                target.len()
+            )));
+        }
+        let excitation = optional_blocks("excitation", excitation, [count, steps, n_u])?;
+        let excitation = excitation.into_iter().chain(std::iter::repeat(vec![]));
+        let candidates: Vec<_> = parameters
+            .into_iter()
+            .zip(initial)
+            .zip(target)
+            .zip(excitation)
+            .map(|(((parameters, initial), target), excitation)| Candidate {
+                parameters,
+                initial,
+                target,
+                excitation,
+            })
+            .collect();
+        let (signals, family) = (signals.0.clone(), family.0.clone());
+        Ok(Self(Flights::new(signals, family, &candidates, steps, divergence_factor)?))
+    }
+
+    #[getter]
+    fn steps(&self) -> usize {
+        self.0.steps()
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// What a flight is judged by.
+#[pyclass(frozen, name = "Quality", module = "twinloop._core")]
+pub struct PyQuality(Quality);
+
+#[pymethods]
+impl PyQuality {
+    #[new]
+    #[pyo3(signature = (kind, weights, *, effort = 0.0, effort_rate = 0.0))]
+    fn new(kind: &str, weights: Vector<'_>, effort: f64, effort_rate: f64) -> Result<Self> {
+        let quality = Quality { kind: kind.parse()?, weights: vector(&weights), effort, effort_rate };
+        Ok(Self(quality.validated()?))
+    }
+
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.0.kind.name()
+    }
+}
+
+/// What flights are flown on: members of a committee, or the truth.
+#[derive(FromPyObject)]
+pub enum Members<'py> {
+    Plant(Bound<'py, PyQuadrotor>),
+    Models(Vec<Bound<'py, PyModel>>),
+}
+
+/// Quality and usage of the envelope of every flight (members, draws, K).
+#[pyfunction]
+#[pyo3(signature = (dynamics, flights, quality, envelope, *, noise = None, offsets = None, workers = None))]
+#[expect(clippy::too_many_arguments, reason = "what a judgement needs, named by keyword in Python")]
+#[expect(clippy::type_complexity, reason = "two arrays")]
+pub fn qualities<'py>(
+    py: Python<'py>,
+    dynamics: Members<'py>,
+    flights: &PyFlights,
+    quality: &PyQuality,
+    envelope: Vec<Option<(f64, f64)>>,
+    noise: Option<Cube<'py>>,
+    offsets: Option<Matrix<'py>>,
+    workers: Option<&PyWorkers>,
+) -> Result<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
+    let workers = or_default(workers)?;
+    let (flights, quality, envelope) = (&flights.0, &quality.0, Envelope::new(&envelope)?);
+    let n_x = flights.signals().states();
+    let draws = noise.as_ref().map_or(0, |noise| noise.as_array().shape()[0]);
+    let noise = optional_blocks("noise", noise, [draws, flights.steps() + 1, n_x])?;
+    let offsets = optional_rows("offsets", offsets, n_x)?;
+    let (noise, offsets) = (views(&noise), views(&offsets));
+    let draws = Draws { noise: &noise, offsets: &offsets };
+    let (members, judged) = match dynamics {
+        Members::Plant(plant) => {
+            let plant = plant.get();
+            if (n_x, flights.signals().commands()) != (6, 4) || flights.signals().dt != plant.0.dt {
+                return Err(misuse(
+                    "expected flights with the states, commands and period of the plant".into(),
+                ));
+            }
+            let plant = std::slice::from_ref(&plant.0);
+            (1, py.detach(|| core_qualities(plant, flights, quality, &envelope, draws, &workers))?)
+        }
+        Members::Models(models) => {
+            let models = fitting(&models, flights)?;
+            let judged =
+                py.detach(|| core_qualities(&models, flights, quality, &envelope, draws, &workers))?;
+            (models.len(), judged)
+        }
+    };
+    let shape = [members, draws.count(), flights.len()];
+    let qualities = to_cube(py, shape, judged.iter().map(|judged| judged.quality).collect());
+    Ok((qualities, to_cube(py, shape, judged.iter().map(|judged| judged.usage).collect())))
+}
+
+/// Disagreement on each flight (K,), and where it is greatest (K, 4).
+#[pyfunction]
+#[pyo3(signature = (models, flights, sds, *, cap = 100.0, workers = None))]
+#[expect(clippy::type_complexity, reason = "two arrays")]
+pub fn disagreements<'py>(
+    py: Python<'py>,
+    models: Vec<Bound<'py, PyModel>>,
+    flights: &PyFlights,
+    sds: Vector<'py>,
+    cap: f64,
+    workers: Option<&PyWorkers>,
+) -> Result<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<i64>>)> {
+    let (workers, flights, sds) = (or_default(workers)?, &flights.0, vector(&sds));
+    let models = fitting(&models, flights)?;
+    let found = py.detach(|| core_disagreements(&models, flights, &sds, cap, &workers))?;
+    let place = |d: &Disagreement| [d.step, d.state, d.highest, d.lowest];
+    let values = found.iter().map(|disagreement| disagreement.value).collect();
+    Ok((to_vector(py, values), to_integer_rows(py, found.iter().map(place).collect())))
+}
+
+/// The engine's view of models that are for the signals of the flights.
+fn fitting<'a>(models: &'a [Bound<'_, PyModel>], flights: &Flights) -> Result<Vec<Model<'a>>> {
+    let models: Vec<_> = models.iter().map(|model| model.get().core()).collect();
+    if models.is_empty() || models.iter().any(|model| !model.frame.fits(flights.signals())) {
+        return Err(misuse(
+            "expected at least one model, all with the states and commands of the flights".into(),
+        ));
+    }
+    Ok(models)
+}

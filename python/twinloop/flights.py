@@ -1,0 +1,155 @@
+"""Candidate flights, judged on a committee or on the truth: how well they go, how much they would tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats, Integers, floats
+from twinloop.controllers import Family
+from twinloop.errors import engine_input
+from twinloop.signals import Signals
+
+
+def candidates(
+    family: Family,
+    genes: ArrayLike,
+    initial_states: ArrayLike,
+    target_states: ArrayLike,
+    steps: int,
+    *,
+    excitation: ArrayLike | None = None,
+    divergence_factor: float = 10.0,
+) -> _core.Flights:
+    """K flights of one length, laid out for the engine once and judged as often as needed.
+
+    Args:
+        family: of the controllers.
+        genes: gains (K, size), in their units.
+        initial_states: where each starts (K, n_x), or where all start (n_x,), SI units, radians.
+        target_states: where each should end (K, n_x), or all (n_x,), the same units.
+        steps: number of commands of each, n.
+        excitation: what is added to the commands of each (K, n, n_u), in their units; None: nothing.
+        divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
+
+    Returns:
+        The engine's flights.
+
+    Raises:
+        InvalidInput: shapes that do not fit, or numbers that are not finite.
+    """
+    n_x = family.signals.n_x
+    rows = floats("Flights, genes (candidates, gains)", genes, (None, family.size))
+    with engine_input():
+        return _core.Flights(
+            family.signals.engine,
+            family.engine,
+            rows,
+            _states("Flights, initial states", initial_states, len(rows), n_x),
+            _states("Flights, target states", target_states, len(rows), n_x),
+            steps,
+            excitation=excitation,
+            divergence_factor=divergence_factor,
+        )
+
+
+def quality(kind: str, weights: ArrayLike, *, effort: float = 0.0, effort_rate: float = 0.0) -> _core.Quality:
+    """What a flight is judged by, to be minimised: the error that is left, plus what commands cost.
+
+    Args:
+        kind: "iae", Σ_k dt Σ_i w_i |x_i(k + 1) − target_i|; "ise", the same with squares;
+            "final_distance", √(Σ_i w_i (x_i(n) − target_i)²).
+        weights: how much each state counts, w (n_x,), at least 0.
+        effort: factor of Σ_k dt Σ_j (u_j / scale_j)², at least 0.
+        effort_rate: factor of Σ_k Σ_j ((u_j(k) − u_j(k − 1)) / scale_j)² / dt from the second command on.
+
+    Returns:
+        The engine's quality.
+
+    Raises:
+        InvalidInput: an unknown kind, or numbers that are negative or not finite.
+    """
+    with engine_input():
+        return _core.Quality(kind, weights, effort=effort, effort_rate=effort_rate)
+
+
+def qualities(
+    dynamics: Sequence[_core.Model] | _core.Quadrotor,
+    flights: _core.Flights,
+    measure: _core.Quality,
+    signals: Signals,
+    *,
+    noise: ArrayLike | None = None,
+    offsets: ArrayLike | None = None,
+    workers: _core.Workers | None = None,
+) -> tuple[Floats, Floats]:
+    """Flies every candidate on every member, under every draw of noise.
+
+    The draws are the same for all candidates and members: common random numbers.
+
+    Args:
+        dynamics: m members of a committee; or a built-in plant, for oracles (m = 1).
+        flights: K candidates.
+        measure: what they are judged by.
+        signals: of the system, with its envelope.
+        noise: D draws of what the sensors add to each state (D, n + 1, n_x), in the units of the states;
+            None: perfect sensors.
+        offsets: D draws of what is added to the initial state (D, n_x); None: nothing.
+        workers: how the work is carried out; one thread by default.
+
+    Returns:
+        Qualities (m, max(D, 1), K), and usages of the envelope in the same shape: the largest
+        |x − middle| / half-width over the true states, the first included, that have an envelope, 0 if none
+        has; both infinite where the flight diverged.
+
+    Raises:
+        InvalidInput: members, weights or draws that do not fit the flights.
+    """
+    envelope = [state.envelope for state in signals.states]
+    with engine_input():
+        return _core.qualities(
+            dynamics, flights, measure, envelope, noise=noise, offsets=offsets, workers=workers
+        )
+
+
+def disagreements(
+    models: Sequence[_core.Model],
+    flights: _core.Flights,
+    sds: ArrayLike,
+    *,
+    cap: float = 100.0,
+    workers: _core.Workers | None = None,
+) -> tuple[Floats, Integers]:
+    """How far apart the members of a committee predict each flight, and where most.
+
+    The value is log det(I + D Dᵀ): row m of D is member m's noise-free trajectory minus the members' mean,
+    each entry divided by the sd of its state and winsorised. It is summed over all steps and states and not
+    divided by their number: where readings carry independent noise of these sds, it grows with what a flight
+    tells about which member is right. A member that diverges stays where it last was within the limits.
+
+    Args:
+        models: m members.
+        flights: K candidates.
+        sds: what counts as a difference in each state (n_x,), such as the sensors' noise, in its unit.
+        cap: sds that a deviation from the mean counts at most.
+        workers: how the work is carried out; one thread by default.
+
+    Returns:
+        Values (K,), to be maximised, 0 where all agree; and (K, 4): row of the states from 1 to n and state
+        where two members are the most sds apart, the member that predicts the largest value there and the one
+        that predicts the smallest; zeros where no two ever differ.
+
+    Raises:
+        InvalidInput: no models, models for other signals, or sds that are not above 0.
+    """
+    with engine_input():
+        return _core.disagreements(models, flights, sds, cap=cap, workers=workers)
+
+
+def _states(what: str, states: ArrayLike, count: int, n_x: int) -> Floats:
+    if np.ndim(states) == 1:
+        return np.tile(floats(what, states, (n_x,)), (count, 1))
+    return floats(what, states, (count, n_x))
