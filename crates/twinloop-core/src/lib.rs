@@ -23,7 +23,7 @@ mod test_loop;
 mod trajectory;
 mod workers;
 
-pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid};
+pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid, StateFeedback};
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};
 pub use evolution::{Problem, Search, Variation};

@@ -4,11 +4,13 @@ mod mixer;
 mod parameters;
 mod pid;
 mod single;
+mod state_feedback;
 
 pub use mixer::Mixer;
 pub use parameters::Parameters;
 pub use pid::{Axis, Pid};
 pub use single::Controller;
+pub use state_feedback::StateFeedback;
 
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
@@ -34,6 +36,7 @@ pub trait Law {
 #[derive(Clone, Debug, PartialEq)]
 enum AnyLaw {
     Pid(Pid),
+    StateFeedback(StateFeedback),
 }
 
 /// A law, the box of its parameters and the sizes of its signals.
@@ -58,6 +61,20 @@ impl Family {
         pid.check(states)?;
         let commands = pid.output.commands();
         Ok(Self { law: AnyLaw::Pid(pid), parameters, states, commands })
+    }
+
+    /// The family of the controllers of one [`StateFeedback`].
+    pub fn state_feedback(feedback: StateFeedback, parameters: Parameters, states: usize) -> Result<Self> {
+        feedback.check(states)?;
+        let expected = feedback.gains();
+        if parameters.len() != expected {
+            return invalid(format!(
+                "controller: expected bounds for {expected} gains (each output's states and integrals), found {}",
+                parameters.len()
+            ));
+        }
+        let commands = feedback.output.commands();
+        Ok(Self { law: AnyLaw::StateFeedback(feedback), parameters, states, commands })
     }
 
     /// The box of the parameters.
@@ -95,6 +112,7 @@ impl Law for Family {
     fn memory(&self) -> usize {
         match &self.law {
             AnyLaw::Pid(pid) => pid.memory(),
+            AnyLaw::StateFeedback(feedback) => feedback.memory(),
         }
     }
 
@@ -109,6 +127,7 @@ impl Law for Family {
     ) {
         match &self.law {
             AnyLaw::Pid(pid) => pid.command(parameters, memory, state, target, command),
+            AnyLaw::StateFeedback(feedback) => feedback.command(parameters, memory, state, target, command),
         }
     }
 }
