@@ -10,8 +10,11 @@ from scipy.integrate import solve_ivp
 
 import twinloop as tl
 from oracles import Pid, quadrotor_derivative, same_bits
+from twinloop.contracts import check_system
 from twinloop.flight import fly
 from twinloop.objectives import frozen_error
+from twinloop.systems.gusts import as_disturbance, gust_accelerations
+from twinloop.systems.sensors import run_stream
 from twinloop.test import final_distance
 
 SIGN = {"physical": 1.0, "print": -1.0}
@@ -177,3 +180,101 @@ def test_a_gust_moves_the_true_state(quadrotor, first_test):
     assert same_bits(calm.states[:61], gusty.states[:61])
     assert same_bits(gusty.true_states[61], calm.states[61] + gusts[60])
     assert not same_bits(calm.commands[61], gusty.commands[61])
+
+
+# Rough air, slow motors
+
+
+def lagging(x, speeds, drag, motor_lag):
+    """Slope of the six states and the four rotor speeds."""
+    slope = quadrotor_derivative(x[:6], x[6:])
+    slope[3:] -= np.asarray(drag) * np.abs(x[3:6]) * x[3:6] / INERTIA
+    return np.concatenate([slope, (speeds - x[6:]) / motor_lag])
+
+
+@pytest.mark.parametrize(("drag", "motor_lag"), [(0.05, 0.03), ((0.01, 0.02, 0.03), 0.1), (0.0, 0.05)])
+def test_a_flight_with_drag_and_lag_is_what_scipy_integrates(first_test, drag, motor_lag):
+    system = tl.systems.Quadrotor(drag=drag, motor_lag=motor_lag)
+    flight = system.run(first_test)
+    x = np.concatenate([np.zeros(6), np.full(4, system.hover_speed)])
+    for speeds, after in zip(flight.commands, flight.states[1:], strict=True):
+        x = solve_ivp(
+            lambda _, x, w=speeds: lagging(x, w, drag, motor_lag),
+            (0.0, 0.02), x, rtol=1e-10, atol=1e-12,
+        ).y[:, -1]  # fmt: skip
+        np.testing.assert_allclose(after, x[:6], rtol=0.0, atol=1e-4)
+
+
+@given(states, speeds)
+def test_drag_alone_brakes_each_rate_by_its_square(state, speeds):
+    drag = np.array([0.01, 0.02, 0.03])
+    plant = tl.systems.Quadrotor(drag=drag.tolist()).dynamics
+    expected = quadrotor_derivative(state, speeds)
+    expected[3:] -= drag * np.abs(state[3:]) * state[3:] / INERTIA
+    np.testing.assert_allclose(plant.derivative(state, speeds), expected, rtol=1e-10, atol=1e-10)
+
+
+def test_a_lag_that_is_nearly_none_is_none(quadrotor, first_test):
+    quick = tl.systems.Quadrotor(motor_lag=1e-5).run(first_test)
+    np.testing.assert_allclose(quick.states, quadrotor.run(first_test).states, atol=0.02)
+    slow = tl.systems.Quadrotor(motor_lag=0.03).run(first_test)
+    assert np.abs(slow.states - quadrotor.run(first_test).states).max() > 0.02
+
+
+def test_every_flight_starts_with_its_rotors_at_hover(first_test):
+    system = tl.systems.Quadrotor(motor_lag=0.1)
+    assert same_bits(system.run(first_test).states, system.run(first_test).states)
+
+
+def test_gusts_are_what_an_ornstein_uhlenbeck_process_is():
+    draws = gust_accelerations(np.random.default_rng(0), 200_000, 0.5, 0.02)
+    np.testing.assert_allclose(draws.std(axis=0), 0.5, rtol=0.03)
+    for lag in (1, 10, 20):
+        correlation = (draws[lag:] * draws[:-lag]).mean(axis=0) / 0.25
+        np.testing.assert_allclose(correlation, np.exp(-lag * 0.02 / 0.2), atol=0.04)
+    first = [gust_accelerations(np.random.default_rng(i), 1, 0.5, 0.02)[0, 0] for i in range(2000)]
+    assert np.std(first) == pytest.approx(0.5, rel=0.05)
+
+
+def test_a_gust_moves_rates_and_angles_as_a_held_acceleration_does():
+    added = as_disturbance(np.array([[1.0, 2.0, -3.0]]), 0.02)
+    np.testing.assert_allclose(added, [[2e-4, 4e-4, -6e-4, 0.02, 0.04, -0.06]], rtol=1e-14)
+
+
+def test_gusts_are_added_to_the_true_states(first_test):
+    system = tl.systems.Quadrotor(gusts=0.5, seed=3)
+    flight = system.run(first_test)
+    still = system.dynamics.step(flight.true_states[:-1], flight.commands)
+    expected = as_disturbance(gust_accelerations(run_stream(3, 0, 1), 100, 0.5, 0.02), 0.02)
+    np.testing.assert_allclose(flight.true_states[1:] - still, expected, atol=1e-13)
+
+
+def test_gusts_leave_the_sensors_noise_as_it_is(first_test):
+    def noise(gusts):
+        flight = tl.systems.Quadrotor(noise=1e-3, seed=2, gusts=gusts).run(first_test)
+        return flight.states - flight.true_states
+
+    np.testing.assert_allclose(noise(0.0), noise(0.5), atol=1e-13)
+
+
+def test_the_harsh_quadrotor_flies_and_keeps_to_the_contract(first_test):
+    system = tl.systems.Quadrotor.harsh(noise=2e-3, seed=5)
+    assert system.drag.tolist() == [0.05] * 3 and (system.motor_lag, system.gusts) == (0.03, 0.5)
+    check_system(system)
+    flight = system.run(first_test)
+    again = tl.systems.Quadrotor.harsh(noise=2e-3, seed=5)
+    again.run(first_test), again.run(first_test)
+    assert flight.ended == "completed" and same_bits(again.run(first_test).states, flight.states)
+
+
+@pytest.mark.parametrize("name", ["drag", "motor_lag", "gusts", "noise", "rotor_inertia"])
+def test_what_cannot_be_negative_is_refused(name):
+    with pytest.raises(tl.InvalidInput, match=rf"{name}.*expected at least 0"):
+        tl.systems.Quadrotor(**{name: -1e-3})
+
+
+def test_drag_is_one_number_or_three():
+    with pytest.raises(tl.InvalidInput, match=r"drag.*expected the shape \(3,\)"):
+        tl.systems.Quadrotor(drag=[0.1, 0.2])
+    with pytest.raises(tl.InvalidInput, match="drag"):
+        tl.systems.Quadrotor(drag="much")

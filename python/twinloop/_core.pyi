@@ -152,9 +152,14 @@ class Quadrotor:
         thrust_factor: float,
         drag_factor: float,
         gyroscopic: str,
+        drag: Sequence[float] = ...,
+        motor_lag: float = 0.0,
+        hover_speed: float = 0.0,
     ) -> Quadrotor: ...
-    def derivative(self, state: ArrayLike, command: ArrayLike) -> _Floats: ...
-    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats: ...
+    def derivative(self, state: ArrayLike, command: ArrayLike) -> _Floats:
+        """Rates and accelerations (6,) of a state (6,), with the rotors turning as commanded (4,)."""
+    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats:
+        """States (rows, 6) after the first period of a run; lagging rotors start at hover speed."""
 
 @final
 class Family:
@@ -172,6 +177,20 @@ class Family:
         power: float,
     ) -> Family:
         """One PID an axis (angle, rate or None); genes (K_P, K_I, K_D) per axis; matrix (n_u, axes)."""
+    @staticmethod
+    def state_feedback(
+        signals: Signals,
+        states: Sequence[int],
+        integrals: Sequence[int],
+        outputs: int,
+        low: ArrayLike,
+        high: ArrayLike,
+        logarithmic: Sequence[bool],
+        matrix: ArrayLike | None,
+        offset: ArrayLike | None,
+        power: float,
+    ) -> Family:
+        """Feedback of errors and integrals; genes (states, integrals) per output; matrix (n_u, outputs)."""
     @property
     def size(self) -> int: ...
     def controller(self, parameters: ArrayLike, excitation: ArrayLike | None = None) -> Controller:

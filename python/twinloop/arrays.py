@@ -78,6 +78,25 @@ def number(what: str, value: object, *, above: float | None = None) -> float:
     raise InvalidInput(f"{what}: expected a finite number{limit}, found {value!r}; change it.")
 
 
+def at_least_zero(what: str, value: object) -> float:
+    """A number that may be nothing, but not less.
+
+    Args:
+        what: how to call it in an error.
+        value: the number.
+
+    Returns:
+        The number as a float.
+
+    Raises:
+        InvalidInput: it is not a finite real number, or below 0.
+    """
+    found = number(what, value)
+    if found < 0.0:
+        raise InvalidInput(f"{what}: expected at least 0, found {value}; change its sign.")
+    return found
+
+
 def whole(what: str, value: object, *, least: int = 0) -> int:
     """A whole number that is not too small.
 

@@ -28,7 +28,7 @@ mod tuning;
 mod workers;
 
 pub use actuators::{Actuator, effects};
-pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid};
+pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid, StateFeedback};
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};
 pub use evolution::{Problem, Search, Variation};

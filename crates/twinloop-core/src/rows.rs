@@ -32,7 +32,7 @@ impl Kernel for Run<'_> {
     }
 }
 
-/// Next states (rows × n_x) of each row of states under its row of commands.
+/// Next states (rows × n_x) of each row of states under its row of commands; each row is the first step of a run.
 pub fn step_rows<D: Dynamics>(
     dynamics: &D,
     states: &[&[f64]],
@@ -53,10 +53,11 @@ impl<D: Dynamics> Kernel for Step<'_, D> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<f64> {
-        let mut workspace = self.dynamics.workspace::<W::Of64>();
         let mut rows = Vec::new();
         let chunks = self.states.chunks(W::Of64::LANES).zip(self.commands.chunks(W::Of64::LANES));
         for (states, commands) in chunks {
+            // A fresh one: dynamics may remember, and a row knows nothing of the rows before it.
+            let mut workspace = self.dynamics.workspace::<W::Of64>();
             let mut state: Vec<W::Of64> = pack(states);
             self.dynamics.step(&mut workspace, &mut state, &pack::<W::Of64, _>(commands));
             for l in 0..states.len() {

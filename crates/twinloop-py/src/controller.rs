@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use twinloop_core::{Axis, Controller, Family, Mixer, Parameters, Pid};
+use twinloop_core::{Axis, Controller, Family, Mixer, Parameters, Pid, Signals, StateFeedback};
 
 use crate::arrays::{Matrix, Vector, optional_rows, rows, to_vector, vector};
 use crate::error::{Result, misuse};
@@ -29,19 +29,32 @@ impl PyFamily {
         power: f64,
     ) -> Result<Self> {
         let signals = &signals.0;
-        let bounds = signals.command_bounds.clone();
-        let output = match matrix {
-            None => Mixer::direct(bounds, axes.len())?,
-            Some(matrix) => {
-                let matrix = rows("mixer matrix", &matrix, axes.len())?;
-                let offset = offset.map_or_else(|| vec![0.0; bounds.len()], |offset| vector(&offset));
-                Mixer::new(matrix, offset, power, bounds, axes.len())?
-            }
-        };
+        let output = output_map(signals, axes.len(), matrix, offset, power)?;
         let axes = axes.into_iter().map(|(angle, rate)| Axis { angle, rate }).collect();
         let parameters = Parameters::new(&vector(&low), &vector(&high), &logarithmic)?;
         let pid = Pid { axes, output, dt: signals.dt };
         Ok(Self(Arc::new(Family::pid(pid, parameters, signals.states())?)))
+    }
+
+    #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "a law, its box and its output map, as numbers")]
+    fn state_feedback(
+        signals: &PySignals,
+        states: Vec<usize>,
+        integrals: Vec<usize>,
+        outputs: usize,
+        low: Vector<'_>,
+        high: Vector<'_>,
+        logarithmic: Vec<bool>,
+        matrix: Option<Matrix<'_>>,
+        offset: Option<Vector<'_>>,
+        power: f64,
+    ) -> Result<Self> {
+        let signals = &signals.0;
+        let output = output_map(signals, outputs, matrix, offset, power)?;
+        let parameters = Parameters::new(&vector(&low), &vector(&high), &logarithmic)?;
+        let feedback = StateFeedback { states, integrals, outputs, output, dt: signals.dt };
+        Ok(Self(Arc::new(Family::state_feedback(feedback, parameters, signals.states())?)))
     }
 
     #[getter]
@@ -55,6 +68,21 @@ impl PyFamily {
         let excitation = optional_rows("excitation", excitation, self.0.commands())?.concat();
         Ok(PyController(Mutex::new(controller.excited(&excitation)?)))
     }
+}
+
+/// The map from a law's outputs to the commands; without a matrix output i is command i.
+fn output_map(
+    signals: &Signals,
+    outputs: usize,
+    matrix: Option<Matrix<'_>>,
+    offset: Option<Vector<'_>>,
+    power: f64,
+) -> Result<Mixer> {
+    let bounds = signals.command_bounds.clone();
+    let Some(matrix) = matrix else { return Ok(Mixer::direct(bounds, outputs)?) };
+    let matrix = rows("mixer matrix", &matrix, outputs)?;
+    let offset = offset.map_or_else(|| vec![0.0; bounds.len()], |offset| vector(&offset));
+    Ok(Mixer::new(matrix, offset, power, bounds, outputs)?)
 }
 
 /// One controller of a family, with its memory.

@@ -16,7 +16,8 @@ pub struct PyQuadrotor(pub Quadrotor);
 #[pymethods]
 impl PyQuadrotor {
     #[new]
-    #[pyo3(signature = (dt, *, arm, inertia, rotor_inertia, thrust_factor, drag_factor, gyroscopic))]
+    #[expect(clippy::too_many_arguments, reason = "the constants of a vehicle, named by keyword in Python")]
+    #[pyo3(signature = (dt, *, arm, inertia, rotor_inertia, thrust_factor, drag_factor, gyroscopic, drag = [0.0; 3], motor_lag = 0.0, hover_speed = 0.0))]
     fn new(
         dt: f64,
         arm: f64,
@@ -25,13 +26,27 @@ impl PyQuadrotor {
         thrust_factor: f64,
         drag_factor: f64,
         gyroscopic: &str,
+        drag: [f64; 3],
+        motor_lag: f64,
+        hover_speed: f64,
     ) -> Result<Self> {
         let inertia = vector(&inertia);
         let inertia = inertia.try_into().map_err(|found: Vec<f64>| {
             misuse(format!("inertia: expected the three numbers I_x, I_y, I_z, found {}", found.len()))
         })?;
         let gyroscopic = gyroscopic.parse()?;
-        let plant = Quadrotor { dt, arm, inertia, rotor_inertia, thrust_factor, drag_factor, gyroscopic };
+        let plant = Quadrotor {
+            dt,
+            arm,
+            inertia,
+            rotor_inertia,
+            thrust_factor,
+            drag_factor,
+            gyroscopic,
+            drag,
+            motor_lag,
+            hover_speed,
+        };
         Ok(Self(plant.validated()?))
     }
 

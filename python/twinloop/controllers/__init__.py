@@ -1,7 +1,9 @@
 """Families of controllers: bounded gains and a law, one implementation for search and real run."""
 
 from twinloop.controllers.family import Controller, Family, Gain, UnboundFamily
+from twinloop.controllers.lqr import lqr_gains
 from twinloop.controllers.mixer import Mixer
 from twinloop.controllers.pid import PID
+from twinloop.controllers.state_feedback import StateFeedback
 
-__all__ = ["PID", "Controller", "Family", "Gain", "Mixer", "UnboundFamily"]
+__all__ = ["PID", "Controller", "Family", "Gain", "Mixer", "StateFeedback", "UnboundFamily", "lqr_gains"]

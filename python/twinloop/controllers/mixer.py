@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop.arrays import Floats, floats, number
+from twinloop.errors import InvalidInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,3 +34,33 @@ class Mixer:
         object.__setattr__(self, "matrix", matrix)
         object.__setattr__(self, "offset", floats("Mixer, offset (one entry a command)", offset, (rows,)))
         object.__setattr__(self, "power", number("Mixer, power", self.power, above=0.0))
+
+    def check(self, commands: int, axes: int) -> None:
+        """Refuses to map other numbers of axes and commands than its matrix has.
+
+        Args:
+            commands: n_u.
+            axes: outputs of the controller's law.
+
+        Raises:
+            InvalidInput: a matrix of another shape.
+        """
+        if self.matrix.shape != (commands, axes):
+            raise InvalidInput(
+                f"Mixer, matrix: expected the shape ({commands}, {axes}) (commands, axes), found"
+                f" {self.matrix.shape}; one row a command, one column an axis."
+            )
+
+
+def check_output(family: str, output: object) -> None:
+    """Refuses an output that is neither a mixer nor none.
+
+    Args:
+        family: whose output it is, for the error.
+        output: what was given.
+
+    Raises:
+        InvalidInput: something else.
+    """
+    if output is not None and not isinstance(output, Mixer):
+        raise InvalidInput(f"{family}, output: expected a Mixer or None, found {output!r}; build a Mixer.")

@@ -6,15 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from twinloop import _core
-from twinloop.arrays import number
+from twinloop.controllers.bounds import GainBounds, bounds_by_name, gain_units
 from twinloop.controllers.family import Family, Gain
-from twinloop.controllers.mixer import Mixer
+from twinloop.controllers.mixer import Mixer, check_output
 from twinloop.errors import InvalidInput, engine_input, unknown
-from twinloop.signals import Signals, ordered
+from twinloop.signals import Signals
 
 TERMS = ("kp", "ki", "kd")
 Axis = tuple[str, "str | None"]
-GainBounds = tuple[float, float] | tuple[float, float, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,25 +44,9 @@ class PID:
             raise InvalidInput(
                 f"PID, axes: expected at least one axis and each angle once, found {angles}; mend them."
             )
-        if not isinstance(self.gains, Mapping):
-            raise InvalidInput(
-                f"PID, gains: expected a dict of bounds by name, found {self.gains!r}; name every gain."
-            )
         names = [f"{angle}.{term}" for angle in angles for term in TERMS]
-        for name in self.gains:
-            if name not in names:
-                raise unknown("gain", name, names)
-        missing = [name for name in names if name not in self.gains]
-        if missing:
-            raise InvalidInput(
-                f"PID, gains: expected bounds for all {len(names)}, found none for {', '.join(missing)}; add"
-                " them."
-            )
-        if self.output is not None and not isinstance(self.output, Mixer):
-            raise InvalidInput(
-                f"PID, output: expected a Mixer or None, found {self.output!r}; build a Mixer."
-            )
-        object.__setattr__(self, "gains", {name: _bounds(name, self.gains[name]) for name in names})
+        object.__setattr__(self, "gains", bounds_by_name("PID", self.gains, names))
+        check_output("PID", self.output)
 
     def bind(self, signals: Signals) -> Family:
         """The family over these signals; genes in the order (K_P, K_I, K_D) per axis.
@@ -86,11 +69,8 @@ class PID:
                 f"PID: expected one axis for each of the {signals.n_u} commands, found {len(self.axes)}; "
                 "add axes, or an output=Mixer(...)."
             )
-        if self.output is not None and self.output.matrix.shape != (signals.n_u, len(self.axes)):
-            raise InvalidInput(
-                f"Mixer, matrix: expected the shape ({signals.n_u}, {len(self.axes)}) (commands, axes), found"
-                f" {self.output.matrix.shape}; one row a command, one column an axis."
-            )
+        if self.output is not None:
+            self.output.check(signals.n_u, len(self.axes))
         gains = self._gains(signals)
         with engine_input():
             engine = _core.Family.pid(
@@ -117,21 +97,6 @@ class PID:
         return gains
 
 
-def gain_units(output: str, angle: str) -> tuple[str, str, str]:
-    """Units of K_P, K_I and K_D of an axis.
-
-    Args:
-        output: unit of what the axis asks for.
-        angle: unit of what the axis controls.
-
-    Returns:
-        The three units, such as "N m/rad", "N m/(rad s)" and "N m s/rad".
-    """
-    top = f"({output})" if "/" in output else output or "1"
-    bottom = f"({angle})" if "/" in angle or " " in angle else angle or "1"
-    return f"{top}/{bottom}", f"{top}/({bottom} s)", f"{top} s/{bottom}"
-
-
 def _axis(axis: object) -> Axis:
     if isinstance(axis, Iterable) and not isinstance(axis, str):
         pair = tuple(axis)
@@ -140,22 +105,3 @@ def _axis(axis: object) -> Axis:
     raise InvalidInput(
         f"PID, axes: expected pairs (angle, rate or None) of names, found {axis!r}; write both."
     )
-
-
-def _bounds(name: str, bounds: object) -> GainBounds:
-    items = tuple(bounds) if isinstance(bounds, Iterable) and not isinstance(bounds, str) else ()
-    what = f"Gain {name!r}, bounds"
-    if len(items) == 3 and items[2] != "log":
-        raise InvalidInput(
-            f'{what}: expected "log" as the third item, found {items[2]!r}; write "log" or leave it out.'
-        )
-    if len(items) not in (2, 3):
-        raise InvalidInput(
-            f'{what}: expected (low, high) or (low, high, "log"), found {bounds!r}; write both numbers.'
-        )
-    low, high = ordered(what, items[:2])
-    if len(items) == 3 and number(what, low) <= 0.0:
-        raise InvalidInput(
-            f'{what}: expected low > 0 with "log", found {low:g}; raise it, or leave "log" out.'
-        )
-    return (low, high, "log") if len(items) == 3 else (low, high)

@@ -2,9 +2,10 @@
 
 from twinloop.systems.base import System
 from twinloop.systems.quadrotor import Quadrotor
+from twinloop.systems.rotorpy import RotorPy
 from twinloop.systems.simulated import Simulated
 
 BUILT_IN: dict[str, type[Quadrotor]] = {"quadrotor": Quadrotor}
 """Systems that can be run by name."""
 
-__all__ = ["BUILT_IN", "Quadrotor", "Simulated", "System"]
+__all__ = ["BUILT_IN", "Quadrotor", "RotorPy", "Simulated", "System"]

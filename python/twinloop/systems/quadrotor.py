@@ -8,12 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, number, whole
+from twinloop.arrays import Floats, at_least_zero, floats, number, whole
 from twinloop.controllers import PID, Mixer
-from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.errors import engine_input, unknown
 from twinloop.flight import fly
 from twinloop.signals import Command, Signals, State
 from twinloop.systems.base import System
+from twinloop.systems.gusts import as_disturbance, gust_accelerations
+from twinloop.systems.sensors import attitude_noise, run_stream
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
 
@@ -23,6 +25,8 @@ ANGLES = ("roll", "pitch", "yaw")
 GYROSCOPIC = ("physical", "print")
 INTEGRAL_GAIN = 0.004
 """K_I of the first controller, N m/(rad s)."""
+GUSTS = 1
+"""Which of a run's streams the gusts are drawn from; the sensors' own stream does not know of them."""
 
 
 class Quadrotor(System):
@@ -45,9 +49,15 @@ class Quadrotor(System):
         thrust_factor: thrust over squared speed, N s².
         drag_factor: torque over squared speed, N m s².
         top_speed: of a rotor, rad/s.
+        drag: torque −drag |rate| rate that brakes the three axes, N m s²: one number, or one an axis.
+        motor_lag: time constant at which a rotor follows its commanded speed, s; the rotors start at hover
+            speed, and their speeds are not among the states.
+        gusts: standard deviation of a random angular acceleration of each axis, rad/s², correlated over
+            0.2 s; run r draws it from another stream of (seed, r).
 
     Raises:
-        InvalidInput: a constant that is not a number above zero, or an unknown `gyroscopic`.
+        InvalidInput: a constant that is not a number above zero, one of the last three or the noise below
+            zero, or an unknown `gyroscopic`.
     """
 
     def __init__(
@@ -65,14 +75,13 @@ class Quadrotor(System):
         thrust_factor: float = 3.13e-5,
         drag_factor: float = 7.5e-7,
         top_speed: float = 300.0,
+        drag: float | Sequence[float] = 0.0,
+        motor_lag: float = 0.0,
+        gusts: float = 0.0,
     ) -> None:
         if gyroscopic not in GYROSCOPIC:
             raise unknown("gyroscopic", gyroscopic, GYROSCOPIC)
-        self.noise = number("Quadrotor, noise (rad)", noise)
-        if self.noise < 0.0:
-            raise InvalidInput(
-                f"Quadrotor, noise (rad): expected at least 0, found {noise}; change its sign."
-            )
+        self.noise = at_least_zero("Quadrotor, noise (rad)", noise)
         self.seed = whole("Quadrotor, seed", seed)
         self.gyroscopic = gyroscopic
         self.natural_frequency = number("Quadrotor, natural_frequency (rad/s)", natural_frequency, above=0.0)
@@ -84,12 +93,13 @@ class Quadrotor(System):
             number(f"Quadrotor, inertia of {axis} (kg m²)", value, above=0.0)
         self.thrust_factor = number("Quadrotor, thrust_factor (N s²)", thrust_factor, above=0.0)
         self.drag_factor = number("Quadrotor, drag_factor (N m s²)", drag_factor, above=0.0)
-        self.rotor_inertia = number("Quadrotor, rotor_inertia (kg m²)", rotor_inertia)
-        if self.rotor_inertia < 0.0:
-            raise InvalidInput(
-                f"Quadrotor, rotor_inertia (kg m²): expected at least 0, found {rotor_inertia}; change its"
-                " sign."
-            )
+        self.rotor_inertia = at_least_zero("Quadrotor, rotor_inertia (kg m²)", rotor_inertia)
+        # One number becomes three, whatever it is: what it is not is said below.
+        self.drag = floats("Quadrotor, drag (N m s²)", [drag] * 3 if np.ndim(drag) == 0 else drag, (3,))
+        for axis, value in zip(ANGLES, self.drag.tolist(), strict=True):
+            at_least_zero(f"Quadrotor, drag of {axis} (N m s²)", value)
+        self.motor_lag = at_least_zero("Quadrotor, motor_lag (s)", motor_lag)
+        self.gusts = at_least_zero("Quadrotor, gusts (rad/s²)", gusts)
         self.hover_speed = math.sqrt(self.mass * GRAVITY / (4.0 * self.thrust_factor))
         self.top_speed = number("Quadrotor, top_speed (rad/s)", top_speed, above=self.hover_speed)
         self.runs = 0
@@ -103,7 +113,29 @@ class Quadrotor(System):
                 thrust_factor=self.thrust_factor,
                 drag_factor=self.drag_factor,
                 gyroscopic=self.gyroscopic,
+                drag=self.drag.tolist(),
+                motor_lag=self.motor_lag,
+                hover_speed=self.hover_speed,
             )
+
+    @classmethod
+    def harsh(cls, noise: float = 1e-3, seed: int = 0) -> Quadrotor:
+        """The same vehicle in rougher air with slower motors, to judge a method where its models are wrong.
+
+        At the fastest moment of the first controller's flight the drag equals that controller's own damping,
+        so it is felt throughout; |rate| rate is no polynomial. The lag of 30 ms is that of small brushless
+        motors, one and a half periods that no state shows. The gusts of 0.5 rad/s² are a quarter of the
+        acceleration with which the first controller sets out in roll, and bound how well any model can
+        predict a run.
+
+        Args:
+            noise: standard deviation of the sensors, as in the constructor, rad.
+            seed: of noise and gusts.
+
+        Returns:
+            A quadrotor with drag 0.05 N m s², motor lag 0.03 s and gusts 0.5 rad/s².
+        """
+        return cls(noise=noise, seed=seed, drag=0.05, motor_lag=0.03, gusts=0.5)
 
     @property
     def signals(self) -> Signals:
@@ -158,13 +190,15 @@ class Quadrotor(System):
             InvalidInput: the test is for other signals.
         """
         check_signals(test, self._signals)
-        noise = None
+        dt = self._signals.dt
+        noise = disturbance = None
         if self.noise > 0.0:
-            stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, self.runs])))
-            deviations = self.noise * np.array([1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
-            noise = deviations * stream.standard_normal((test.steps + 1, 6))
+            noise = attitude_noise(run_stream(self.seed, self.runs), test.steps, self.noise)
+        if self.gusts > 0.0:
+            stream = run_stream(self.seed, self.runs, GUSTS)
+            disturbance = as_disturbance(gust_accelerations(stream, test.steps, self.gusts, dt), dt)
         self.runs += 1
-        return fly(self._dynamics, test, noise=noise)
+        return fly(self._dynamics, test, noise=noise, disturbance=disturbance)
 
     def _mixer(self) -> Mixer:
         """Squared speeds from torques at hover thrust (specification, section 5)."""

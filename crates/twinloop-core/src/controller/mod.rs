@@ -4,11 +4,13 @@ mod mixer;
 mod parameters;
 mod pid;
 mod single;
+mod state_feedback;
 
 pub use mixer::Mixer;
 pub use parameters::Parameters;
 pub use pid::{Axis, Pid};
 pub use single::Controller;
+pub use state_feedback::StateFeedback;
 
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
@@ -34,6 +36,7 @@ pub trait Law {
 #[derive(Clone, Debug, PartialEq)]
 enum AnyLaw {
     Pid(Pid),
+    StateFeedback(StateFeedback),
 }
 
 /// A law, the box of its parameters, and the states and commands that it is for.
@@ -58,6 +61,20 @@ impl Family {
         pid.check(states)?;
         let bounds = pid.output.bounds().to_vec();
         Ok(Self { law: AnyLaw::Pid(pid), parameters, states, bounds })
+    }
+
+    /// The family of the controllers of one [`StateFeedback`].
+    pub fn state_feedback(feedback: StateFeedback, parameters: Parameters, states: usize) -> Result<Self> {
+        feedback.check(states)?;
+        let expected = feedback.gains();
+        if parameters.len() != expected {
+            return invalid(format!(
+                "controller: expected bounds for {expected} gains (each output's states and integrals), found {}",
+                parameters.len()
+            ));
+        }
+        let commands = feedback.output.commands();
+        Ok(Self { law: AnyLaw::StateFeedback(feedback), parameters, states, commands })
     }
 
     /// The box of the parameters.
@@ -103,6 +120,7 @@ impl Law for Family {
     fn memory(&self) -> usize {
         match &self.law {
             AnyLaw::Pid(pid) => pid.memory(),
+            AnyLaw::StateFeedback(feedback) => feedback.memory(),
         }
     }
 
@@ -117,6 +135,7 @@ impl Law for Family {
     ) {
         match &self.law {
             AnyLaw::Pid(pid) => pid.command(parameters, memory, state, target, command),
+            AnyLaw::StateFeedback(feedback) => feedback.command(parameters, memory, state, target, command),
         }
     }
 }

@@ -45,6 +45,12 @@ pub struct Quadrotor {
     pub drag_factor: f64,
     /// Signs of the gyroscopic terms.
     pub gyroscopic: Gyroscopic,
+    /// Torque that brakes each axis, over its squared rate, N m s²; zeros in the paper.
+    pub drag: [f64; 3],
+    /// Time constant at which a rotor follows its commanded speed, s; zero in the paper: it follows at once.
+    pub motor_lag: f64,
+    /// Speed of the rotors at the start of a run, rad/s; nothing depends on it without a lag.
+    pub hover_speed: f64,
 }
 
 impl Quadrotor {
@@ -52,17 +58,21 @@ impl Quadrotor {
     pub fn validated(self) -> Result<Self> {
         let constants = [self.dt, self.arm, self.thrust_factor, self.drag_factor];
         let positive = constants.iter().chain(&self.inertia).all(|x| x.is_finite() && *x > 0.0);
-        let rotor_inertia = self.rotor_inertia.is_finite() && self.rotor_inertia >= 0.0;
-        if !positive || !rotor_inertia {
-            return invalid(format!("quadrotor: expected finite constants above 0, found {self:?}"));
+        let absent = [self.rotor_inertia, self.motor_lag, self.hover_speed];
+        let possible = absent.iter().chain(&self.drag).all(|x| x.is_finite() && *x >= 0.0);
+        if !positive || !possible {
+            return invalid(format!(
+                "quadrotor: expected finite constants above 0, and rotor inertia, drag, motor lag and hover speed of \
+                 at least 0, found {self:?}"
+            ));
         }
         Ok(self)
     }
 
-    /// Accelerations and rates at a state, under a command.
+    /// Accelerations and rates at a state, with the rotors at given speeds.
     #[inline(always)]
-    pub fn derivative<V: Vector>(&self, state: &[V], command: &[V], slope: &mut [V]) {
-        let [w1, w2, w3, w4] = [command[0], command[1], command[2], command[3]];
+    pub fn derivative<V: Vector>(&self, state: &[V], speeds: &[V], slope: &mut [V]) {
+        let [w1, w2, w3, w4] = [speeds[0], speeds[1], speeds[2], speeds[3]];
         let squared = [w1 * w1, w2 * w2, w3 * w3, w4 * w4];
         let roll_torque = (squared[3] - squared[1]) * (self.arm * self.thrust_factor);
         let pitch_torque = (squared[0] - squared[2]) * (self.arm * self.thrust_factor);
@@ -80,23 +90,49 @@ impl Quadrotor {
         slope[3] = (roll_torque + rotors * q * roll_sign + q * r * (iy - iz)) / ix;
         slope[4] = (pitch_torque - rotors * p + p * r * (iz - ix)) / iy;
         slope[5] = (yaw_torque + p * q * (ix - iy)) / iz;
+        // Skipped without drag: what is subtracted would be a zero, and might still turn the sign of a zero.
+        if self.drag != [0.0; 3] {
+            for (i, rate) in [p, q, r].into_iter().enumerate() {
+                slope[3 + i] = slope[3 + i] - rate.abs() * rate * (self.drag[i] / self.inertia[i]);
+            }
+        }
     }
+}
+
+/// What the plant needs for a run and remembers in it.
+pub struct Flight<V: Vector> {
+    stages: Stages<V>,
+    /// Speeds of the rotors now, half a period and a whole period later; only the first outlives a step.
+    speeds: [[V; 4]; 3],
 }
 
 impl Dynamics for Quadrotor {
-    type Workspace<V: Vector> = Stages<V>;
+    type Workspace<V: Vector> = Flight<V>;
 
-    fn workspace<V: Vector>(&self) -> Stages<V> {
-        Stages::new(6)
+    fn workspace<V: Vector>(&self) -> Flight<V> {
+        Flight { stages: Stages::new(6), speeds: [[V::splat(self.hover_speed); 4]; 3] }
     }
 
     #[inline(always)]
-    fn step<V: Vector>(&self, stages: &mut Stages<V>, state: &mut [V], command: &[V]) {
-        rk4(state, self.dt, stages, Held { plant: self, command });
+    fn step<V: Vector>(&self, flight: &mut Flight<V>, state: &mut [V], command: &[V]) {
+        if self.motor_lag == 0.0 {
+            rk4(state, self.dt, &mut flight.stages, Held { plant: self, command });
+            return;
+        }
+        // The speeds approach a held command exponentially, whatever the body does: no need to integrate them.
+        for (moment, share) in [(1, 0.5), (2, 1.0)] {
+            let left = libm::exp(-share * self.dt / self.motor_lag);
+            for (i, &wanted) in command.iter().enumerate() {
+                flight.speeds[moment][i] = wanted + (flight.speeds[0][i] - wanted) * left;
+            }
+        }
+        let lagging = Lagging { plant: self, speeds: &flight.speeds, stage: 0 };
+        rk4(state, self.dt, &mut flight.stages, lagging);
+        flight.speeds[0] = flight.speeds[2];
     }
 }
 
-/// The plant under a command.
+/// The plant whose rotors turn as commanded.
 struct Held<'a, V: Vector> {
     plant: &'a Quadrotor,
     command: &'a [V],
@@ -106,5 +142,22 @@ impl<V: Vector> Field<V> for Held<'_, V> {
     #[inline(always)]
     fn slope(&mut self, point: &[V], slope: &mut [V]) {
         self.plant.derivative(point, self.command, slope);
+    }
+}
+
+/// The plant whose rotors are on their way to what was commanded.
+struct Lagging<'a, V: Vector> {
+    plant: &'a Quadrotor,
+    speeds: &'a [[V; 4]; 3],
+    stage: usize,
+}
+
+impl<V: Vector> Field<V> for Lagging<'_, V> {
+    #[inline(always)]
+    fn slope(&mut self, point: &[V], slope: &mut [V]) {
+        // Runge and Kutta look at the start, twice at the middle, and at the end of the step.
+        let moment = [0, 1, 1, 2][self.stage];
+        self.stage += 1;
+        self.plant.derivative(point, &self.speeds[moment], slope);
     }
 }

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use twinloop_core::{Axis, Controller, Family, Mixer, Parameters, Pid, Purpose, Scalar, Stream, Vector};
+use twinloop_core::{
+    Axis, Controller, Family, Mixer, Parameters, Pid, Purpose, Scalar, StateFeedback, Stream, Vector,
+};
 
 use crate::oracle::Pids;
 use crate::worlds::{GAINS, World, gains, state};
@@ -31,7 +33,36 @@ fn inside(values: &[f64]) -> bool {
     values.iter().zip(BOX).all(|(value, (low, high))| (low..=high).contains(value))
 }
 
+/// Two outputs that read states 2 and 0 and the integral of state 1, through a map with an offset.
+fn feedback(states: Vec<usize>, integrals: Vec<usize>, outputs: usize) -> StateFeedback {
+    let bounds = vec![(-1e3, 1e3), (-1e3, 1e3)];
+    let matrix = vec![[1.0, 0.5][..outputs].to_vec(), [-0.25, 2.0][..outputs].to_vec()];
+    let output = Mixer::new(matrix, vec![0.1, -0.2], 1.0, bounds, outputs).unwrap();
+    StateFeedback { states, integrals, outputs, output, dt: 0.05 }
+}
+
 proptest! {
+    #[test]
+    fn a_state_feedback_is_two_matrices_and_an_integral(
+        gains in prop::array::uniform6(-3.0..3.0),
+        target in state(),
+        states in prop::collection::vec(state(), 1..20),
+    ) {
+        let parameters = Parameters::new(&[-3.0; 6], &[3.0; 6], &[false; 6]).unwrap();
+        let family = Family::state_feedback(feedback(vec![2, 0], vec![1], 2), parameters, 3).unwrap();
+        let mut controller = Controller::new(Arc::new(family), gains.to_vec()).unwrap();
+        let mut integral = 0.0;
+        for state in &states {
+            let error = |i: usize| target[i] - state[i];
+            integral += error(1) * 0.05;
+            let u = |j: usize| gains[3 * j] * error(2) + gains[3 * j + 1] * error(0) + gains[3 * j + 2] * integral;
+            let expected = [0.1 + u(0) + 0.5 * u(1), -0.2 - 0.25 * u(0) + 2.0 * u(1)];
+            for (found, expected) in controller.command(state, &target).unwrap().iter().zip(expected) {
+                prop_assert!((found - expected).abs() < 1e-12);
+            }
+        }
+    }
+
     #[test]
     fn a_controller_is_a_pid_on_each_axis(
         gains in gains(),
@@ -173,6 +204,18 @@ fn families_whose_parts_do_not_fit_are_refused() {
     ] {
         assert!(mixer(vec![vec![factor]], vec![offset], power).contains("power above 0"));
     }
+}
+
+#[test]
+fn state_feedbacks_whose_parts_do_not_fit_are_refused() {
+    let refusal = |feedback: StateFeedback, n: usize| {
+        let parameters = Parameters::new(&vec![0.0; n], &vec![1.0; n], &vec![false; n]).unwrap();
+        Family::state_feedback(feedback, parameters, 3).unwrap_err().to_string()
+    };
+    assert!(refusal(feedback(vec![0, 1], vec![2], 2), 5).contains("6 gains"));
+    assert!(refusal(feedback(vec![0, 3], vec![], 2), 4).contains("states 0 to 2, found 3"));
+    assert!(refusal(feedback(vec![0], vec![5], 2), 4).contains("found 5"));
+    assert!(refusal(feedback(vec![], vec![], 2), 1).contains("feed something back"));
 }
 
 #[test]

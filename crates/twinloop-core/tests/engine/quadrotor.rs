@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Axis, Family, Gyroscopic, Influences, Mixer, Parameters, Pid, Quadrotor, Scalar, Task, Trajectory,
-    Vector, Width, record, step_rows,
+    Axis, Dynamics, Family, Gyroscopic, Influences, Mixer, Parameters, Pid, Quadrotor, Scalar, Task,
+    Trajectory, Vector, Width, record, step_rows,
 };
 
 use crate::oracle::rk4;
@@ -20,6 +20,9 @@ fn quadrotor(gyroscopic: Gyroscopic) -> Quadrotor {
         thrust_factor: 3.13e-5,
         drag_factor: 7.5e-7,
         gyroscopic,
+        drag: [0.0; 3],
+        motor_lag: 0.0,
+        hover_speed: 225.0,
     }
 }
 
@@ -85,6 +88,9 @@ fn constants_that_no_vehicle_has_are_refused() {
         Quadrotor { arm: -1.0, ..good.clone() },
         Quadrotor { inertia: [1.0, f64::NAN, 1.0], ..good.clone() },
         Quadrotor { rotor_inertia: -1.0, ..good.clone() },
+        Quadrotor { drag: [0.0, -1e-9, 0.0], ..good.clone() },
+        Quadrotor { motor_lag: f64::NAN, ..good.clone() },
+        Quadrotor { hover_speed: -1.0, ..good.clone() },
         Quadrotor { thrust_factor: f64::INFINITY, ..good.clone() },
         Quadrotor { drag_factor: 0.0, ..good },
     ];
@@ -97,6 +103,57 @@ fn constants_that_no_vehicle_has_are_refused() {
 }
 
 proptest! {
+    #[test]
+    fn rotors_that_lag_and_drag_are_what_small_steps_integrate(
+        state in prop::array::uniform6(-2.0..2.0),
+        first in prop::array::uniform4(150.0..290.0),
+        second in prop::array::uniform4(150.0..290.0),
+        drag in prop::array::uniform3(0.0..0.02),
+        motor_lag in 0.02..0.2,
+    ) {
+        let plain = quadrotor(Gyroscopic::Physical);
+        let plant = Quadrotor { drag, motor_lag, ..plain.clone() };
+        let mut flight = plant.workspace::<Scalar>();
+        let mut found: Vec<_> = state.iter().map(|&x| Scalar::splat(x)).collect();
+        // The rotors are four more states; a thousand steps a period leave no error of the integrator to speak of.
+        let mut expected = [&state[..], &[225.0; 4]].concat();
+        for speeds in [first, second] {
+            plant.step(&mut flight, &mut found, &speeds.map(Scalar::splat));
+            let derivative = |x: &[f64]| {
+                let lanes = |values: &[f64]| values.iter().map(|&x| Scalar::splat(x)).collect::<Vec<_>>();
+                let mut slope = [Scalar::splat(0.0); 6];
+                plain.derivative(&lanes(&x[..6]), &lanes(&x[6..]), &mut slope);
+                let mut all: Vec<f64> = slope.iter().map(|slope| slope.lane(0)).collect();
+                for i in 0..3 {
+                    all[3 + i] -= drag[i] * x[3 + i] * x[3 + i].abs() / plain.inertia[i];
+                }
+                all.extend(speeds.iter().zip(&x[6..]).map(|(wanted, speed)| (wanted - speed) / motor_lag));
+                all
+            };
+            for _ in 0..1000 {
+                expected = rk4(&expected, 0.02 / 1000.0, derivative);
+            }
+        }
+        for (found, expected) in found.iter().zip(&expected) {
+            prop_assert!((found.lane(0) - expected).abs() < 2e-3, "{} and {expected}", found.lane(0));
+        }
+    }
+
+    #[test]
+    fn a_row_knows_nothing_of_the_rows_before_it_though_the_rotors_lag(
+        speeds in prop::collection::vec(prop::array::uniform4(0.0..300.0), 70),
+    ) {
+        let plant = Quadrotor { motor_lag: 0.03, ..quadrotor(Gyroscopic::Physical) };
+        let states = vec![[0.1; 6]; speeds.len()];
+        let (states, speeds): (Vec<&[f64]>, Vec<&[f64]>) =
+            (states.iter().map(|x| &x[..]).collect(), speeds.iter().map(|x| &x[..]).collect());
+        let together = step_rows(&plant, &states, &speeds, Width::widest());
+        let alone: Vec<f64> = (0..speeds.len())
+            .flat_map(|i| step_rows(&plant, &states[i..=i], &speeds[i..=i], Width::Baseline))
+            .collect();
+        prop_assert_eq!(together, alone);
+    }
+
     #[test]
     fn a_step_is_the_equations_of_the_paper(
         state in prop::array::uniform6(-2.0..2.0),
