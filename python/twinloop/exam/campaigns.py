@@ -10,7 +10,7 @@ import numpy as np
 from twinloop.campaign import Campaign
 from twinloop.exam import quality
 from twinloop.exam.held_out import PENALTY, HeldOut
-from twinloop.exam.learners import Campaigner
+from twinloop.exam.kinds import Campaigner
 from twinloop.exam.measures import coverage, number_of_terms, quantiles, violated
 from twinloop.exam.systems import Subject, from_unit
 from twinloop.models import Twin

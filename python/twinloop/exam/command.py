@@ -13,13 +13,14 @@ import click
 from twinloop.arrays import whole
 from twinloop.console import duration
 from twinloop.errors import InvalidInput, NotAvailable, unknown
-from twinloop.exam.learners import LEARNERS, Fitter, Learner, Tuner, for_smoke, learner
+from twinloop.exam.kinds import Fitter, Learner, Tuner
+from twinloop.exam.learners import LEARNERS, for_smoke, learner
 from twinloop.exam.plan import Scope, available, planned
 from twinloop.exam.results import Results
 from twinloop.exam.store import Store
 from twinloop.exam.study import work_off
 from twinloop.exam.systems import SUBJECTS
-from twinloop.exam.tables import FORMATS, Table, as_text, render
+from twinloop.exam.tables import FORMATS, as_text, render
 from twinloop.exam.tuning import EXPERIMENTS as TUNING_EXPERIMENTS
 from twinloop.exam.tuning import SEEDS as TUNING_SEEDS
 from twinloop.exam.tuning import score, tuned, variants
@@ -133,35 +134,23 @@ def _with_source(scope: Scope) -> Scope:
 
 
 def _tune(scope: Scope, path: Path, jobs: int, yes: bool) -> str:
-    tables: list[Table] = []
-    system = scope.systems[0] if len(scope.systems) == 1 else "quadrotor"
-    for who in scope.learners:
-        if not isinstance(who, Fitter | Tuner) or not who.grid:
-            continue
-        tried: Sequence[Learner] = variants(who)
-        study = Scope(
-            [system], tried, scope.data, scope.seeds or TUNING_SEEDS, TUNING_EXPERIMENTS, scope.retry
-        )
-        _say(f"{who.name}: {len(tried)} settings")
-        # One at a time: rows are told apart by settings, but progress by name.
-        for variant in tried:
-            _run(
-                Scope([system], [variant], study.data, study.seeds, study.experiments, study.retry),
-                path,
-                jobs,
-                yes,
-            )
-        store = Store(path)
-        try:
-            scores = []
-            for variant in tried:
-                assert isinstance(variant, Fitter | Tuner)
-                results = Results(store, [system], [variant], study.data, study.seeds)
-                scores.append((variant, score(results, system, variant)))
-        finally:
-            store.close()
-        tables.append(tuned(who, scores))
-    return "\n\n".join(as_text(each) for each in tables) + "\n"
+    system = "quadrotor" if "quadrotor" in scope.systems else scope.systems[0]
+    grids = [who for who in scope.learners if isinstance(who, Fitter | Tuner) and who.grid]
+    tried = [variant for who in grids for variant in variants(who)]
+    seeds = scope.seeds or TUNING_SEEDS
+    _run(Scope([system], tried, scope.data, seeds, max(TUNING_EXPERIMENTS), scope.retry), path, jobs, yes)
+    shown = []
+    store = Store(path)
+    try:
+        for who in grids:
+            scores = [
+                (variant, score(Results(store, [system], [variant], scope.data, seeds), system, variant))
+                for variant in variants(who)
+            ]
+            shown.append(as_text(tuned(who, scores)))
+    finally:
+        store.close()
+    return "\n\n".join(shown) + "\n"
 
 
 def _source(name: str | None) -> Learner:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.exam.learners import Campaigner, Fitter, Flyer, Learner, Optimum, Tuner, key
+from twinloop.exam.kinds import Campaigner, Fitter, Flyer, Learner, Optimum, Tuner
+from twinloop.exam.learners import key
 from twinloop.exam.store import Address, Store
 from twinloop.exam.systems import why_missing
 

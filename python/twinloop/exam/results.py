@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.exam.learners import Learner, key
+from twinloop.exam.kinds import Learner
+from twinloop.exam.learners import key
 from twinloop.exam.store import Row, Store
 
 

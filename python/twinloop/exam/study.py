@@ -24,7 +24,7 @@ from twinloop.errors import TwinloopError
 from twinloop.exam import campaigns
 from twinloop.exam.campaigns import Measured
 from twinloop.exam.held_out import HeldOut
-from twinloop.exam.learners import Campaigner, Fitter, Flyer, Optimum, Tuner
+from twinloop.exam.kinds import Campaigner, Fitter, Flyer, Optimum, Tuner
 from twinloop.exam.plan import Job
 from twinloop.exam.store import MissingFlights, Row, Store
 from twinloop.exam.systems import Subject, subject
@@ -60,7 +60,7 @@ def work_off(path: Path, jobs: Sequence[Job], processes: int) -> int:
     )
     console = Console(stderr=True)
     done, spoke = 0, time.monotonic()
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("exam", total=len(jobs), last="")
         for stage in (False, True):
             ready = [job for job in jobs if isinstance(job.who, Fitter) is stage]
@@ -118,8 +118,8 @@ def work(path: Path, job: Job) -> str | None:
             if k in missing:
                 store.write(Row(job.address, k, measures, seconds), flight)
                 missing.remove(k)
-    except MissingFlights as reason:  # not this learner's failure: it is measured once they are flown
-        return str(reason)
+    except MissingFlights as lacking:  # not this learner's failure: it is measured once they are flown
+        return str(lacking)
     except Exception as failure:  # whatever a learner by others raises is a result: it is counted
         reason = (
             str(failure) if isinstance(failure, TwinloopError) else f"{type(failure).__name__}: {failure}"

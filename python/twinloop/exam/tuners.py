@@ -13,7 +13,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.exam import quality
 from twinloop.exam.campaigns import Measured, of_flight
-from twinloop.exam.learners import Optimum, Tuner
+from twinloop.exam.kinds import Optimum, Tuner
 from twinloop.exam.systems import Subject, from_unit, to_unit
 
 Evaluate = Callable[[Floats], float]

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
-from twinloop.exam.learners import Fitter, Learner, Tuner
-from twinloop.exam.results import Results, spread
+from twinloop.exam.kinds import Fitter, Tuner
+from twinloop.exam.results import Results
 from twinloop.exam.tables import Table
 
 SEEDS = range(10)
-EXPERIMENTS = 2
+EXPERIMENTS = (2, 4)
 """After Υ0, of the flights on which the fits are compared."""
 
 Tunable = Fitter | Tuner
@@ -36,12 +36,12 @@ def variants(who: Tunable) -> list[Tunable]:
 
 def _varied(who: Tunable, settings: dict[str, object]) -> Tunable:
     if isinstance(who, Fitter):
-        return replace(who, settings=settings, experiments=(EXPERIMENTS,))
+        return replace(who, settings=settings, experiments=EXPERIMENTS)
     return replace(who, settings=settings)
 
 
-def score(results: Results, system: str, who: Tunable) -> tuple[float, float]:
-    """How good a variant is, to be minimised: the second number decides.
+def score(results: Results, system: str, who: Tunable) -> float:
+    """How good a variant is, to be minimised.
 
     Args:
         results: of this variant alone.
@@ -49,22 +49,25 @@ def score(results: Results, system: str, who: Tunable) -> tuple[float, float]:
         who: the variant.
 
     Returns:
-        For a fit the medians over seeds of the median and of the 90th percentile of the held-out error; for
-        an optimiser the third quartile and the median over seeds of the last quality. Infinite if a seed
-        failed.
+        The geometric mean over seeds, of a fit's median and 90th percentile of the held-out error after
+        each of `EXPERIMENTS`, or of an optimiser's last quality. It lets a few runs that diverge count, and
+        no more. Infinite if anything failed or is missing.
     """
-    last = EXPERIMENTS if isinstance(who, Fitter) else who.flights - 1
-    if results.failures(system, who.name, last) or not results.rows(system, who.name):
-        return math.inf, math.inf
-    if isinstance(who, Fitter):
-        middle = spread(results.values(system, who.name, "error_median", last))
-        tail = spread(results.values(system, who.name, "error_p90", last))
-        return (math.inf, math.inf) if middle is None or tail is None else (middle.median, tail.median)
-    found = spread(results.values(system, who.name, "quality", last))
-    return (math.inf, math.inf) if found is None else (found.high, found.median)
+    fits = isinstance(who, Fitter)
+    measures = ("error_median", "error_p90") if fits else ("quality",)
+    numbers = []
+    for k in EXPERIMENTS if isinstance(who, Fitter) else (who.flights - 1,):
+        if results.failures(system, who.name, k):
+            return math.inf
+        for measure in measures:
+            found = results.values(system, who.name, measure, k)
+            if not found:
+                return math.inf
+            numbers += [max(value, 1e-300) for value in found.values()]
+    return math.exp(math.fsum(math.log(value) for value in numbers) / len(numbers))
 
 
-def tuned(who: Tunable, scores: Sequence[tuple[Learner, tuple[float, float]]]) -> Table:
+def tuned(who: Tunable, scores: Sequence[tuple[Tunable, float]]) -> Table:
     """What the grid says of one learner, the best first.
 
     Args:
@@ -75,13 +78,12 @@ def tuned(who: Tunable, scores: Sequence[tuple[Learner, tuple[float, float]]]) -
         A table.
     """
     names = list(who.grid)
-    ordered = sorted(scores, key=lambda pair: pair[1][1])
-    rows = []
-    for variant, (first, decides) in ordered:
-        assert isinstance(variant, Fitter | Tuner)
-        here = "in the code" if variant.settings == who.settings else ""
-        rows.append(
-            [*(str(variant.settings[name]) for name in names), f"{first:.3g}", f"{decides:.3g}", here]
-        )
-    kind = ("median", "90th percentile") if isinstance(who, Fitter) else ("third quartile", "median")
-    return Table(f"{who.name}, seeds {SEEDS.start} to {SEEDS.stop - 1}", [*names, *kind, ""], rows)
+    rows = [
+        [
+            *(str(variant.settings[name]) for name in names),
+            f"{found:.3g}",
+            "in the code" if variant.settings == who.settings else "",
+        ]
+        for variant, found in sorted(scores, key=lambda pair: pair[1])
+    ]
+    return Table(f"{who.name}: geometric mean over seeds", [*names, "score", ""], rows)
