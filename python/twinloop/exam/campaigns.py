@@ -22,7 +22,7 @@ Measured = tuple[int, dict[str, float | None], Trajectory | None, float]
 
 
 def campaign(
-    who: Campaigner, subject: Subject, held_out: HeldOut, seed: int, experiments: int
+    who: Campaigner, subject: Subject, held_out: HeldOut, seed: int, experiments: int, threads: int
 ) -> Iterator[Measured]:
     """Flies a campaign.
 
@@ -32,6 +32,7 @@ def campaign(
         held_out: what its twin is judged on.
         seed: of the system and the campaign.
         experiments: after Υ0.
+        threads: of the engine; no number but the seconds depends on it.
 
     Yields:
         What was measured after each experiment, Υ0 first. `ask_seconds` is the time of the `ask` that
@@ -50,7 +51,7 @@ def campaign(
         preset=who.preset,
         seed=seed,
         options=who.options,
-        threads=1,
+        threads=threads,
         **arguments,  # type: ignore[arg-type]
     )
     predicts = "final_distance" if who.preset == "paper" else subject.quality

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -15,14 +16,13 @@ from twinloop.console import duration
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.exam.kinds import Fitter, Learner, Tuner
 from twinloop.exam.learners import LEARNERS, for_smoke, learner
-from twinloop.exam.plan import Scope, available, planned
+from twinloop.exam.plan import TUNING_SEEDS, Scope, available, planned
 from twinloop.exam.results import Results
 from twinloop.exam.store import Store
 from twinloop.exam.study import work_off
 from twinloop.exam.systems import SUBJECTS
 from twinloop.exam.tables import FORMATS, as_text, render
 from twinloop.exam.tuning import EXPERIMENTS as TUNING_EXPERIMENTS
-from twinloop.exam.tuning import SEEDS as TUNING_SEEDS
 from twinloop.exam.tuning import score, tuned, variants
 
 ASK_ABOVE = 600.0
@@ -123,14 +123,7 @@ def _with_source(scope: Scope) -> Scope:
     fitted = any(isinstance(who, Fitter) for who in scope.learners)
     if not fitted or any(who.name == scope.data.name for who in scope.learners):
         return scope
-    return Scope(
-        scope.systems,
-        [scope.data, *scope.learners],
-        scope.data,
-        scope.seeds,
-        scope.experiments,
-        scope.retry,
-    )
+    return replace(scope, learners=[scope.data, *scope.learners])
 
 
 def _tune(scope: Scope, path: Path, jobs: int, yes: bool) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop.exam.kinds import Learner
 from twinloop.exam.learners import key
+from twinloop.exam.plan import TUNING_SEEDS
 from twinloop.exam.store import Row, Store
 
 
@@ -65,7 +66,7 @@ class Results:
         if row.address.learner == "optimum":
             return True
         seed = row.address.seed
-        return seed >= 10 if self.seeds is None else seed in self.seeds
+        return seed not in TUNING_SEEDS if self.seeds is None else seed in self.seeds
 
     def rows(self, system: str, learner: str) -> list[Row]:
         """Rows of a learner on a system, by seed and k; none if it was not measured."""

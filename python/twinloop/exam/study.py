@@ -20,6 +20,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from twinloop.campaign import available_threads
 from twinloop.errors import TwinloopError
 from twinloop.exam import campaigns
 from twinloop.exam.campaigns import Measured
@@ -80,14 +81,15 @@ def work_off(path: Path, jobs: Sequence[Job], processes: int) -> int:
 def _finished(path: Path, jobs: Sequence[Job], processes: int) -> Iterator[tuple[Job, str | None]]:
     if processes == 1 or len(jobs) < 2:
         for job in jobs:
-            yield job, work(path, job)
+            yield job, work(path, job, available_threads())
         return
     # Several processes that each use all cores for their linear algebra only wait for each other.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=context, initializer=_quietly) as pool:
         try:
-            futures = {pool.submit(work, path, job): job for job in jobs}
+            threads = max(1, available_threads() // processes)
+            futures = {pool.submit(work, path, job, threads): job for job in jobs}
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BaseException:
@@ -100,12 +102,13 @@ def _quietly() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def work(path: Path, job: Job) -> str | None:
+def work(path: Path, job: Job, threads: int = 1) -> str | None:
     """Does one job and keeps each row as soon as it is measured.
 
     Args:
         path: of the store.
         job: to be done.
+        threads: of the engine.
 
     Returns:
         Why it failed; None if it did not.
@@ -114,7 +117,7 @@ def work(path: Path, job: Job) -> str | None:
     missing = list(job.ks)
     try:
         judged = subject(job.address.system)
-        for k, measures, flight, seconds in _measured(job, judged, store):
+        for k, measures, flight, seconds in _measured(job, judged, store, threads):
             if k in missing:
                 store.write(Row(job.address, k, measures, seconds), flight)
                 missing.remove(k)
@@ -132,11 +135,12 @@ def work(path: Path, job: Job) -> str | None:
     return None
 
 
-def _measured(job: Job, judged: Subject, store: Store) -> Iterator[Measured]:
+def _measured(job: Job, judged: Subject, store: Store, threads: int) -> Iterator[Measured]:
     seed = job.address.seed
     match job.who:
         case Campaigner():
-            yield from campaigns.campaign(job.who, judged, _held_out(store, judged), seed, job.last)
+            judge = _held_out(store, judged)
+            yield from campaigns.campaign(job.who, judged, judge, seed, job.last, threads)
         case Flyer():
             yield from campaigns.random_gains(judged, seed, job.last)
         case Fitter():

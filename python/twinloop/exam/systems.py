@@ -253,7 +253,7 @@ def why_missing(name: str) -> str | None:
     """
     try:
         _ = subject(name).family
-    except (TwinloopError, TypeError) as reason:
+    except (TwinloopError, ImportError, TypeError) as reason:
         if name in SUBJECTS:
             return str(reason)
         raise

@@ -11,7 +11,6 @@ from twinloop.exam.kinds import Fitter, Tuner
 from twinloop.exam.results import Results
 from twinloop.exam.tables import Table
 
-SEEDS = range(10)
 EXPERIMENTS = (2, 4)
 """After Υ0, of the flights on which the fits are compared."""
 
