@@ -257,6 +257,14 @@ def test_the_integral_form_does_not_care_where_a_run_starts(excited, rig):
         np.testing.assert_allclose(a.features.T @ a.target, b.features.T @ b.target, rtol=1e-4, atol=1e-9)
 
 
+def test_declared_kinematics_leave_nothing_to_learn_of_the_angles():
+    names = ("roll", "pitch", "p", "q")
+    states = [types.SimpleNamespace(name=name, derivative_of=None) for name in names]
+    assert unknown_states(types.SimpleNamespace(states=states)) == [0, 1, 2, 3]
+    kinematics = types.SimpleNamespace(angles=("roll", "pitch"))
+    assert unknown_states(types.SimpleNamespace(states=states, kinematics=kinematics)) == [2, 3]
+
+
 def test_a_library_becomes_a_program_that_computes_it(rig):
     library = monomials(variables_of("all", rig.signals), degree=3)
     stream = np.random.default_rng(1)

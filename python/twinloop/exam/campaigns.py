@@ -126,7 +126,7 @@ def of_controller(subject: Subject, best: Test) -> dict[str, float | None]:
     Returns:
         Measures by name.
     """
-    return {"quality": subject.true_quality(best.genes)}
+    return {"quality": subject.judged(subject.test(best.genes, best.family))}
 
 
 def of_flight(subject: Subject, test: Test, flight: Trajectory) -> dict[str, float | None]:

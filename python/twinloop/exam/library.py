@@ -109,6 +109,9 @@ def unknown_states(signals: Signals) -> list[int]:
         Their indices, in the order of a model's outputs in the form "acceleration".
     """
     known = {state.derivative_of for state in signals.states}
+    kinematics = getattr(signals, "kinematics", None)
+    if kinematics is not None:  # body rates turn into attitude: declared, so nothing has to be learnt
+        known |= set(kinematics.angles)
     return [i for i, state in enumerate(signals.states) if state.name not in known]
 
 

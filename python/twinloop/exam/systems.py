@@ -22,6 +22,8 @@ from twinloop.trajectory import Trajectory
 JUDGE_SEED = 987_654
 """Of the noise under which controllers are judged; far from the seeds of campaigns."""
 NOISY_RUNS = 200
+NOISE = 1e-3
+"""Of the sensors, rad; five times as much in rad/s."""
 
 
 class Rig(Protocol):
@@ -105,24 +107,35 @@ class Subject:
         """Of the system."""
         return self.family.signals
 
-    def test(self, genes: ArrayLike) -> Test:
+    def test(self, genes: ArrayLike, family: Family | None = None) -> Test:
         """The exam's task under a controller, without excitation.
 
         Args:
             genes: gains (size,), in their units.
+            family: that they belong to; by default the system's own.
 
         Returns:
             A test that belongs to no campaign.
         """
         rig = self.true_rig
         steps = round(rig.duration / self.signals.dt)
-        return Test(self.family, np.asarray(genes), rig.initial_state, rig.target_state, steps)
+        return Test(family or self.family, np.asarray(genes), rig.initial_state, rig.target_state, steps)
 
     def true_quality(self, genes: ArrayLike, runs: int | None = None, seed: int = JUDGE_SEED) -> float:
-        """Quality of a controller on the true states, to be minimised.
+        """Quality of a controller of the system's own family, as `judged`.
 
         Args:
             genes: gains (size,), in their units.
+            runs: as for `judged`.
+            seed: as for `judged`.
+        """
+        return self.judged(self.test(genes), runs, seed)
+
+    def judged(self, test: Test, runs: int | None = None, seed: int = JUDGE_SEED) -> float:
+        """Quality of a test on the true states, to be minimised.
+
+        Args:
+            test: to be flown.
             runs: over whose noise it is averaged; by default `judged_runs`. Equal for all controllers.
             seed: of that noise.
 
@@ -131,7 +144,6 @@ class Subject:
         """
         runs = self.judged_runs if runs is None else runs
         rig = self.rig(seed) if runs else self.true_rig
-        test = self.test(genes)
         found = [
             quality.of_states(self.quality, quality.true_states(rig.run(test)), test)
             for _ in range(max(1, runs))
@@ -187,14 +199,20 @@ def _quadrotor(noise: float) -> Callable[[int], Any]:
     return lambda seed: systems.Quadrotor(noise=noise, seed=seed)
 
 
-def _harsh(**arguments: object) -> Any:
+def _harsh(seed: int) -> Any:
     make = getattr(systems.Quadrotor, "harsh", None)
     if make is None:
         raise NotAvailable(
             "System 'quadrotor-harsh': expected twinloop.systems.Quadrotor.harsh, found none in this version;"
             " leave the system out."
         )
-    return make(**arguments)
+    return make(noise=NOISE, seed=seed)
+
+
+def _harsh_in_calm_air() -> Any:
+    harsh = _harsh(0)
+    make: Any = systems.Quadrotor
+    return make(drag=harsh.drag, motor_lag=harsh.motor_lag)
 
 
 def _rotorpy(**arguments: object) -> Any:
@@ -211,15 +229,15 @@ SUBJECTS: dict[str, Subject] = {
     subject.name: subject
     for subject in (
         Subject("quadrotor-0", "final_distance", _quadrotor(0.0), systems.Quadrotor),
-        Subject("quadrotor", "final_distance", _quadrotor(1e-3), systems.Quadrotor, NOISY_RUNS),
-        Subject("quadrotor-noisy", "final_distance", _quadrotor(1e-2), systems.Quadrotor, NOISY_RUNS),
+        Subject("quadrotor", "final_distance", _quadrotor(NOISE), systems.Quadrotor, NOISY_RUNS),
+        Subject("quadrotor-noisy", "final_distance", _quadrotor(10.0 * NOISE), systems.Quadrotor, NOISY_RUNS),
         Subject(
             "quadrotor-harsh",
             "iae",
-            lambda seed: _harsh(noise=1e-3, seed=seed),
-            lambda: _harsh(noise=0.0, gusts=0.0, seed=0),
+            _harsh,
+            _harsh_in_calm_air,
         ),
-        Subject("rotorpy", "iae", lambda seed: _rotorpy(seed=seed), lambda: _rotorpy(noise=0.0, seed=0)),
+        Subject("rotorpy", "iae", lambda seed: _rotorpy(noise=NOISE, seed=seed), _rotorpy),
     )
 }
 """Systems of the exam by name."""
