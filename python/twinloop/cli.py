@@ -14,6 +14,7 @@ from twinloop import __version__
 from twinloop.campaign import Campaign
 from twinloop.console import Watch
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
+from twinloop.exam.command import bench
 from twinloop.files import check_picture, check_writable, write_text
 from twinloop.presets import PRESETS, options_of, parsed
 from twinloop.reproduce.command import reproduce
@@ -136,6 +137,7 @@ def run(
     context.exit(130 if campaign.interrupted else 0)
 
 
+main.add_command(bench)
 main.add_command(reproduce)
 
 
