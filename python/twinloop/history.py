@@ -18,6 +18,7 @@ class Experiment:
         before: closed-loop error of the twin before it learnt the run; None if there was no twin yet.
         frozen: closed-loop error of the model that never moves, on the run.
         final_distance: distance of the last measured state to the target; None if the run was cut.
+        quality: what the campaign minimises, as measured; None if the run was cut.
     """
 
     test: Test
@@ -25,6 +26,7 @@ class Experiment:
     before: float | None
     frozen: float
     final_distance: float | None
+    quality: float | None
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,72 @@ class TestLoop:
     evaluations: int
     predicted: float
     flown: float | None = None
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A test that the preset `default` has proposed.
+
+    Args:
+        test: number of the test.
+        genes: gains of the test, in their units.
+        predicted: quality on the committee, mean; infinite if a member diverges.
+        spread: standard deviation of it over the members.
+        risk: probability that the flight leaves the envelope, by the committee.
+        safe: whether every member keeps the margin.
+        bits: what the flight is expected to tell.
+        gain: quality that knowing the right member would bring.
+        reason: why this one.
+        flown: quality on the system, mean over complete runs; None if there was none.
+    """
+
+    test: int
+    genes: tuple[float, ...]
+    predicted: float
+    spread: float
+    risk: float
+    safe: bool
+    bits: float
+    gain: float
+    reason: str
+    flown: float | None = None
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """One identification of the preset `default`, and the tests planned after it.
+
+    Args:
+        iteration: its number, from 1.
+        tests: numbers of the selected tests, in the order they were told.
+        form: what the model's outputs mean.
+        terms: of the equations.
+        misfit: χ² of the predictions for each reading; 1 where only noise is left.
+        readings: that counted.
+        ignored: readings taken for outliers.
+        sensors: standard deviation of each state's sensor, estimated, in its unit.
+        lags: time constant of each command's actuator, s.
+        delays: of each command's actuator, periods.
+        closed_loop: of the best model, one for each selected test, SI units squared.
+        normalised: closed_loop over that of the model that never moves.
+        remarks: what a person should know.
+        asked: the tests planned after it.
+    """
+
+    iteration: int
+    tests: tuple[int, ...]
+    form: str
+    terms: int
+    misfit: float
+    readings: int
+    ignored: int
+    sensors: tuple[float, ...]
+    lags: tuple[float, ...]
+    delays: tuple[int, ...]
+    closed_loop: tuple[float, ...]
+    normalised: tuple[float, ...]
+    remarks: tuple[str, ...]
+    asked: tuple[Planned, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -95,7 +163,7 @@ class Progress:
     """Where a campaign is, as told to its progress callback after every chunk of work.
 
     Args:
-        phase: "models", "tests" or "experiment".
+        phase: "models", "tests", "experiment", or a step of the preset `default`.
         iteration: of the double loop.
         generation: of the loop that is running.
         generations: that it will run.

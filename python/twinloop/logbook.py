@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput, engine_input
-from twinloop.history import Experiment, Iteration, TestLoop
+from twinloop.history import Experiment, Iteration, Lesson, Planned, TestLoop
 from twinloop.objectives import frozen_error
 from twinloop.setup import Setup
 from twinloop.test import Test, check_signals, final_distance
@@ -28,19 +28,29 @@ class Logbook:
         self.setup = setup
         self.tests: list[Test] = []
         self.experiments: list[Experiment] = []
-        self.asked: list[tuple[int, TestLoop]] = []
+        self.asked: list[tuple[int, TestLoop | Planned]] = []
         self.selected = setup.none_selected()
         self._identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
 
     def new_test(
-        self, genes: Floats, *, excitation: Floats | None = None, predicted: float | None = None
+        self,
+        genes: Floats,
+        *,
+        excitation: Floats | None = None,
+        predicted: float | None = None,
+        spread: float | None = None,
+        risk: float | None = None,
+        reason: str = "",
     ) -> Test:
         """Enters a test.
 
         Args:
             genes: gains (size,), in their units.
             excitation: what is added to the controller's commands (n, n_u), in their units; None: nothing.
-            predicted: final distance that is expected.
+            predicted: quality that is expected.
+            spread: standard deviation of it.
+            risk: probability that the flight leaves the envelope.
+            reason: why this test.
 
         Returns:
             The test, under the next number.
@@ -55,6 +65,9 @@ class Logbook:
             number=len(self.tests),
             campaign=self._identity,
             predicted=predicted,
+            spread=spread,
+            risk=risk,
+            reason=reason,
         )
         self.tests.append(test)
         return test
@@ -80,6 +93,15 @@ class Logbook:
         )
         self.asked.append((iteration, loop))
 
+    def enter_plan(self, iteration: int, planned: Planned) -> None:
+        """Enters a test that was planned, and why.
+
+        Args:
+            iteration: of the models that judged it.
+            planned: what was expected of it.
+        """
+        self.asked.append((iteration, planned))
+
     def tell(
         self, test: object, trajectory: Trajectory, judge: Callable[[_core.SelectedTests], float | None]
     ) -> None:
@@ -102,31 +124,34 @@ class Logbook:
             before = judge(self.setup.none_selected().with_test(*run))
         complete = trajectory.ended == "completed" and trajectory.steps == known.steps
         distance = final_distance(trajectory.states[-1], known.target_state) if complete else None
-        experiment = Experiment(known, trajectory, before, frozen_error(trajectory), distance)
+        quality = distance
+        if complete and self.setup.preset != "paper":
+            quality = self.setup.quality.flown(trajectory, known.target_state)
+        experiment = Experiment(known, trajectory, before, frozen_error(trajectory), distance, quality)
         self.selected = selected
         self.experiments.append(experiment)
 
     def measured(self, test: int) -> float | None:
-        """Final distance of a test on the system, mean over complete runs; None if there was none.
+        """Quality of a test on the system, mean over complete runs; None if there was none.
 
         Args:
             test: its number.
         """
-        distances = [
-            run.final_distance
+        values = [
+            run.quality
             for run in self.experiments
-            if run.test.number == test and run.final_distance is not None
+            if run.test.number == test and run.quality is not None
         ]
-        return math.fsum(distances) / len(distances) if distances else None
+        return math.fsum(values) / len(values) if values else None
 
     def best(self) -> Test:
-        """The flown test that ended nearest to its target; the first one if no run was complete."""
+        """The flown test of the best quality; the first one if no run was complete."""
 
-        def distance(test: Test) -> float:
+        def quality(test: Test) -> float:
             measured = self.measured(test.number)
             return math.inf if measured is None else measured
 
-        return min((run.test for run in self.experiments), key=distance)
+        return min((run.test for run in self.experiments), key=quality)
 
     def waiting(self) -> Test | None:
         """The first test that was asked for and not told; before the first flight, the last that was made."""
@@ -135,6 +160,27 @@ class Logbook:
             if loop.test not in told:
                 return self.tests[loop.test]
         return self.tests[-1] if self.tests and not told else None
+
+    def with_plans(self, records: Sequence[Lesson]) -> tuple[Lesson, ...]:
+        """Lessons with the tests that were planned after each.
+
+        Args:
+            records: of the identifications.
+
+        Returns:
+            The same, complete.
+        """
+        plans = [
+            (iteration, dataclasses.replace(plan, flown=self.measured(plan.test)))
+            for iteration, plan in self.asked
+            if isinstance(plan, Planned)
+        ]
+        return tuple(
+            dataclasses.replace(
+                record, asked=tuple(plan for iteration, plan in plans if iteration == record.iteration)
+            )
+            for record in records
+        )
 
     def with_loops(self, records: Sequence[Iteration]) -> tuple[Iteration, ...]:
         """Iterations with the test loops that followed each.
@@ -148,6 +194,7 @@ class Logbook:
         loops = [
             (iteration, dataclasses.replace(loop, flown=self.measured(loop.test)))
             for iteration, loop in self.asked
+            if isinstance(loop, TestLoop)
         ]
         return tuple(
             dataclasses.replace(

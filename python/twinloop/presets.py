@@ -1,14 +1,19 @@
-"""Every choice that the double loop leaves open, named; the defaults are the preset `paper`."""
+"""The presets, and every option by name: what the paper leaves open, and each idea that goes beyond it."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from twinloop.errors import InvalidInput, unknown
+from twinloop.identification.libraries import LIBRARIES
+from twinloop.identification.settings import FORMS as ALL_FORMS
+from twinloop.identification.settings import IdentificationOptions
+from twinloop.planning.settings import TESTS, PlanningOptions
 
 FORMS = ("absolute", "increment", "acceleration")
 TRADEOFFS = ("raw", "normalised")
@@ -87,16 +92,7 @@ class Options:
     test_mutation_step: float = 0.1
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            object.__setattr__(
-                self, field.name, _typed(field.name, str(field.type), getattr(self, field.name))
-            )
-        for name, (low, high) in _RANGES.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise InvalidInput(
-                    f"Option {name!r}: expected {low:g} to {high:g}, found {value!r}; change it."
-                )
+        _check(self, _RANGES)
         for name, choices in (("form", FORMS), ("tradeoff", TRADEOFFS)):
             if getattr(self, name) not in choices:
                 raise unknown(f"value of the option {name!r}", getattr(self, name), choices)
@@ -124,7 +120,69 @@ class Options:
         return max(1, self.model_generations // (20 if self.control_quality else 30))
 
 
+@dataclass(frozen=True)
+class DefaultOptions(PlanningOptions, IdentificationOptions):
+    """Options of the preset `default`: how a twin is identified, then how tests are planned.
+
+    Each is described where it is defined: `IdentificationOptions` and `PlanningOptions`.
+
+    Raises:
+        InvalidInput: a value out of range.
+    """
+
+    def __post_init__(self) -> None:
+        _check(self, _DEFAULT_RANGES)
+        for name, choices in (("form", ALL_FORMS), ("tests", TESTS)):
+            if getattr(self, name) not in choices:
+                raise unknown(f"value of the option {name!r}", getattr(self, name), choices)
+        for name in self.libraries:
+            if name not in LIBRARIES:
+                raise unknown("library", name, LIBRARIES)
+        for name in self.operators:
+            if name not in OPERATORS:
+                raise unknown("operator", name, OPERATORS)
+        if not self.libraries and (self.generations == 0 or not self.operators):
+            raise InvalidInput(
+                "Options libraries, generations, operators: expected a library or evolved programs, found neither;"
+                " name a library, or set generations above 0 and name operators."
+            )
+
+
+OPERATORS = ("+", "-", "*", "/", "min", "max", "sin", "cos", "tanh", "exp", "sqrt", "abs")
+"""What an evolved program may compute."""
+AnyOptions = Options | DefaultOptions
+"""Options of some preset."""
+
 _MANY = 10**9
+_DEFAULT_RANGES: dict[str, tuple[float, float]] = {
+    "generations": (0, 100_000),
+    "restarts": (1, 1000),
+    "population": (10, 3000),
+    "longest": (1, 1000),
+    "moves": (100, _MANY),
+    "starts": (1, 1000),
+    "largest": (1, 200),
+    "most_terms": (1, 3000),
+    "longest_delay": (0, 100),
+    "tuning_steps": (0, 1000),
+    "passes": (1, 10),
+    "committee_size": (1, 1000),
+    "divergence_factor": (1, 1e6),
+    "excitation": (0, 10),
+    "excitation_most": (0, 10),
+    "fade": (0, 1),
+    "candidates": (2, 100_000),
+    "nearness": (0, 1),
+    "share": (0, 1),
+    "draws": (1, 1000),
+    "margin": (0, 0.99),
+    "evaluations": (64, _MANY),
+    "tuning_starts": (1, 100),
+    "tuning_members": (1, 1000),
+    "confidence": (0, 1),
+    "effort": (0, 1e12),
+    "effort_rate": (0, 1e12),
+}
 _RANGES: dict[str, tuple[float, float]] = {
     "model_population": (2, _MANY),
     "model_generations": (1, _MANY),
@@ -154,7 +212,7 @@ _RANGES: dict[str, tuple[float, float]] = {
 }
 
 
-def options_of(preset: str, changes: Mapping[str, object] | None = None) -> Options:
+def options_of(preset: str, changes: Mapping[str, object] | None = None) -> AnyOptions:
     """A preset with some options changed.
 
     Args:
@@ -173,17 +231,18 @@ def options_of(preset: str, changes: Mapping[str, object] | None = None) -> Opti
         raise InvalidInput(
             f"Options: expected a dict of values by name, found {changes!r}; write {{name: value}}."
         )
-    names = [field.name for field in dataclasses.fields(Options)]
+    names = [field.name for field in dataclasses.fields(PRESETS[preset])]
     for name in changes or {}:
         if name not in names:
-            raise unknown("option", name, names)
+            raise unknown(f"option of the preset {preset!r}", name, names)
     return dataclasses.replace(PRESETS[preset], **dict(changes or {}))  # type: ignore[arg-type]
 
 
-def parsed(name: str, text: str) -> object:
+def parsed(preset: str, name: str, text: str) -> object:
     """The value of an option that was written as text.
 
     Args:
+        preset: whose option it is.
         name: of the option.
         text: such as "300", "true", "none" or "+,-,*".
 
@@ -193,24 +252,41 @@ def parsed(name: str, text: str) -> object:
     Raises:
         InvalidInput: an unknown option, or text that is no such value.
     """
-    kinds = {field.name: str(field.type) for field in dataclasses.fields(Options)}
+    if preset not in PRESETS:
+        raise unknown("preset", preset, PRESETS)
+    kinds = {field.name: str(field.type) for field in dataclasses.fields(PRESETS[preset])}
     if name not in kinds:
-        raise unknown("option", name, kinds)
+        raise unknown(f"option of the preset {preset!r}", name, kinds)
     kind = kinds[name]
     if kind == "str":
         return text
     if kind.startswith("tuple"):
-        return tuple(item.strip() for item in text.split(",") if item.strip())
+        items = [item.strip() for item in text.split(",") if item.strip()]
+        return tuple(_number(name, item) for item in items) if "float" in kind else tuple(items)
     if kind == "bool" and text.lower() in ("true", "false"):
         return text.lower() == "true"
     if kind.endswith("None") and text.lower() == "none":
         return None
+    return _number(name, text, kind)
+
+
+def _number(name: str, text: str, kind: str = "float") -> float:
     try:
         return int(text) if kind.startswith("int") else float(text)
     except ValueError as reason:
         raise InvalidInput(
             f"Option {name!r}: expected {_article(kind)}, found {text!r}; write one."
         ) from reason
+
+
+def _check(options: Any, ranges: Mapping[str, tuple[float, float]]) -> None:
+    for field in dataclasses.fields(options):
+        value = _typed(field.name, str(field.type), getattr(options, field.name))
+        object.__setattr__(options, field.name, value)
+    for name, (low, high) in ranges.items():
+        value = getattr(options, name)
+        if value is not None and not low <= value <= high:
+            raise InvalidInput(f"Option {name!r}: expected {low:g} to {high:g}, found {value!r}; change it.")
 
 
 def _typed(name: str, kind: str, value: object) -> object:
@@ -229,7 +305,13 @@ def _typed(name: str, kind: str, value: object) -> object:
     if kind == "str" and isinstance(value, str):
         return value
     if (
-        kind.startswith("tuple")
+        kind.startswith("tuple[float")
+        and isinstance(value, (tuple, list))
+        and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
+    ):
+        return tuple(float(v) for v in value)
+    if (
+        kind.startswith("tuple[str")
         and isinstance(value, (tuple, list))
         and all(isinstance(v, str) for v in value)
     ):
@@ -242,5 +324,5 @@ def _article(kind: str) -> str:
     return words.get(kind, "a list of names" if kind.startswith("tuple") else "a whole number")
 
 
-PRESETS: dict[str, Options] = {"paper": Options()}
+PRESETS: dict[str, AnyOptions] = {"default": DefaultOptions(), "paper": Options()}
 """Sets of options by name."""

@@ -13,7 +13,9 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, number, whole
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, engine_input, unknown
-from twinloop.presets import Options, options_of
+from twinloop.planning.planner import GOALS
+from twinloop.planning.quality import KINDS, Quality, quality_of
+from twinloop.presets import AnyOptions, DefaultOptions, Options, options_of
 from twinloop.search import grammar, settings_of_tests, variation
 from twinloop.signals import Signals
 
@@ -31,6 +33,8 @@ class Setup:
         preset: name of the set of options.
         options: the preset's, with those that were changed.
         seed: of all random numbers.
+        goal: what flights are for, "both", "model" or "control".
+        quality: what is minimised.
     """
 
     signals: Signals
@@ -39,8 +43,10 @@ class Setup:
     target_state: Floats
     steps: int
     preset: str
-    options: Options
+    options: AnyOptions
     seed: int
+    goal: str
+    quality: Quality
 
     @cached_property
     def task(self) -> _core.Task:
@@ -61,6 +67,9 @@ def checked(
     preset: str,
     options: Mapping[str, object] | None,
     seed: object,
+    goal: str | None,
+    quality: str | None,
+    operators: Sequence[str] | None,
 ) -> Setup:
     """The arguments of a campaign, if they can be used.
 
@@ -73,6 +82,9 @@ def checked(
         preset: name of a set of options.
         options: other values for some of them.
         seed: of all random numbers.
+        goal: what flights are for; None: the preset's.
+        quality: what is minimised; None: the preset's.
+        operators: that evolved programs may use; None: the preset's.
 
     Returns:
         The setup.
@@ -105,14 +117,48 @@ def checked(
     if known_seed >= 2**64:
         raise InvalidInput(f"Campaign, seed: expected less than 2**64, found {seed}; choose a smaller one.")
     steps = _steps(number("Campaign, duration (s)", duration, above=0.0), signals.dt)
-    chosen = options_of(preset, options)
-    setup = Setup(signals, controller.bind(signals), start, target, steps, preset, chosen, known_seed)
+    changes = dict(options or {}) if isinstance(options or {}, Mapping) else options
+    if operators is not None and isinstance(changes, dict):
+        changes["operations" if preset == "paper" else "operators"] = tuple(operators)
+    chosen = options_of(preset, changes)
+    purpose, measure = _purpose(preset, goal, quality, chosen, signals)
+    family = controller.bind(signals)
+    setup = Setup(
+        signals, family, start, target, steps, preset, chosen, known_seed, purpose, measure
+    )
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
-        grammar(chosen, signals)
-        variation(chosen, chosen.model_population)
-        settings_of_tests(chosen)
+    if isinstance(chosen, Options):
+        with engine_input():
+            grammar(chosen, signals)
+            variation(chosen, chosen.model_population)
+            settings_of_tests(chosen)
     return setup
+
+
+def _purpose(
+    preset: str, goal: str | None, quality: str | None, options: AnyOptions, signals: Signals
+) -> tuple[str, Quality]:
+    """What flights are for and what is minimised; the paper knows one answer to each."""
+    if isinstance(options, DefaultOptions):
+        goal, quality = goal or "both", quality or "iae"
+        for what, value, known in (("goal", goal, GOALS), ("quality", quality, KINDS)):
+            if value not in known:
+                raise unknown(what, value, known)
+        if len(options.quality_weights) not in (0, signals.n_x):
+            raise InvalidInput(
+                f"Option 'quality_weights': expected {signals.n_x} numbers, one a state, or none, found"
+                f" {len(options.quality_weights)}; write one for each."
+            )
+        weights, effort, rate = options.quality_weights, options.effort, options.effort_rate
+        return goal, quality_of(quality, signals, weights, effort, rate)
+    for what, value, only in (("goal", goal, "both"), ("quality", quality, "final_distance")):
+        if value not in (None, only):
+            raise InvalidInput(
+                f"Campaign, {what}: expected {only!r} with the preset {preset!r}, found {value!r}; leave it out, or"
+                ' choose preset="default".'
+            )
+    return "both", quality_of("final_distance", signals)
 
 
 def refuse_arguments(where: str, found: Mapping[str, object], known: Sequence[str]) -> None:

@@ -29,8 +29,12 @@ class Test:
             the commands' bounds. None: nothing.
         number: its number in the campaign, from 0.
         campaign: identity of the campaign that it belongs to; empty if none.
-        predicted: final distance that the twin predicts, where it was asked; infinite if it diverges.
-        measured: final distance that was flown, mean over complete runs; None if there was none.
+        predicted: quality that the twin predicts, where it was asked (with the preset "paper" the final distance);
+            infinite if it diverges.
+        measured: quality that was flown, mean over complete runs; None if there was none.
+        spread: standard deviation of the prediction over the committee; None where there was none.
+        risk: probability that the flight leaves the envelope, by the committee; None where there was none.
+        reason: why this test, for a person.
 
     Raises:
         InvalidInput: shapes that do not fit the family's signals, or numbers that are not finite.
@@ -48,6 +52,9 @@ class Test:
     campaign: str = ""
     predicted: float | None = None
     measured: float | None = None
+    spread: float | None = None
+    risk: float | None = None
+    reason: str = ""
 
     def __post_init__(self) -> None:
         n_x = self.family.signals.n_x
@@ -74,7 +81,7 @@ class Test:
         return self.family.controller(self.genes, self.excitation)
 
     def judged(self, predicted: float | None, measured: float | None) -> Test:
-        """The same test with its final distances.
+        """The same test with its quality.
 
         Args:
             predicted: what the twin predicts.

@@ -7,6 +7,7 @@ repeated on states that the model has smoothed.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -154,7 +155,8 @@ class _Learner:
         self.watch = watch
         self.scales = np.array([state.scale for state in signals.states])
         if known is not None and known.model.form == self.form:
-            self.pool, self.known = known.pool, known
+            # A copy: what an interrupted attempt has entered must not change the next one.
+            self.pool, self.known = copy.deepcopy(known.pool), known
         else:
             self.pool, self.known = Pool(signals.n_x + signals.n_u, len(options.operators)), None
         self.stream = 0

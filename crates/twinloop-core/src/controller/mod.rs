@@ -73,8 +73,8 @@ impl Family {
                 parameters.len()
             ));
         }
-        let commands = feedback.output.commands();
-        Ok(Self { law: AnyLaw::StateFeedback(feedback), parameters, states, commands })
+        let bounds = feedback.output.bounds().to_vec();
+        Ok(Self { law: AnyLaw::StateFeedback(feedback), parameters, states, bounds })
     }
 
     /// The box of the parameters.

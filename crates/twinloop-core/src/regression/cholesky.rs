@@ -114,7 +114,8 @@ mod tests {
                 prop_assert!((product - b[i]).abs() < 1e-8);
                 for k in 0..4 {
                     let product: f64 = (0..4).map(|j| a[i * 4 + j] * inverse[j * 4 + k]).sum();
-                    prop_assert!((product - if i == k { 1.0 } else { 0.0 }).abs() < 1e-8);
+                    let identity = if i == k { 1.0 } else { 0.0 };
+                    prop_assert!((product - identity).abs() < 1e-8);
                 }
             }
         }

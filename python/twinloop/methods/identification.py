@@ -1,0 +1,289 @@
+"""The way of the preset `default`: identify a twin and a committee, tune the gains on them, plan the next test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.history import Lesson, Planned, Progress
+from twinloop.identification.identify import Identified, identify_runs
+from twinloop.identification.records import Run
+from twinloop.logbook import Logbook
+from twinloop.methods.errors import errors
+from twinloop.models import Twin
+from twinloop.objectives import closed_loop, normalised_error
+from twinloop.planning.planner import Committee, Planner, Task
+from twinloop.presets import DefaultOptions
+from twinloop.setup import Setup
+from twinloop.test import Test
+
+STEPS = ("noise", "actuators", "terms", "evolution", "smoothed", "committee", "gains", "candidates")
+"""What there is to see while it works, in order."""
+WRONG = 0.5
+"""Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
+
+
+class IdentifyAndPlan:
+    """Learns by identification, asks by planning.
+
+    Args:
+        setup: of the campaign.
+        options: of the preset.
+        workers: how the work is carried out.
+        report: called with a `Progress` at every step.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        options: DefaultOptions,
+        workers: _core.Workers,
+        report: Callable[[Progress], None],
+    ) -> None:
+        self.setup = setup
+        self.options = options
+        self.workers = workers
+        self.report = report
+        self.iteration = 0
+        self.identified: Identified | None = None
+        self._learnt = 0
+        self._told: tuple[int, ...] = ()
+        self._believed: list[_core.Model] = []
+        self._tuned: tuple[int, Floats] | None = None
+        self._best: tuple[int, Test] | None = None
+        self._lessons: list[Lesson] = []
+        task = Task(setup.initial_state, setup.target_state, setup.steps)
+        self.planner = Planner(
+            setup.family,
+            task,
+            setup.quality,
+            options,
+            divergence_factor=options.divergence_factor,
+            seed=setup.seed,
+            workers=workers,
+            watch=self._watch,
+        )
+
+    def learn(self, book: Logbook, at_once: bool = False) -> None:
+        """Identifies from all that was told; an interruption leaves what was known before."""
+        told = len(book.experiments)
+        if told == self._learnt or (at_once and self.identified is not None):
+            return
+        self._told = tuple(run.test.number for run in book.experiments)
+        runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in book.experiments]
+        identified = identify_runs(
+            runs,
+            self.setup.signals,
+            self.options,
+            rests=self._rests(),
+            seed=self.setup.seed,
+            iteration=told,
+            known=self.identified,
+            workers=self.workers,
+            watch=lambda step: self._watch(step, 0.0),
+        )
+        free = closed_loop(identified.members, book.selected, self.workers)
+        frozen = np.array([run.frozen for run in book.experiments])
+        # A member that cannot follow the flights that it was learnt from is no member (E-SINDy's stability filter).
+        wrong = free > np.maximum(WRONG * frozen, 4.0 * free[0])
+        believed = [m for m, off in zip(identified.members, wrong.any(axis=1), strict=True) if not off]
+        self._believed = believed or [identified.model]
+        self.identified, self._learnt, self.iteration = identified, told, told
+        self._lessons.append(self._lesson(identified, book, free[0].tolist()))
+
+    def ask(self, book: Logbook, last: bool) -> Test:
+        """The next test, with what is expected of it."""
+        number = len(book.tests)
+        if self.options.tests != "ask":
+            genes, excitation = self.planner.baseline(number, book.experiments[0].test.genes)
+            test = book.new_test(genes, excitation=excitation, reason="No committee was asked.")
+            plan = Planned(
+                test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
+            )
+            book.enter_plan(self.iteration, plan)
+            return test
+        committee = self._committee()
+        tuned = self._gains(book)
+        told = {run.test.number for run in book.experiments}
+        waiting = any(plan.test not in told for _, plan in book.asked)
+        exploit = not waiting and (
+            (last and self.options.exploit_last) or (self.setup.goal == "control" and len(told) > 1)
+        )
+        found = self.planner.propose(
+            committee, tuned, self.setup.goal, number, len(book.experiments), self._first_quality(book), exploit
+        )
+        test = book.new_test(
+            found.genes,
+            excitation=found.excitation,
+            predicted=found.predicted,
+            spread=found.spread,
+            risk=found.risk,
+            reason=found.reason,
+        )
+        plan = Planned(
+            test=test.number,
+            genes=tuple(found.genes.tolist()),
+            predicted=found.predicted,
+            spread=found.spread,
+            risk=found.risk,
+            safe=found.safe,
+            bits=found.disagreement / float(np.log(2.0)),
+            gain=found.gain,
+            reason=found.reason,
+        )
+        book.enter_plan(self.iteration, plan)
+        return test
+
+    def best_test(self, book: Logbook) -> Test:
+        """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
+        if self._best is not None and self._best[0] == len(book.experiments):
+            return self._best[1]
+        committee, flown = self._committee(), book.best().quiet()
+        tuned = self._gains(book)
+        genes = np.stack([tuned, flown.genes])
+        judged = self.planner.judge(committee.members, genes, committee.sds, self.options.draws)
+        measured = book.measured(flown.number)
+        new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
+        better = float((new < old).mean())
+        safe = float(judged.usages[:, :, 0].max()) <= 1.0
+        trusted = committee.trusted and safe and better >= self.options.confidence
+        pick = 0 if trusted else 1
+        known = next((t for t in book.tests if t.genes.tobytes() == tuned.tobytes()), None)
+        means = judged.qualities[:, :, pick].mean(axis=1)
+        if pick == 1:
+            reason = (
+                f"The best gains flown: the twin prefers others in {100 * better:.0f} % of its predictions only."
+            )
+            test = flown.judged(float(means.mean()), measured)
+        else:
+            reason = f"Tuned on the twin, which prefers them to the best flown in {100 * better:.0f} % of its predictions."
+            number = len(book.tests) if known is None else known.number
+            number_measured = None if known is None or known.excitation is not None else book.measured(number)
+            test = Test(
+                self.setup.family,
+                tuned,
+                self.setup.initial_state,
+                self.setup.target_state,
+                self.setup.steps,
+                None,
+                number=number,
+                campaign=flown.campaign,
+                predicted=float(means.mean()),
+                measured=number_measured,
+            )
+        answer = test.explained(float(means.std()), self._risk(judged.usages[:, :, pick]), reason)
+        self._best = (len(book.experiments), answer)
+        return answer
+
+    def first_excitation(self, number: int) -> Floats | None:
+        """A gentle chirp that fades out."""
+        return self.planner.first_excitation(number)
+
+    def twin(self, book: Logbook) -> Twin:
+        """The best model, with the committee and the sensors' noise for its band."""
+        known = self._known()
+        return Twin(
+            known.model,
+            self.setup.signals,
+            errors(known.model, book, self.workers),
+            self.options.divergence_factor,
+            members=self._believed,
+            noise=known.noise(self.setup.signals),
+            seed=self.setup.seed,
+        )
+
+    @property
+    def best_model(self) -> _core.Model | None:
+        """The best model so far."""
+        return None if self.identified is None else self.identified.model
+
+    def history(self, book: Logbook) -> tuple[Lesson, ...]:
+        """One record for each identification."""
+        return book.with_plans(self._lessons)
+
+    def committee(self) -> Sequence[_core.Model]:
+        """Members that follow the flown tests, the best first."""
+        return self._believed
+
+    # Inside
+
+    def _known(self) -> Identified:
+        assert self.identified is not None
+        return self.identified
+
+    def _committee(self) -> Committee:
+        known = self._known()
+        return Committee(self._believed, known.sensors(self.setup.signals.n_x), bool(np.isfinite(known.left)))
+
+    def _gains(self, book: Logbook) -> Floats:
+        """Gains tuned on the committee; the best ones flown where no model can be trusted."""
+        if self._tuned is None or self._tuned[0] != len(book.experiments):
+            committee = self._committee()
+            starts = [book.best().genes]
+            if self._tuned is not None:
+                starts.append(self._tuned[1])
+            first = book.experiments[0].test.genes
+            if first.tobytes() != starts[0].tobytes():
+                starts.append(first)
+            if committee.trusted:
+                genes, _ = self.planner.tune(committee, starts, 2 * len(book.experiments))
+            else:
+                genes = starts[0]
+            self._tuned = (len(book.experiments), genes)
+        return self._tuned[1]
+
+    def _first_quality(self, book: Logbook) -> float:
+        first = book.measured(book.experiments[0].test.number)
+        if first is not None:
+            return first
+        committee = self._committee()
+        genes = book.experiments[0].test.genes[np.newaxis]
+        return float(self.planner.judge(committee.members[:1], genes, committee.sds, 1).mean[0])
+
+    def _rests(self) -> list[Floats]:
+        """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
+        family, target = self.setup.family, self.setup.target_state
+        middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
+        return [family.controller(middle).command(target, target)]
+
+    def _risk(self, usages: Floats) -> float:
+        return (float((usages > 1.0).sum()) + 0.5) / (usages.size + 1.0)
+
+    def _lesson(self, known: Identified, book: Logbook, free: list[float]) -> Lesson:
+        return Lesson(
+            iteration=self.iteration,
+            tests=self._told,
+            form=known.model.form,
+            terms=known.terms,
+            misfit=known.misfit,
+            readings=known.readings,
+            ignored=known.ignored,
+            sensors=tuple(known.sensors(self.setup.signals.n_x).tolist()),
+            lags=tuple(lag for lag, _, _ in known.actuators),
+            delays=tuple(delay for _, delay, _ in known.actuators),
+            closed_loop=tuple(free),
+            normalised=tuple(
+                normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)
+            ),
+            remarks=tuple(known.remarks),
+        )
+
+    def _watch(self, step: str, share: float) -> None:
+        lesson = self._lessons[-1] if self._lessons else None
+        self.report(
+            Progress(
+                phase=step,
+                iteration=max(1, self.iteration),
+                generation=STEPS.index(step) + 1 if step in STEPS else 0,
+                generations=len(STEPS),
+                told=len(self._told),
+                tests=() if lesson is None else lesson.tests,
+                open_loop=(),
+                closed_loop=() if lesson is None else lesson.closed_loop,
+                archive_size=len(self._believed),
+                evaluations=0,
+            )
+        )

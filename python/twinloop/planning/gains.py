@@ -1,0 +1,90 @@
+"""Tuning of gains by CMA-ES, from several starts: the true cost has several basins."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.controllers import Family
+
+Score = Callable[[Floats], Floats]
+"""Scores (K,), to be minimised, of genes (K, size)."""
+
+
+def to_unit(family: Family, genes: Floats) -> Floats:
+    """Genes (…, size) as places in the box, 0 to 1, logarithmic where decades matter."""
+    places = np.empty_like(genes, dtype=np.float64)
+    for i, gain in enumerate(family.gains):
+        if gain.logarithmic:
+            low, high = np.log(gain.low), np.log(gain.high)
+            places[..., i] = (np.log(genes[..., i]) - low) / (high - low)
+        else:
+            places[..., i] = (genes[..., i] - gain.low) / (gain.high - gain.low)
+    return places
+
+
+def from_unit(family: Family, places: Floats) -> Floats:
+    """The genes at places in the box; the inverse of `to_unit`, clipped to the bounds."""
+    genes = np.empty_like(places)
+    for i, gain in enumerate(family.gains):
+        place = np.clip(places[..., i], 0.0, 1.0)
+        if gain.logarithmic:
+            low, high = np.log(gain.low), np.log(gain.high)
+            value = np.exp(low + (high - low) * place)
+        else:
+            value = gain.low + (gain.high - gain.low) * place
+        genes[..., i] = np.clip(value, gain.low, gain.high)
+    return genes
+
+
+def tune_gains(
+    family: Family,
+    score: Score,
+    starts: Sequence[Floats],
+    *,
+    evaluations: int,
+    spread: float,
+    seed: int,
+    watch: Callable[[], None] = lambda: None,
+) -> tuple[Floats, float]:
+    """Gains of the lowest score (Hansen 2001).
+
+    Args:
+        family: of the controllers.
+        score: of genes, a row each.
+        starts: genes to start from, one search each.
+        evaluations: of all searches together.
+        spread: standard deviation of the first steps, in ranges of the gains.
+        seed: of the searches.
+        watch: called after every generation.
+
+    Returns:
+        The genes, and their score.
+    """
+    from cmaes import CMA  # imported here: it takes a while
+
+    size = family.size
+    bounds = np.tile([0.0, 1.0], (size, 1))
+    best_genes, best = np.asarray(starts[0], dtype=np.float64), float(score(np.atleast_2d(starts[0]))[0])
+    for number, start in enumerate(starts):
+        mean = np.clip(to_unit(family, np.asarray(start, dtype=np.float64)), 0.02, 0.98)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            search = CMA(
+                mean=mean, sigma=spread, bounds=bounds, seed=(seed + number) % 2**32, population_size=32
+            )
+        for _ in range(max(1, evaluations // (len(starts) * 32))):
+            places = np.stack([search.ask() for _ in range(search.population_size)])
+            genes = from_unit(family, places)
+            scores = score(genes)
+            i = int(np.argmin(scores))
+            if scores[i] < best:
+                best_genes, best = genes[i], float(scores[i])
+            search.tell(list(zip(places, scores.tolist(), strict=True)))
+            watch()
+            if search.should_stop():
+                break
+    return best_genes, best

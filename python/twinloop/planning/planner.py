@@ -1,0 +1,359 @@
+"""Picks the next test: on which the committee disagrees, near the task, inside the envelope on every member."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.controllers import Family
+from twinloop.flights import candidates, disagreements, qualities
+from twinloop.planning.excitation import binary, chirps
+from twinloop.planning.gains import from_unit, to_unit, tune_gains
+from twinloop.planning.quality import Quality
+from twinloop.planning.settings import PlanningOptions
+
+GOALS = ("both", "model", "control")
+HOPELESS = 1e9
+"""What a flight that diverges is worth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Start, target and length of flights."""
+
+    initial_state: Floats
+    target_state: Floats
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class Committee:
+    """Models that judge, the best first, and the noise of the sensors.
+
+    Args:
+        members: m of them.
+        sds: of each state's sensor (n_x,).
+        trusted: whether the best one explains the runs that it was learnt from without diverging.
+    """
+
+    members: Sequence[_core.Model]
+    sds: Floats
+    trusted: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A test that is proposed.
+
+    Args:
+        genes: its gains (size,).
+        excitation: (n, n_u), or None.
+        predicted: mean quality over members and draws; infinite if any diverges.
+        spread: standard deviation of the members' means.
+        risk: share of predicted flights that leave the envelope, with half a flight added on either side.
+        safe: whether every member keeps the margin.
+        disagreement: of the committee, log det.
+        gain: quality that knowing the right member would bring, by the committee's own estimate.
+        reason: for a person.
+    """
+
+    genes: Floats
+    excitation: Floats | None
+    predicted: float
+    spread: float
+    risk: float
+    safe: bool
+    disagreement: float
+    gain: float
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Qualities (members, draws, K) and the worst usage of the envelope (members, draws, K)."""
+
+    qualities: Floats
+    usages: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """Over members and draws (K,)."""
+        return self.qualities.mean(axis=(0, 1))
+
+    @property
+    def worst_usage(self) -> Floats:
+        """Over members and draws (K,)."""
+        return self.usages.max(axis=(0, 1))
+
+
+class Planner:
+    """Judges flights on a committee.
+
+    Args:
+        family: of the controllers.
+        task: of the flights.
+        quality: what is minimised.
+        options: of the planning.
+        divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
+        seed: of the campaign.
+        workers: how the work is carried out.
+        watch: called now and then, with what is being done and how far it is (0 to 1).
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        task: Task,
+        quality: Quality,
+        options: PlanningOptions,
+        *,
+        divergence_factor: float,
+        seed: int,
+        workers: _core.Workers,
+        watch: Callable[[str, float], None] = lambda step, share: None,
+    ) -> None:
+        self.family = family
+        self.signals = family.signals
+        self.task = task
+        self.quality = quality
+        self.options = options
+        self.divergence_factor = divergence_factor
+        self.seed = seed
+        self.workers = workers
+        self.watch = watch
+
+    # Judging
+
+    def judge(
+        self,
+        members: Sequence[_core.Model],
+        genes: Floats,
+        sds: Floats,
+        draws: int,
+        excitation: Floats | None = None,
+    ) -> Judged:
+        """Flies candidates on members under noise; what diverges is worth `HOPELESS`."""
+        noise = self.noise(sds, draws)
+        values, usages = qualities(
+            members, self._flights(genes, excitation), self.quality.engine, self.signals,
+            noise=noise, workers=self.workers,
+        )  # fmt: skip
+        return Judged(
+            np.where(np.isfinite(values), values, HOPELESS), np.where(np.isfinite(usages), usages, HOPELESS)
+        )
+
+    def noise(self, sds: Floats, draws: int) -> Floats | None:
+        """The same draws of sensor noise for everybody (draws, n + 1, n_x); None for a single, quiet flight."""
+        if draws < 2:
+            return None
+        stream = self._stream(1, 0)
+        shape = (draws, self.task.steps + 1, self.signals.n_x)
+        return np.asarray(sds * stream.standard_normal(shape), dtype=np.float64)
+
+    def tune(self, committee: Committee, starts: Sequence[Floats], number: int) -> tuple[Floats, float]:
+        """Gains of the best quality on the committee, inside the envelope with its margin.
+
+        Args:
+            committee: that judges.
+            starts: genes to start from.
+            number: of the call, for its stream.
+
+        Returns:
+            The genes and their score, quality plus what is paid for leaving the margin.
+        """
+        options = self.options
+        stream = self._stream(2, number)
+        places = np.clip(to_unit(self.family, np.stack(starts)), 0.0, 1.0)
+        all_starts = list(starts)
+        while len(all_starts) < options.tuning_starts:
+            # The middle between what is known and anywhere: basins that no flight has seen.
+            other = 0.5 * places[0] + 0.5 * stream.random(self.family.size)
+            all_starts.append(from_unit(self.family, other))
+        best, _ = self._searched(committee.members[:1], committee.sds, 1, all_starts, 0.5, 0.2, number)
+        members = committee.members[: max(1, options.tuning_members)]
+        fine = [best, *starts[:1]]
+        return self._searched(members, committee.sds, options.draws, fine[:2], 0.5, 0.08, number + 1)
+
+    def _searched(
+        self,
+        members: Sequence[_core.Model],
+        sds: Floats,
+        draws: int,
+        starts: Sequence[Floats],
+        share: float,
+        spread: float,
+        number: int,
+    ) -> tuple[Floats, float]:
+        options = self.options
+        done = 0
+
+        def score(genes: Floats) -> Floats:
+            nonlocal done
+            done += len(genes)
+            judged = self.judge(members, genes, sds, draws)
+            excess = np.maximum(0.0, judged.worst_usage - (1.0 - options.margin))
+            return judged.mean * (1.0 + 10.0 * excess) + np.where(excess > 0.0, excess, 0.0)
+
+        total = share * options.evaluations
+        return tune_gains(
+            self.family, score, starts, evaluations=int(total), spread=spread, seed=self.seed * 1009 + number,
+            watch=lambda: self.watch("gains", min(1.0, done / total)),
+        )  # fmt: skip
+
+    # Proposing
+
+    def first_excitation(self, number: int) -> Floats | None:
+        """The gentle excitation of a test with gains of the user's own; None where it is switched off."""
+        options = self.options
+        if options.excitation <= 0.0:
+            return None
+        stream = self._stream(3, number)
+        return chirps(self.signals, self.task.steps, options.excitation, options.fade, stream)
+
+    def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
+        """Genes and excitation of a test that no committee chose."""
+        options = self.options
+        stream = self._stream(4, number)
+        steps, most, fade = self.task.steps, options.excitation_most, options.fade
+        if options.tests == "random":
+            genes = from_unit(self.family, stream.random(self.family.size))
+            return genes, chirps(self.signals, steps, options.excitation, fade, stream)
+        make = chirps if options.tests == "chirp" else binary
+        return first, make(self.signals, steps, most, fade, stream)
+
+    def propose(
+        self,
+        committee: Committee,
+        tuned: Floats,
+        goal: str,
+        number: int,
+        told: int,
+        first_quality: float,
+        exploit: bool,
+    ) -> Proposal:
+        """The next test.
+
+        Args:
+            committee: that judges.
+            tuned: gains that are best on it.
+            goal: "both", "model" or "control".
+            number: of the test, for its stream.
+            told: experiments so far.
+            first_quality: of the first controller, as flown or predicted.
+            exploit: whether the tuned gains are flown as they are.
+
+        Returns:
+            The proposal; not `safe` where no candidate keeps the margin on every member.
+        """
+        genes, excitation = self._candidates(tuned, goal, number, exploit)
+        self.watch("candidates", 0.0)
+        judged = self.judge(committee.members, genes, committee.sds, 1, excitation)
+        flights = self._flights(genes, excitation)
+        values, where = disagreements(
+            committee.members, flights, np.maximum(committee.sds, self._smallest()), workers=self.workers
+        )
+        self.watch("candidates", 1.0)
+        per_member = judged.qualities.mean(axis=1)
+        mean = per_member.mean(axis=0)
+        keeps = judged.worst_usage <= 1.0 - self.options.margin
+        limit = self._limit(float(mean[0]), goal, told, first_quality)
+        allowed = keeps & (mean <= limit)
+        if exploit and keeps[0]:
+            chosen = 0
+        elif allowed.any():
+            chosen = int(np.argmax(np.where(allowed, values, -np.inf)))
+        elif keeps.any():
+            chosen = int(np.argmin(np.where(keeps, mean, np.inf)))
+        else:
+            chosen = int(np.argmin(judged.worst_usage))
+        best = per_member[:, 0] if allowed.any() else per_member[:, chosen]
+        gain = float((best - per_member[:, keeps].min(axis=1)).mean()) if keeps.any() else 0.0
+        row, state, high, low = (int(i) for i in where[chosen])
+        noisy = self.judge(
+            committee.members, genes[[chosen]], committee.sds, self.options.draws, excitation[[chosen]]
+        )
+        left = int((noisy.usages > 1.0).sum())
+        flown = noisy.usages.size
+        means = noisy.qualities.mean(axis=(1, 2))
+        diverges = bool((noisy.qualities >= HOPELESS).any())
+        return Proposal(
+            genes=genes[chosen],
+            excitation=excitation[chosen] if excitation[chosen].any() else None,
+            predicted=float("inf") if diverges else float(means.mean()),
+            spread=float(means.std()),
+            risk=(left + 0.5) / (flown + 1.0),
+            safe=bool(keeps[chosen]),
+            disagreement=float(values[chosen]),
+            gain=max(0.0, gain),
+            reason=self._reason(
+                goal, exploit and chosen == 0, bool(keeps[chosen]), float(values[chosen]), row, state, (high, low)
+            ),
+        )
+
+    # Inside
+
+    def _candidates(self, tuned: Floats, goal: str, number: int, exploit: bool) -> tuple[Floats, Floats]:
+        """Genes (K, size) and excitations (K, n, n_u); the first candidate is the tuned one as it is."""
+        options = self.options
+        stream = self._stream(5, number)
+        count = max(2, options.candidates)
+        place = to_unit(self.family, tuned)
+        places = place + options.nearness * stream.standard_normal((count, self.family.size))
+        places[: count // 4] = place
+        if goal == "model":
+            places[count // 2 :] = stream.random((count - count // 2, self.family.size))
+        genes = from_unit(self.family, np.clip(places, 0.0, 1.0))
+        genes[0] = tuned
+        excitation = np.zeros((count, self.task.steps, self.signals.n_u))
+        most = options.excitation_most * (2.0 if goal == "model" else 1.0)
+        if most > 0.0 and options.excitation > 0.0:
+            for i in range(1, count):
+                amplitude = most * stream.random()
+                excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
+        return genes, excitation
+
+    def _limit(self, tuned: float, goal: str, told: int, first: float) -> float:
+        """Predicted quality that a test may have at most."""
+        if goal == "model":
+            return max(3.0 * first, 3.0 * tuned)
+        share = self.options.share ** max(1, told)
+        if goal == "control":
+            share *= 0.1
+        return tuned + share * max(0.0, first - tuned)
+
+    def _smallest(self) -> Floats:
+        """Differences below this are rounding (n_x,)."""
+        return np.array([1e-6 * state.scale for state in self.signals.states])
+
+    def _flights(self, genes: Floats, excitation: Floats | None) -> _core.Flights:
+        return candidates(
+            self.family, genes, self.task.initial_state, self.task.target_state, self.task.steps,
+            excitation=excitation, divergence_factor=self.divergence_factor,
+        )  # fmt: skip
+
+    def _stream(self, purpose: int, number: int) -> np.random.Generator:
+        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 79, purpose, number])))
+
+    def _reason(
+        self, goal: str, exploits: bool, safe: bool, value: float, row: int, state: int, pair: tuple[int, int]
+    ) -> str:
+        sentences = []
+        if exploits:
+            sentences.append("The best gains that the twin knows, flown as they are.")
+        elif value > 0.0 and pair[0] != pair[1]:
+            sentences.append(
+                f"Models {pair[0]} and {pair[1]} disagree most on {self.signals.state_names[state]},"
+                f" {row * self.signals.dt:.2g} s after the start; the flight tells {value / np.log(2):.3g} bits."
+            )
+        else:
+            sentences.append("All models agree: the flight confirms what is known.")
+        if not safe:
+            sentences.append(
+                "No candidate keeps the envelope with its margin on every model: this is the safest one."
+                " Fly it with a hand on the switch, or not at all."
+            )
+        return " ".join(sentences)

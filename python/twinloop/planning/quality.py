@@ -1,0 +1,88 @@
+"""What flights are for: the quality that is minimised, of predicted flights and of flown ones alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.flights import quality as engine_quality
+from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
+
+KINDS = ("iae", "ise", "final_distance")
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """A quality over given signals.
+
+    Args:
+        kind: "iae", "ise" or "final_distance".
+        weights: how much each state counts (n_x,).
+        effort: factor of the integral of squared commands, in units of their scale.
+        effort_rate: factor of the integral of their squared rates.
+        signals: of the system.
+    """
+
+    kind: str
+    weights: Floats
+    effort: float
+    effort_rate: float
+    signals: Signals
+
+    @property
+    def engine(self) -> _core.Quality:
+        """The same for the native engine."""
+        return engine_quality(self.kind, self.weights, effort=self.effort, effort_rate=self.effort_rate)
+
+    def flown(self, trajectory: Trajectory, target: Floats) -> float:
+        """The quality of a recorded run, from its readings.
+
+        Args:
+            trajectory: of at least one step.
+            target: state that it should have been led to (n_x,).
+        """
+        dt = self.signals.dt
+        errors = trajectory.states[1:] - target
+        if self.kind == "final_distance":
+            value = float(np.sqrt((self.weights * errors[-1] ** 2).sum()))
+        else:
+            powers = np.abs(errors) if self.kind == "iae" else errors**2
+            value = float(dt * (powers * self.weights).sum())
+        scaled = trajectory.commands / np.array([command.size for command in self.signals.commands])
+        value += self.effort * dt * float((scaled**2).sum())
+        return value + self.effort_rate * float((np.diff(scaled, axis=0) ** 2).sum()) / dt
+
+
+def quality_of(
+    kind: str, signals: Signals, weights: Sequence[float] = (), effort: float = 0.0, effort_rate: float = 0.0
+) -> Quality:
+    """A quality with the weights that its kind has by default.
+
+    The final distance counts every state alike, as in the paper. The integrals count the states that a task is about,
+    which are those that are no other's derivative and no body rate, each in units of its scale.
+
+    Args:
+        kind: "iae", "ise" or "final_distance".
+        signals: of the system.
+        weights: of the states (n_x,), where the default ones are not wanted.
+        effort: factor of the integral of squared commands.
+        effort_rate: factor of the integral of their squared rates.
+
+    Returns:
+        The quality.
+    """
+    chosen = np.asarray(weights, dtype=np.float64)
+    if not len(chosen):
+        chosen = np.ones(signals.n_x)
+        if kind != "final_distance":
+            body = signals.kinematics
+            for i, state in enumerate(signals.states):
+                rate = state.derivative_of is not None or (body is not None and state.name in body.rates)
+                size = state.scale if kind == "iae" else state.scale**2
+                chosen[i] = 0.0 if rate else 1.0 / size
+    return Quality(kind, chosen, effort, effort_rate, signals)

@@ -1,0 +1,52 @@
+"""Options of the choice of tests and of the controller; each is one idea that can be switched off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+TESTS = ("ask", "random", "chirp", "prbs")
+
+
+@dataclass(frozen=True)
+class PlanningOptions:
+    """How tests are chosen and controllers tuned.
+
+    Args:
+        tests: "ask": where the committee disagrees; "random": random gains, gently excited; "chirp" and "prbs": the
+            first controller with a chirp or a binary sequence of the largest excitation.
+        excitation: amplitude of the first test's excitation, in units of each command's scale; 0: none.
+        excitation_most: largest amplitude of a later test.
+        fade: share of a flight, at its end, over which excitation fades out.
+        candidates: flights that are compared for each proposal.
+        nearness: standard deviation of the candidates' gains around the tuned ones, in ranges of the gains.
+        share: of the way from the tuned quality back to the first controller's that a test may give up to be told
+            more, after the first flight; it is multiplied by itself with every further one.
+        draws: of sensor noise under which a flight is judged.
+        margin: share of the envelope that a proposal keeps free on every member of the committee.
+        evaluations: flights on which gains are tuned, for each member and draw.
+        tuning_starts: of the tuning of gains.
+        tuning_members: of the committee on which gains are tuned; 1: the best model only.
+        confidence: share of members and draws that must find new gains better than the best flown ones.
+        exploit_last: whether the last experiment of a budget flies the tuned gains as they are.
+        quality_weights: of the states in the quality (n_x,); none: those of its kind.
+        effort: weight of the commands' squares in the quality.
+        effort_rate: weight of their rates' squares.
+    """
+
+    tests: str = "ask"
+    excitation: float = 0.02
+    excitation_most: float = 0.04
+    fade: float = 0.25
+    candidates: int = 256
+    nearness: float = 0.1
+    share: float = 0.25
+    draws: int = 6
+    margin: float = 0.1
+    evaluations: int = 3000
+    tuning_starts: int = 3
+    tuning_members: int = 4
+    confidence: float = 0.8
+    exploit_last: bool = True
+    quality_weights: tuple[float, ...] = ()
+    effort: float = 0.0
+    effort_rate: float = 0.0
