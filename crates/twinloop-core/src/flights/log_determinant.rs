@@ -65,9 +65,12 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_alike_and_huge_still_give_a_finite_number() {
-        let mut gram = vec![Scalar::splat(1e300); 6];
-        let found = log_determinant(&mut gram, 3).lane(0);
-        assert!((found - 1e300_f64.ln()).abs() < 1e-9, "{found}");
+    fn rows_that_are_alike_and_long_still_give_a_finite_number() {
+        let found = |squared: f64| log_determinant(&mut [Scalar::splat(squared); 6], 3).lane(0);
+        assert!((found(1e8) - (1.0 + 3e8_f64).ln()).abs() < 1e-6, "{}", found(1e8));
+        // What is left of these after rounding is no number to trust, but a number.
+        for squared in [1e16, 1e20, 1e300] {
+            assert!(found(squared).is_finite() && found(squared) >= squared.ln(), "{}", found(squared));
+        }
     }
 }
