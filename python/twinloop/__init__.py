@@ -5,7 +5,7 @@ from twinloop._core import __version__
 from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput, NotAvailable, SystemFailure, TwinloopError
 from twinloop.models import Twin
-from twinloop.signals import Command, Signals, State
+from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems import System
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -15,6 +15,7 @@ __all__ = [
     "Command",
     "InvalidInput",
     "NotAvailable",
+    "RigidBody",
     "Signals",
     "State",
     "System",

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, whole
+from twinloop.arrays import floats, whole
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
-from twinloop.history import Experiment, Iteration, Progress
-from twinloop.learning import Learning
+from twinloop.history import Experiment, Iteration, Lesson, Progress
 from twinloop.logbook import Logbook
-from twinloop.models import TestErrors, Twin
-from twinloop.objectives import closed_loop, final_distances, normalised_error, open_loop
-from twinloop.presets import Options
-from twinloop.search import chunks, start_tests
+from twinloop.methods import Coevolution, IdentifyAndPlan, Method
+from twinloop.models import Twin
+from twinloop.objectives import closed_loop
+from twinloop.presets import AnyOptions, Options
 from twinloop.setup import checked, refuse_arguments
 from twinloop.signals import Signals
 from twinloop.systems import System
@@ -35,9 +33,14 @@ ARGUMENTS = (
     "preset",
     "seed",
     "options",
+    "goal",
+    "quality",
+    "operators",
     "threads",
     "progress",
 )
+GENTLE = "gentle"
+"""The excitation of a first test where nothing else is asked for: the preset's own."""
 
 
 class Campaign:
@@ -49,9 +52,14 @@ class Campaign:
         initial_state: where every test starts (n_x,), SI units, radians.
         target_state: where every test should end (n_x,), the same units.
         duration: of a test, s; a whole number of periods.
-        preset: name of a set of options; "paper" is the only one.
+        preset: "default", or "paper" for the algorithm of the paper to the letter.
         seed: of all random numbers; equal seeds give equal bits.
         options: other values for some of the preset's options, by name.
+        goal: what the flights are for: "control" (the best controller soon), "model" (a twin that is right
+            everywhere), or "both", the default.
+        quality: what is minimised: "iae" (integrated absolute error, the default), "ise" (squared) or "final_distance"
+            (the paper's).
+        operators: that evolved programs may use; by default the preset's.
         threads: how many the engine may use, by default all that there are; no result depends on it.
         progress: called with a `Progress` a few times a second while the loops run.
 
@@ -67,16 +75,29 @@ class Campaign:
         initial_state: ArrayLike,
         target_state: ArrayLike,
         duration: float,
-        preset: str = "paper",
+        preset: str = "default",
         seed: int = 0,
         options: Mapping[str, object] | None = None,
+        goal: str | None = None,
+        quality: str | None = None,
+        operators: Sequence[str] | None = None,
         threads: int | None = None,
         progress: Callable[[Progress], None] | None = None,
         **other: object,
     ) -> None:
         refuse_arguments("Campaign", other, ARGUMENTS)
         self.setup = checked(
-            signals, controller, initial_state, target_state, duration, preset, options, seed
+            signals,
+            controller,
+            initial_state,
+            target_state,
+            duration,
+            preset,
+            options,
+            seed,
+            goal,
+            quality,
+            operators,
         )
         self.threads = (
             available_threads() if threads is None else whole("Campaign, threads", threads, least=1)
@@ -86,9 +107,7 @@ class Campaign:
         with engine_input():
             self._workers = _core.Workers(threads=self.threads)
         self._book = Logbook(self.setup)
-        self._learning = Learning(
-            self.signals, self.options, self.setup.seed, self._workers, self._watch_models
-        )
+        self._method = self._chosen()
 
     @property
     def signals(self) -> Signals:
@@ -101,19 +120,22 @@ class Campaign:
         return self.setup.family
 
     @property
-    def options(self) -> Options:
+    def options(self) -> AnyOptions:
         """Of the preset, with those that were changed."""
         return self.setup.options
 
     # Ask and tell
 
-    def test(self, gains: Mapping[str, float] | ArrayLike, excitation: ArrayLike | None = None) -> Test:
+    def test(
+        self, gains: Mapping[str, float] | ArrayLike, excitation: ArrayLike | str | None = GENTLE
+    ) -> Test:
         """A test with gains of your own: the first one, a controller that you already trust.
 
         Args:
             gains: all gains by name, or (size,) in order; in their units and bounds.
             excitation: what is added to the controller's commands (steps, n_u), in their units; the sum is
-                clipped to the commands' bounds. None: nothing.
+                clipped to the commands' bounds. None: nothing. By default the preset's own, a gentle one that
+                fades out; the preset "paper" has none.
 
         Returns:
             The test, to be flown and told.
@@ -122,10 +144,18 @@ class Campaign:
             InvalidInput: gains or an excitation that cannot be used.
         """
         genes = self.family.genes(gains)
-        if excitation is not None:
+        if isinstance(excitation, str):
+            if excitation != GENTLE:
+                raise InvalidInput(
+                    f"Campaign.test, excitation: expected an array, None or {GENTLE!r}, found {excitation!r}."
+                )
+            added = self._method.first_excitation(len(self._book.tests))
+        elif excitation is not None:
             shape = (self.setup.steps, self.signals.n_u)
-            excitation = floats("Campaign.test, excitation (steps, commands)", excitation, shape)
-        return self._book.new_test(genes, excitation=excitation)
+            added = floats("Campaign.test, excitation (steps, commands)", excitation, shape)
+        else:
+            added = None
+        return self._book.new_test(genes, excitation=added)
 
     def ask(self) -> Test:
         """Learns from all that was told, then picks the test on which the best models disagree.
@@ -133,30 +163,12 @@ class Campaign:
         Asking again without telling learns nothing new and gives another test.
 
         Returns:
-            The test, to be flown and told, with its predicted final distance.
+            The test, to be flown and told, with its predicted quality, its risk and the reason for it.
 
         Raises:
             NotAvailable: nothing was told yet.
         """
-        self.interrupted = False
-        models = self._learnt()
-        with self._interruptible():
-            search = start_tests(
-                models,
-                self.family,
-                self.setup.task,
-                self.options,
-                seed=self.setup.seed,
-                iteration=len(self._book.asked) + 1,
-                workers=self._workers,
-            )
-            total = self.options.generations_of_tests
-            for moved, left in chunks(search, lambda s, n: s.advance(n, self._workers), total):
-                search = moved
-                self._report("tests", total - left, total, search.archive_size, search.evaluations)
-        test = self._book.new_test(search.best_genes, predicted=self._predicted(models, search.best_genes))
-        self._book.enter_loop(self._learning.iteration, test, search)
-        return test
+        return self._asked(last=False)
 
     def tell(self, test: Test, trajectory: Trajectory) -> None:
         """Adds a run to what is to be learnt. Tests may be told in any order; one told again is a replicate.
@@ -168,12 +180,12 @@ class Campaign:
         Raises:
             InvalidInput: a test of another campaign, or a useless trajectory; nothing has changed.
         """
-        models = self._learning.models
+        model = self._method.best_model
 
         def error_so_far(alone: _core.SelectedTests) -> float | None:
-            if models is None:
+            if model is None:
                 return None
-            return float(closed_loop([models.best_model], alone, self._workers)[0, 0])
+            return float(closed_loop([model], alone, self._workers)[0, 0])
 
         self._book.tell(test, trajectory, error_so_far)
         self.interrupted = False
@@ -204,8 +216,8 @@ class Campaign:
         self.interrupted = False
         try:
             while len(self._book.experiments) < budget:
-                test = self._next(system)
-                self._report("experiment", 0, 0, 0, 0)
+                test = self._next(system, last=len(self._book.experiments) + 1 == budget)
+                self._report_experiment()
                 self.tell(test, system.run(test))
         except KeyboardInterrupt:
             self.interrupted = True
@@ -216,26 +228,21 @@ class Campaign:
     @property
     def twin(self) -> Twin:
         """The best model, after learning all that was told; the best so far after an interruption."""
-        model = self._learnt().best_model
-        selected, experiments = self._book.selected, self._book.experiments
-        steps = open_loop([model], selected, self._workers)[0].tolist()
-        runs = closed_loop([model], selected, self._workers)[0].tolist()
-        rows = [
-            TestErrors(run.test.number, step, free, normalised_error(free, run.frozen), run.before, free)
-            for run, step, free in zip(experiments, steps, runs, strict=True)
-        ]
-        return Twin(model, self.signals, rows, self.options.divergence_factor)
+        self._learn()
+        return self._method.twin(self._book)
 
     @property
     def best_test(self) -> Test:
-        """The controller to fly: the flown test that ended nearest to its target.
+        """The controller to fly, without excitation, after learning all that was told.
 
-        It carries the final distance that the twin predicts, after learning all that was told, and the
-        measured one. Runs that were cut do not count, unless there are no others. It carries no excitation:
-        to fly and tell it where it was flown with one, make a test of it with `campaign.test`.
+        With the preset "default": the gains tuned on the committee, unless it is not confident that they beat the
+        best ones flown. With "paper": the flown test that ended nearest to its target. It carries the quality that
+        the twin predicts and, if it was flown, the measured one. Runs that were cut do not count, unless there are
+        no others. To fly and tell it, make a test of it with `campaign.test`.
         """
-        models, best = self._learnt(), self._book.best().quiet()
-        return best.judged(self._predicted(models, best.genes), self._book.measured(best.number))
+        self._learn()
+        with self._interruptible():
+            return self._method.best_test(self._book)
 
     @property
     def controller(self) -> Controller:
@@ -243,9 +250,25 @@ class Campaign:
         return self.best_test.controller()
 
     @property
+    def committee(self) -> tuple[_core.Model, ...]:
+        """Models that judge tests, the best first, after learning all that was told."""
+        self._learn()
+        return tuple(self._method.committee())
+
+    @property
     def models(self) -> _core.ModelSearch:
-        """The model loop as a value, after learning all that was told."""
-        return self._learnt()
+        """The paper's model loop as a value, after learning all that was told.
+
+        Raises:
+            NotAvailable: the preset has no such loop, or nothing was told.
+        """
+        self._learn()
+        if not isinstance(self._method, Coevolution):
+            raise NotAvailable(
+                f"Campaign.models: expected the preset 'paper', found {self.setup.preset!r}, which has no model loop;"
+                " use `committee`."
+            )
+        return self._method.models
 
     @property
     def experiments(self) -> tuple[Experiment, ...]:
@@ -253,21 +276,32 @@ class Campaign:
         return tuple(self._book.experiments)
 
     @property
-    def history(self) -> tuple[Iteration, ...]:
-        """One record for each iteration, from 0; the last may be unfinished after an interruption."""
-        return self._book.with_loops(self._learning.records())
+    def history(self) -> tuple[Iteration, ...] | tuple[Lesson, ...]:
+        """One record for each turn of the loop; the last may be unfinished after an interruption."""
+        return self._method.history(self._book)
 
     # Inside
 
-    def _learnt(self) -> _core.ModelSearch:
+    def _chosen(self) -> Method:
+        options = self.setup.options
+        if isinstance(options, Options):
+            return Coevolution(self.setup, options, self._workers, self._report)
+        return IdentifyAndPlan(self.setup, options, self._workers, self._report)
+
+    def _learn(self) -> None:
         if not self._book.experiments:
             raise NotAvailable(
                 "Expected at least one experiment that was told, found none; first fly a controller you "
                 "trust: test = campaign.test(gains), then campaign.tell(test, system.run(test))."
             )
-        learn = self._learning.start if self.interrupted else self._learning.learn
         with self._interruptible():
-            return learn(self._book.selected, self._book.experiments)
+            self._method.learn(self._book, at_once=self.interrupted)
+
+    def _asked(self, last: bool) -> Test:
+        self.interrupted = False
+        self._learn()
+        with self._interruptible():
+            return self._method.ask(self._book, last)
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
@@ -277,12 +311,12 @@ class Campaign:
             self.interrupted = True
             raise
 
-    def _next(self, system: System) -> Test:
+    def _next(self, system: System, last: bool) -> Test:
         waiting = self._book.waiting()
         if waiting is not None:
             return waiting
         if self._book.experiments:
-            return self.ask()
+            return self._asked(last)
         gains = getattr(system, "default_gains", None)
         if gains is None:
             raise NotAvailable(
@@ -291,36 +325,15 @@ class Campaign:
             )
         return self.test(gains)
 
-    def _predicted(self, models: _core.ModelSearch, genes: Floats) -> float:
-        factor = self.options.divergence_factor
-        task, row = self.setup.task, genes[np.newaxis]
-        distances = final_distances([models.best_model], self.family, row, task, divergence_factor=factor)
-        return float(distances[0, 0])
+    def _report(self, progress: Progress) -> None:
+        if self.progress is not None:
+            self.progress(progress)
 
-    def _watch_models(self) -> None:
-        models, done, total = self._learning.models, self._learning.done, self.options.model_generations
-        if models is not None:
-            self._report("models", done, total, models.archive_size, models.evaluations)
-
-    def _report(
-        self, phase: str, generation: int, generations: int, archive_size: int, evaluations: int
-    ) -> None:
-        if self.progress is None:
-            return
-        best = [] if self._learning.models is None else self._learning.models.best_objectives.tolist()
+    def _report_experiment(self) -> None:
         progress = Progress(
-            phase=phase,
-            iteration=self._learning.iteration,
-            generation=generation,
-            generations=generations,
-            told=len(self._book.experiments),
-            tests=self._learning.tests,
-            open_loop=tuple(best[::2]),
-            closed_loop=tuple(best[1::2]),
-            archive_size=archive_size,
-            evaluations=evaluations,
+            "experiment", self._method.iteration, 0, 0, len(self._book.experiments), (), (), (), 0, 0
         )
-        self.progress(progress)
+        self._report(progress)
 
 
 def available_threads() -> int:

@@ -138,9 +138,7 @@ class Logbook:
             test: its number.
         """
         values = [
-            run.quality
-            for run in self.experiments
-            if run.test.number == test and run.quality is not None
+            run.quality for run in self.experiments if run.test.number == test and run.quality is not None
         ]
         return math.fsum(values) / len(values) if values else None
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import dataclasses
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,25 @@ class ErrorTable(tuple[TestErrors, ...]):
         return "\n".join(lines)
 
 
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """What a twin does not predict.
+
+    Args:
+        sensors: standard deviation of each state's sensor (n_x,), in its unit.
+        moves: standard deviation of what a disturbance adds to each state in a period (n_x,), in its unit.
+    """
+
+    sensors: Floats
+    moves: Floats
+
+
+DRAWS = 12
+"""Runs of each member of a committee that a band is made of."""
+NINE_OF_TEN = 1.645
+"""Standard deviations on either side of the mean between which nine of ten normal numbers lie."""
+
+
 class Twin:
     """A model that stands in for the system.
 
@@ -68,6 +88,9 @@ class Twin:
         signals: what it is a model of.
         errors: how well it follows the selected tests.
         divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
+        members: of the committee, for the band of a simulated run; none: no band.
+        noise: of sensors and disturbances, for the band.
+        seed: of the band's random numbers.
     """
 
     def __init__(
@@ -76,7 +99,13 @@ class Twin:
         signals: Signals,
         errors: Iterable[TestErrors] = (),
         divergence_factor: float = 10.0,
+        members: Sequence[_core.Model] = (),
+        noise: Noise | None = None,
+        seed: int = 0,
     ) -> None:
+        self.members = tuple(members)
+        self.noise = noise
+        self.seed = seed
         self.model = model
         self.signals = signals
         self.errors = ErrorTable(errors)
@@ -103,13 +132,47 @@ class Twin:
             test: any test for the same signals.
 
         Returns:
-            The predicted run, cut where it diverges.
+            The predicted run, cut where it diverges; with a `band` where a committee stands behind the twin.
 
         Raises:
             InvalidInput: the test is for other signals.
         """
         check_signals(test, self.signals)
-        return fly(self.model, test, divergence_factor=self.divergence_factor)
+        run = fly(self.model, test, divergence_factor=self.divergence_factor)
+        if not self.members or self.noise is None:
+            return run
+        return dataclasses.replace(run, band=self._band(test, run))
+
+    def _band(self, test: Test, run: Trajectory) -> Floats:
+        """Between these nine of ten readings are expected: members, disturbances and sensors drawn together."""
+        assert self.noise is not None
+        stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 80])))
+        shape = (DRAWS, test.steps + 1, self.signals.n_x)
+        noise = self.noise.sensors * stream.standard_normal(shape)
+        moves = self.noise.moves * stream.standard_normal((DRAWS, test.steps, self.signals.n_x))
+        excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
+        runs = []
+        for member in self.members:
+            with engine_input():
+                drawn = _core.rollout(
+                    member,
+                    test.family.engine,
+                    np.tile(test.genes, (DRAWS, 1)),
+                    test.task,
+                    self.signals.engine,
+                    noise=noise,
+                    disturbance=moves if self.noise.moves.any() else None,
+                    excitation=excitation,
+                    divergence_factor=self.divergence_factor,
+                )
+            runs.append(drawn.states)
+        states = np.concatenate(runs)[:, : len(run.states)]
+        lasted = np.isfinite(states)
+        count = np.maximum(1, lasted.sum(axis=0))
+        mean = np.where(lasted, states, 0.0).sum(axis=0) / count
+        variance = np.where(lasted, (states - mean) ** 2, 0.0).sum(axis=0) / count
+        half = NINE_OF_TEN * np.sqrt(variance + self.noise.sensors**2)
+        return np.stack([mean - half, mean + half])
 
     def predict(self, states: ArrayLike, commands: ArrayLike) -> Floats:
         """One step.

@@ -123,9 +123,7 @@ def checked(
     chosen = options_of(preset, changes)
     purpose, measure = _purpose(preset, goal, quality, chosen, signals)
     family = controller.bind(signals)
-    setup = Setup(
-        signals, family, start, target, steps, preset, chosen, known_seed, purpose, measure
-    )
+    setup = Setup(signals, family, start, target, steps, preset, chosen, known_seed, purpose, measure)
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
     if isinstance(chosen, Options):

@@ -96,6 +96,19 @@ class Test:
         """The same test without its excitation: what is flown once nothing is to be learnt any more."""
         return dataclasses.replace(self, excitation=None)
 
+    def explained(self, spread: float, risk: float, reason: str) -> Test:
+        """The same test with what a committee says of it.
+
+        Args:
+            spread: standard deviation of the prediction over the committee.
+            risk: probability that the flight leaves the envelope.
+            reason: why this test.
+
+        Returns:
+            A copy under the same number.
+        """
+        return dataclasses.replace(self, spread=spread, risk=risk, reason=reason)
+
     def same_as(self, other: Test) -> bool:
         """Whether both stand for the same experiment of the same campaign."""
         return (

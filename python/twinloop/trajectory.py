@@ -26,6 +26,8 @@ class Trajectory:
         ended: "completed", "aborted" or "diverged".
         reason: why it did not complete, in a few words.
         true_states: states without sensor noise (n + 1, n_x), where an oracle knows them; never learnt from.
+        band: lower and upper end, between which nine of ten readings are expected (2, n + 1, n_x), where a committee
+            predicted the run.
 
     Raises:
         InvalidInput: shapes that do not fit each other, numbers that are not finite, times that do not grow.
@@ -37,6 +39,7 @@ class Trajectory:
     ended: str = "completed"
     reason: str = ""
     true_states: Floats | None = None
+    band: Floats | None = None
 
     def __post_init__(self) -> None:
         t = floats("Trajectory.t", self.t, (None,))
@@ -60,6 +63,9 @@ class Trajectory:
         if self.true_states is not None:
             true_states = floats("Trajectory.true_states", self.true_states, (len(t), states.shape[1]))
             object.__setattr__(self, "true_states", true_states)
+        if self.band is not None:
+            band = floats("Trajectory.band", self.band, (2, len(t), states.shape[1]))
+            object.__setattr__(self, "band", band)
 
     @property
     def steps(self) -> int:

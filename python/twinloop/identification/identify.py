@@ -24,6 +24,7 @@ from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, stages
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Problem, Sum, first_noise, search
+from twinloop.models import Noise
 from twinloop.signals import Signals
 
 OUTLIER = 6.0
@@ -69,6 +70,14 @@ class Identified:
     def misfit(self) -> float:
         """χ² for each reading; 1 where only noise is left."""
         return self.left / max(1, self.readings)
+
+    def noise(self, signals: Signals) -> Noise:
+        """Of the sensors, and of what moves the states from one period to the next."""
+        moves = np.zeros(signals.n_x)
+        for chain in self.chains:
+            period = signals.dt if chain.integrated else 1.0
+            moves[chain.states[0]] = np.sqrt(chain.process * period)
+        return Noise(self.sensors(signals.n_x), moves)
 
     def sensors(self, n_x: int) -> Floats:
         """Standard deviation of each state's sensor (n_x,)."""
@@ -175,9 +184,7 @@ class _Learner:
             actuators = self.known.actuators
         problem = self._problem(actuators)
         start = base[0]
-        driven = [
-            first_noise(problem, chain, problem.usable(start), self.scales) for chain in driven
-        ]
+        driven = [first_noise(problem, chain, problem.usable(start), self.scales) for chain in driven]
         known: list[Sum | None] = [None] * len(driven)
         if self.known is not None:
             known = [replace(s, others=[]) for s in self.known.sums]
@@ -273,9 +280,7 @@ class _Learner:
     ) -> tuple[list[Actuator], list[Sum | None]]:
         def judge(actuators: list[Actuator]) -> list[Sum]:
             problem = self._problem(actuators)
-            return self._search(
-                problem, driven, terms, [None] * len(driven), self.options.moves // 3, 2
-            )
+            return self._search(problem, driven, terms, [None] * len(driven), self.options.moves // 3, 2)
 
         actuators, sums = search_actuators(
             self.signals, [None, *self.rests], judge, self.options.longest_delay
@@ -305,7 +310,13 @@ class _Learner:
             return _core.Model(program, self.form, self.signals.engine, list(actuators))
 
     def _tune(
-        self, model: _core.Model, observer: Sequence[Chain], steps: int, draws: int, spread: float = 1.0, unit: int = 0
+        self,
+        model: _core.Model,
+        observer: Sequence[Chain],
+        steps: int,
+        draws: int,
+        spread: float = 1.0,
+        unit: int = 0,
     ) -> tuple[_core.Model, float, int, Floats, list[_core.Model]]:
         lags = [g for g in groups(self.signals) if self._lags_of(model)[g[0]][0] > 0.0]
         with engine_input():
@@ -325,7 +336,9 @@ class _Learner:
                 workers=self.workers,
             )
 
-    def _predictions(self, model: _core.Model, observer: Sequence[Chain]) -> list[tuple[Floats, Floats]] | None:
+    def _predictions(
+        self, model: _core.Model, observer: Sequence[Chain]
+    ) -> list[tuple[Floats, Floats]] | None:
         with engine_input():
             return _core.predictions(
                 model,
@@ -356,7 +369,8 @@ class _Learner:
         if share == 0.0 or share > 0.02:
             return False
         self.runs = [
-            replace(run, weights=np.where(w, 0.0, run.weights)) for run, w in zip(self.runs, wrong, strict=True)
+            replace(run, weights=np.where(w, 0.0, run.weights))
+            for run, w in zip(self.runs, wrong, strict=True)
         ]
         return True
 
@@ -376,7 +390,9 @@ class _Learner:
     ) -> list[_core.Model]:
         """The best model, draws from what the runs leave open of it, and other structures that are nearly as good."""
         size = self.options.committee_size
-        stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 78, self.iteration])))
+        stream = np.random.Generator(
+            np.random.Philox(np.random.SeedSequence([self.seed, 78, self.iteration]))
+        )
         members = [best]
         _, base, readings, _, draws = self._tune(best, observer, 0, size)
         plausible = 1.5 * max(base, readings)
@@ -421,7 +437,9 @@ class _Learner:
     def _remarks(self, left: float, readings: int, sums: Sequence[Sum], ignored: int) -> list[str]:
         remarks = []
         if not np.isfinite(left):
-            remarks.append("The model diverges on the runs that it was learnt from; fly another test before you trust it.")
+            remarks.append(
+                "The model diverges on the runs that it was learnt from; fly another test before you trust it."
+            )
         elif left > 2.0 * readings:
             remarks.append(
                 f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."

@@ -35,7 +35,7 @@ def damping(pool: Pool, signals: Signals) -> Terms:
 
 
 def trigonometric(pool: Pool, signals: Signals) -> Terms:
-    """sin and cos of angles, alone and times every input."""
+    """Sin and cos of angles, alone and times every input."""
     terms: Terms = []
     for i, state in enumerate(signals.states):
         if state.unit == "rad":

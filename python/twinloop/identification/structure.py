@@ -72,9 +72,7 @@ class Problem:
             for i, term in enumerate(new):
                 columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
                 self._values[term] = columns  # type: ignore[assignment]
-        return [
-            term for term in terms if all(np.abs(column).max() < 1e100 for column in self._values[term])
-        ]
+        return [term for term in terms if all(np.abs(column).max() < 1e100 for column in self._values[term])]
 
     def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
         """Of one chain on terms that were found usable."""
@@ -224,9 +222,7 @@ def search(
                 ),
             )
             subset, energy, left, weights = judged[0]
-            others = [
-                (tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _, _ in judged[1:40]
-            ]
+            others = [(tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _, _ in judged[1:40]]
             coefficients = np.zeros(len(usable))
             coefficients[list(subset)] = weights
             noisy = chain

@@ -113,7 +113,13 @@ class IdentifyAndPlan:
             (last and self.options.exploit_last) or (self.setup.goal == "control" and len(told) > 1)
         )
         found = self.planner.propose(
-            committee, tuned, self.setup.goal, number, len(book.experiments), self._first_quality(book), exploit
+            committee,
+            tuned,
+            self.setup.goal,
+            number,
+            len(book.experiments),
+            self._first_quality(book),
+            exploit,
         )
         test = book.new_test(
             found.genes,
@@ -154,9 +160,7 @@ class IdentifyAndPlan:
         known = next((t for t in book.tests if t.genes.tobytes() == tuned.tobytes()), None)
         means = judged.qualities[:, :, pick].mean(axis=1)
         if pick == 1:
-            reason = (
-                f"The best gains flown: the twin prefers others in {100 * better:.0f} % of its predictions only."
-            )
+            reason = f"The best gains flown: the twin prefers others in {100 * better:.0f} % of its predictions only."
             test = flown.judged(float(means.mean()), measured)
         else:
             reason = f"Tuned on the twin, which prefers them to the best flown in {100 * better:.0f} % of its predictions."

@@ -290,7 +290,13 @@ class Planner:
             disagreement=float(values[chosen]),
             gain=max(0.0, gain),
             reason=self._reason(
-                goal, exploit and chosen == 0, bool(keeps[chosen]), float(values[chosen]), row, state, (high, low)
+                goal,
+                exploit and chosen == 0,
+                bool(keeps[chosen]),
+                float(values[chosen]),
+                row,
+                state,
+                (high, low),
             ),
         )
 
