@@ -27,7 +27,7 @@ PERIOD = 0.02
 """Period of the commands, s."""
 TUMBLED = math.radians(85.0)
 """Roll or pitch at which a run is over, rad: near 90° the Euler angles jump."""
-FIRST_FREQUENCY = 2.5
+FIRST_FREQUENCY = 3.0
 """Natural frequency of the first controller's axes, rad/s."""
 FIRST_INTEGRAL = 0.5
 """K_I of the first controller over the axis's inertia, 1/s³."""
