@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from oracles import same_bits
+from twinloop import _core
 from twinloop.contracts import check_controller, check_system
 from twinloop.controllers import Mixer, StateFeedback
 
@@ -139,3 +140,20 @@ def test_what_does_not_fit_the_signals_is_refused(pendulum_signals, case):
     feedback, sentence = UNFIT[case]
     with pytest.raises(tl.InvalidInput, match=sentence):
         feedback.bind(pendulum_signals)
+
+
+def test_every_width_flies_the_same_bits_with_rotors_that_lag():
+    system = tl.systems.Quadrotor(drag=0.05, motor_lag=0.03)
+    family = StateFeedback(None, (-0.1, 0.3), system.controller.output, ["yaw"]).bind(system.signals)
+    genes = np.random.default_rng(0).uniform(-0.1, 0.3, (70, family.size))
+    task = _core.Task(np.zeros(6), system.target_state, 40)
+
+    def flown(width):
+        workers = _core.Workers(1, width)
+        signals = system.signals.engine
+        return _core.rollout(system.dynamics, family.engine, genes, task, signals, workers=workers).states
+
+    narrow = flown("baseline")
+    assert all(same_bits(narrow, flown(width)) for width in _core.vector_widths())
+    alone = _core.rollout(system.dynamics, family.engine, genes[69:], task, system.signals.engine).states
+    assert same_bits(narrow[69:], alone)

@@ -27,7 +27,7 @@ PERIOD = 0.02
 """Period of the commands, s."""
 TUMBLED = math.radians(85.0)
 """Roll or pitch at which a run is over, rad: near 90° the Euler angles jump."""
-FIRST_FREQUENCY = 2.0
+FIRST_FREQUENCY = 3.0
 """Natural frequency of the first controller's axes, rad/s."""
 FIRST_INTEGRAL = 0.5
 """K_I of the first controller over the axis's inertia, 1/s³."""
@@ -86,7 +86,7 @@ class RotorPy(System):
     @property
     def controller(self) -> PID:
         """One PID an axis in N m, turned into rotor speeds at hover thrust; the box follows the inertia."""
-        box = {"kp": 250.0, "ki": 100.0, "kd": 40.0}
+        box = {"kp": 400.0, "ki": 100.0, "kd": 60.0}
         gains = {
             f"{angle}.{term}": (0.0, top * moment)
             for angle, moment in zip(ANGLES, self.inertia.tolist(), strict=True)
