@@ -585,6 +585,16 @@ def test_a_smoke_run_without_optional_packages_says_what_it_left_out(monkeypatch
         assert words in done.stdout
 
 
+def test_ctrl_c_keeps_what_was_measured_and_says_so(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaigns, "random_gains", interrupted)
+    asked = ("--systems", "quadrotor-0", "--learners", "random-gains", "--seeds", "10")
+    done = bench(*asked, "--store", str(tmp_path / "exam.db"), code=130)
+    assert "Interrupted: what was measured is in exam.db" in done.stderr
+
+
 def test_the_store_prints_its_tables_without_working(tmp_path):
     path = str(tmp_path / "exam.db")
     asked = ("--systems", "quadrotor-0", "--learners", "random-gains", "--seeds", "10:12", "--store", path)
