@@ -350,8 +350,8 @@ def test_an_optimiser_begins_with_the_first_controller_and_keeps_the_best_it_mea
     from twinloop.exam.tuners import tune
 
     system = subject("quadrotor-0")  # without noise, what was measured is true
-    rows = tune(LEARNERS[name], system, seed=3, flights=8)
-    assert [k for k, *_ in rows] == list(range(8))
+    rows = tune(LEARNERS[name], system, seed=3, flights=6)
+    assert [k for k, *_ in rows] == list(range(6))
     first = system.true_quality(system.family.genes(system.true_rig.default_gains))
     assert rows[0][1]["quality"] == rows[0][1]["flown_quality"] == pytest.approx(first)
     flown = [row[1]["flown_quality"] for row in rows]
@@ -528,7 +528,7 @@ def test_bars_say_what_was_measured_and_whether_it_is_enough(filled):
     )
     assert verdict(bars.safe("quadrotor")) == ("1 of 9", False)
     assert verdict(bars.quick("quadrotor")) == ("2.5 s", True)
-    assert verdict(bars.calibrated("quadrotor")) == ("90 %", True)
+    assert verdict(bars.calibrated("quadrotor")) == ("90 % (9 flights)", True)
     assert verdict(bars.better_than_first("quadrotor")) == ("0 of 6 worse", True)
     assert verdict(bars.growth("quadrotor")) is None
 

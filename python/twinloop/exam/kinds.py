@@ -125,7 +125,7 @@ class Tuner:
     settings: Mapping[str, object]
     package: str
     flights: int = 20
-    seconds: float = 0.2
+    seconds: float = 0.05
     grid: Mapping[str, Sequence[object]] = field(default_factory=dict)
 
     def why_missing(self) -> str | None:

@@ -16,7 +16,7 @@ VERSION = 1
 # Hyper-parameters were chosen by `twinloop bench power --tune --data random-gains`, seeds 0 to 9 of the
 # system "quadrotor": the first of each table.
 _RIDGES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
-_SPARSE = {"threshold": (0.1, 0.3, 1.0, 3.0, 10.0), "alpha": (1e-4, 1e-2, 1.0)}
+_SPARSE = {"threshold": (0.3, 1.0, 3.0, 10.0), "alpha": (1e-2, 1.0, 10.0, 100.0)}
 _SPARSE_INTEGRAL = {"threshold": (0.03, 0.1, 0.3), "alpha": (1e-8, 1e-7, 1e-6, 1e-5)}
 _FITTERS: tuple[Fitter, ...] = (
     Fitter(
@@ -28,7 +28,7 @@ _FITTERS: tuple[Fitter, ...] = (
     Fitter(
         "least-squares-integral",
         "least_squares",
-        {"form": "integral", "ridge": 1e-10, "variables": "rates"},
+        {"form": "integral", "ridge": 1e-8, "variables": "rates"},
         grid={"ridge": _RIDGES},
     ),
     *(
@@ -69,11 +69,11 @@ _TUNERS = (
         "gaussian_process",
         {"acquisition": "ucb", "random": 0},
         "bayes_opt",
-        seconds=1.0,
+        seconds=0.4,
         grid={"acquisition": ("ei", "ucb"), "random": (0, 3)},
     ),
     Tuner("cma-es", "cma_es", {"step": 0.3}, "cmaes", grid={"step": (0.1, 0.2, 0.3, 0.5)}),
-    Tuner("optuna-tpe", "tree_parzen", {"random": 10}, "optuna", grid={"random": (3, 5, 10, 15)}),
+    Tuner("optuna-tpe", "tree_parzen", {"random": 15}, "optuna", grid={"random": (3, 5, 10, 15)}),
 )
 _CAMPAIGNERS = (
     Campaigner("ours", "default", experiments=10, longer={"quadrotor": 20}),
