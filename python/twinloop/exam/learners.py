@@ -28,7 +28,7 @@ _FITTERS: tuple[Fitter, ...] = (
     Fitter(
         "least-squares-integral",
         "least_squares",
-        {"form": "integral", "ridge": 1e-8, "variables": "rates"},
+        {"form": "integral", "ridge": 1e-9, "variables": "rates"},
         grid={"ridge": _RIDGES},
     ),
     *(
@@ -47,16 +47,16 @@ _FITTERS: tuple[Fitter, ...] = (
             grid=_SPARSE_INTEGRAL if name.endswith("integral") else _SPARSE,
         )
         for name, threshold, alpha in (
-            ("sindy-stlsq", 1.0, 1e-2),
+            ("sindy-stlsq", 1.0, 100.0),
             ("sindy-stlsq-integral", 0.1, 1e-6),
-            ("sindy-ensemble", 3.0, 1e-2),
+            ("sindy-ensemble", 1.0, 100.0),
             ("sindy-ensemble-integral", 0.1, 1e-6),
         )
     ),
     Fitter(
         "operon",
         "operon",
-        {"window": 5, "evaluations": 50_000, "length": 60, "variables": "rates"},
+        {"window": 3, "evaluations": 50_000, "length": 60, "variables": "rates"},
         package="pyoperon",
         seconds=10.0,
         experiments=(1, 2, 4),
@@ -86,7 +86,7 @@ _CAMPAIGNERS = (
         Campaigner(f"without-{name}", "default", options, experiments=2)
         for name, options in ABLATIONS.items()
     ),
-    Campaigner("paper", "paper", {"model_generations": 1000}, seconds=30.0),
+    Campaigner("paper", "paper", {"model_generations": 1000}, seconds=5.0),
 )
 
 _ALL: tuple[Learner, ...] = (
@@ -94,7 +94,7 @@ _ALL: tuple[Learner, ...] = (
     Flyer("random-gains"),
     *_FITTERS,
     *_TUNERS,
-    Optimum("optimum"),
+    Optimum("optimum", patient={name: 2000 for name in ("quadrotor-0", "quadrotor", "quadrotor-noisy")}),
 )
 
 LEARNERS: dict[str, Learner] = {who.name: who for who in _ALL}
@@ -136,7 +136,7 @@ def for_smoke(who: Learner) -> Learner:
         case Tuner():
             return replace(who, flights=4)
         case Optimum():
-            return replace(who, flights=20, starts=1, draws=2, seconds=1.0)
+            return replace(who, flights=20, starts=1, draws=2, patient={}, seconds=1.0)
 
 
 def key(who: Learner, data: Learner | None = None) -> str:
