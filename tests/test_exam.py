@@ -350,8 +350,8 @@ def test_an_optimiser_begins_with_the_first_controller_and_keeps_the_best_it_mea
     from twinloop.exam.tuners import tune
 
     system = subject("quadrotor-0")  # without noise, what was measured is true
-    rows = tune(LEARNERS[name], system, seed=3, flights=8)
-    assert [k for k, *_ in rows] == list(range(8))
+    rows = tune(LEARNERS[name], system, seed=3, flights=6)
+    assert [k for k, *_ in rows] == list(range(6))
     first = system.true_quality(system.family.genes(system.true_rig.default_gains))
     assert rows[0][1]["quality"] == rows[0][1]["flown_quality"] == pytest.approx(first)
     flown = [row[1]["flown_quality"] for row in rows]
@@ -528,7 +528,7 @@ def test_bars_say_what_was_measured_and_whether_it_is_enough(filled):
     )
     assert verdict(bars.safe("quadrotor")) == ("1 of 9", False)
     assert verdict(bars.quick("quadrotor")) == ("2.5 s", True)
-    assert verdict(bars.calibrated("quadrotor")) == ("90 %", True)
+    assert verdict(bars.calibrated("quadrotor")) == ("90 % (9 flights)", True)
     assert verdict(bars.better_than_first("quadrotor")) == ("0 of 6 worse", True)
     assert verdict(bars.growth("quadrotor")) is None
 
@@ -583,6 +583,16 @@ def test_a_smoke_run_without_optional_packages_says_what_it_left_out(monkeypatch
     assert "about" in done.stderr
     for words in ("quadrotor-0: normalised error on held-out controllers", "least-squares-integral", "Bars"):
         assert words in done.stdout
+
+
+def test_ctrl_c_keeps_what_was_measured_and_says_so(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaigns, "random_gains", interrupted)
+    asked = ("--systems", "quadrotor-0", "--learners", "random-gains", "--seeds", "10")
+    done = bench(*asked, "--store", str(tmp_path / "exam.db"), code=130)
+    assert "Interrupted: what was measured is in exam.db" in done.stderr
 
 
 def test_the_store_prints_its_tables_without_working(tmp_path):

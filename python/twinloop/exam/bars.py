@@ -176,8 +176,9 @@ def calibrated(system: str) -> Bar:
     """Share of the next flight's samples inside the band that was foretold."""
 
     def judge(results: Results) -> Verdict:
-        found = spread(results.all_values(system, OURS, "coverage"))
-        return None if found is None else (f"{100 * found.median:.0f} %", 0.80 <= found.median <= 0.97)
+        found = results.all_values(system, OURS, "coverage")
+        share = float(np.mean(found)) if found else np.nan
+        return None if not found else (f"{100 * share:.0f} % ({len(found)} flights)", 0.80 <= share <= 0.97)
 
     return Bar(system, "samples inside the 90 % band, of flights not learnt yet", "80 to 97 %", judge)
 

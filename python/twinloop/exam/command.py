@@ -88,7 +88,11 @@ def power(
         if tune:
             click.echo(_tune(scope, path, jobs, yes), nl=False)
             return
-        failed = 0 if form is not None else _run(scope, path, jobs, yes)
+        try:
+            failed = 0 if form is not None else _run(scope, path, jobs, yes)
+        except KeyboardInterrupt:
+            _say(f"Interrupted: what was measured is in {path.name}; the same command goes on from there.")
+            context.exit(130)
         kept = Store(path)
         try:
             results = Results(kept, names, chosen, source, chosen_seeds)

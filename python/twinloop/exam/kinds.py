@@ -125,7 +125,7 @@ class Tuner:
     settings: Mapping[str, object]
     package: str
     flights: int = 20
-    seconds: float = 0.2
+    seconds: float = 0.05
     grid: Mapping[str, Sequence[object]] = field(default_factory=dict)
 
     def why_missing(self) -> str | None:
@@ -140,6 +140,7 @@ class Optimum:
     Args:
         name: of the row.
         flights: of each start; on noisy systems each stands for `draws` runs with the same fixed noise.
+        patient: flights by system where 500 are not enough to arrive: a bar must not be too easy.
         starts: the first from C0, the others random.
         draws: of the noise.
         seconds: guess of what it costs.
@@ -149,6 +150,7 @@ class Optimum:
     flights: int = 500
     starts: int = 4
     draws: int = 20
+    patient: Mapping[str, int] = field(default_factory=dict)
     seconds: float = 60.0
 
     def why_missing(self) -> str | None:

@@ -78,6 +78,7 @@ def optimum(who: Optimum, subject: Subject) -> Iterator[Measured]:
     clock = time.monotonic()
     family = subject.family
     draws = who.draws if subject.judged_runs else 0
+    flights = who.patient.get(subject.name, who.flights)
 
     def evaluate(units: Floats) -> float:
         return subject.true_quality(from_unit(family, units), runs=draws, seed=1)
@@ -90,7 +91,7 @@ def optimum(who: Optimum, subject: Subject) -> Iterator[Measured]:
         used = [0]
 
         def fly(units: Floats, best: list[Any] = best, used: list[int] = used) -> float:
-            if used[0] == who.flights:
+            if used[0] == flights:
                 raise _OutOfFlightsError
             used[0] += 1
             value = evaluate(units)
@@ -100,7 +101,7 @@ def optimum(who: Optimum, subject: Subject) -> Iterator[Measured]:
 
         start = first if number == 0 else stream.random(family.size)
         with suppress(_OutOfFlightsError):
-            cma_es(fly, start, {"step": 0.2}, number, who.flights)
+            cma_es(fly, start, {"step": 0.2}, number, flights)
         bests.append((best[0], best[1]))
     winner = min(bests, key=lambda pair: float(pair[0]))
     measures: dict[str, float | None] = {
