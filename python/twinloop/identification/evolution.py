@@ -61,7 +61,7 @@ def evolve(
     stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 77, iteration])))
     best: list[Sum | None] = list(known)
     survivors: dict[int, int] = dict.fromkeys(terms, 0)
-    lengths: dict[int, float] = {}
+    taken: set[int] = set()
     for generation in range(generations):
         parents = list(survivors)
         candidates = dict.fromkeys(parents)
@@ -71,8 +71,9 @@ def evolve(
             node = _drawn(pool, parents, operators, stream)
             if node is not None and pool.length(node) <= longest:
                 candidates.setdefault(node)
-        wholes = [_whole(pool, found, lengths) if found is not None else {} for found in best]
-        # A chain may use what drives another one; its own sum would be a law that nobody has paid for.
+        wholes = [_whole(pool, found, taken) if found is not None else {} for found in best]
+        # A chain may use what drives another one; its own sum would be a law that nobody has paid for, and so would
+        # sums that use each other.
         favoured = [
             {node: length for j, whole in enumerate(wholes) if j != i for node, length in whole.items()}
             for i in range(len(wholes))
@@ -124,14 +125,14 @@ def _drawn(
     return pool.add((operation, a, b))
 
 
-def _whole(pool: Pool, found: Sum, lengths: dict[int, float]) -> dict[int, float]:
-    """The sum that drives another output, as one node at the price of one choice."""
-    if len(found.weights) < 2:
+def _whole(pool: Pool, found: Sum, taken: set[int]) -> dict[int, float]:
+    """The sum that drives another output, as one node at the price of one choice; none if it uses such a node."""
+    if len(found.weights) < 2 or taken.intersection(pool.needed(found.weights)):
         return {}
     node: int | None = None
     for term, weight in found.weights.items():
         part = pool.add(("*", term, weight))
         node = part if node is None else pool.add(("+", node, part))
     assert node is not None
-    lengths.setdefault(node, float(np.log(pool.inputs + len(lengths) + 1)))
-    return {node: lengths[node]}
+    taken.add(node)
+    return {node: float(np.log(pool.inputs + 1))}

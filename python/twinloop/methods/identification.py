@@ -22,6 +22,8 @@ from twinloop.test import Test
 
 STEPS = ("noise", "actuators", "terms", "evolution", "smoothed", "committee", "gains", "candidates")
 """What there is to see while it works, in order."""
+FEWEST = 4
+"""Members of a committee that are kept in any case."""
 WRONG = 0.5
 """Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
 
@@ -88,9 +90,12 @@ class IdentifyAndPlan:
         free = closed_loop(identified.members, book.selected, self.workers)
         frozen = np.array([run.frozen for run in book.experiments])
         # A member that cannot follow the flights that it was learnt from is no member (E-SINDy's stability filter).
-        wrong = free > np.maximum(WRONG * frozen, 4.0 * free[0])
-        believed = [m for m, off in zip(identified.members, wrong.any(axis=1), strict=True) if not off]
-        self._believed = believed or [identified.model]
+        wrong = (free > np.maximum(WRONG * frozen, 4.0 * free[0])).any(axis=1)
+        # Where hardly any can, the ones that go wrong least still show where more must be known.
+        order = np.argsort((free / np.maximum(frozen, 1e-300)).max(axis=1), kind="stable")
+        kept = {0, *np.flatnonzero(~wrong).tolist()}
+        kept |= set(order[: max(0, FEWEST - len(kept))].tolist())
+        self._believed = [identified.members[i] for i in sorted(kept)]
         self.identified, self._learnt, self.iteration = identified, told, told
         self._lessons.append(self._lesson(identified, book, free[0].tolist()))
 

@@ -64,7 +64,8 @@ def quality_of(
     """A quality with the weights that its kind has by default.
 
     The final distance counts every state alike, as in the paper. The integrals count the states that a task is about,
-    which are those that are no other's derivative and no body rate, each in units of its scale.
+    which are those that are no other's derivative and no body rate: as they are where they have one unit, else in units
+    of their scales.
 
     Args:
         kind: "iae", "ise" or "final_distance".
@@ -81,8 +82,12 @@ def quality_of(
         chosen = np.ones(signals.n_x)
         if kind != "final_distance":
             body = signals.kinematics
+            counted = [
+                state.derivative_of is None and not (body is not None and state.name in body.rates)
+                for state in signals.states
+            ]
+            units = {state.unit for state, counts in zip(signals.states, counted, strict=True) if counts}
             for i, state in enumerate(signals.states):
-                rate = state.derivative_of is not None or (body is not None and state.name in body.rates)
-                size = state.scale if kind == "iae" else state.scale**2
-                chosen[i] = 0.0 if rate else 1.0 / size
+                size = state.scale if len(units) > 1 else 1.0
+                chosen[i] = (size if kind == "iae" else size**2) ** -1.0 if counted[i] else 0.0
     return Quality(kind, chosen, effort, effort_rate, signals)

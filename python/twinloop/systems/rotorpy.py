@@ -14,7 +14,7 @@ from twinloop.arrays import Floats, at_least_zero, whole
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import NotAvailable, unknown
 from twinloop.flight import fly
-from twinloop.signals import Command, Signals, State
+from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems.base import System
 from twinloop.systems.quadrotor import ANGLES, gains_from_frequency
 from twinloop.systems.sensors import attitude_noise, run_stream
@@ -223,12 +223,13 @@ def _fixed_steps(solver: Any, step: float) -> Any:
 def _signals(multirotor: Any) -> Signals:
     envelope = {"roll": math.radians(80.0), "pitch": math.radians(80.0), "yaw": math.radians(180.0)}
     angles = [State(name, "rad", math.pi, envelope=(-limit, limit)) for name, limit in envelope.items()]
-    # KINEMATICS: body rates are no derivatives of Euler angles; what ties the two together is declared here.
+    # Body rates are no derivatives of Euler angles: a rigid body ties the two together.
     rates = [State(name, "rad/s", 10.0, envelope=(-10.0, 10.0)) for name in RATES]
     bounds = (float(multirotor.rotor_speed_min), float(multirotor.rotor_speed_max))
     hover = _hover_speed(multirotor)
     rotors = [Command(f"rotor_{i}", "rad/s", bounds, scale=hover) for i in range(1, 5)]
-    return Signals(states=angles + rates, commands=rotors, dt=PERIOD)
+    body = RigidBody([angle.name for angle in angles], list(RATES))
+    return Signals(states=angles + rates, commands=rotors, dt=PERIOD, kinematics=body)
 
 
 def _hover_speed(multirotor: Any) -> float:
