@@ -23,7 +23,7 @@ TINY = {
     "committee_size": 6,
     "mutants": 3,
 }
-"""Options of a campaign that takes a fraction of a second."""
+"""Options of a campaign of the preset `paper` that takes a fraction of a second."""
 
 PENDULUM_GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
 
@@ -92,7 +92,7 @@ def pendulum(pendulum_signals):
 
 @pytest.fixture
 def new_campaign(pendulum_signals, pendulum_controller):
-    """Makes campaigns on the pendulum."""
+    """Makes campaigns of the preset `paper` on the pendulum."""
 
     def make(**changes):
         options = {**TINY, **changes.pop("options", {})}
@@ -101,6 +101,7 @@ def new_campaign(pendulum_signals, pendulum_controller):
             "initial_state": [0.0, 0.0],
             "target_state": [1.0, 0.0],
             "duration": 1.0,
+            "preset": "paper",
             "threads": 1,
             "options": options,
             **changes,

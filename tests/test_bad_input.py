@@ -141,9 +141,9 @@ OPTIONS = {
     "no operations": lambda: options_of("paper", {"operations": []}),
     "operations in one word": lambda: options_of("paper", {"operations": "+-"}),
     "a number for a choice": lambda: options_of("paper", {"control_quality": 1}),
-    "a word for a number": lambda: parsed("pages", "three"),
-    "a word for a choice": lambda: parsed("control_quality", "maybe"),
-    "an option that there is none of": lambda: parsed("pagez", "3"),
+    "a word for a number": lambda: parsed("paper", "pages", "three"),
+    "a word for a choice": lambda: parsed("paper", "control_quality", "maybe"),
+    "an option that there is none of": lambda: parsed("paper", "pagez", "3"),
 }
 QUADROTORS = {
     "negative noise": lambda: tl.systems.Quadrotor(noise=-1e-3),

@@ -386,6 +386,7 @@ def test_the_quadrotor_goes_through_the_front_page(tiny):
         initial_state=np.zeros(6),
         target_state=np.deg2rad([-30, 30, -70, 0, 0, 0]),
         duration=2.0,
+        preset="paper",
         seed=0,
         options=tiny,
     )
