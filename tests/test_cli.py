@@ -14,7 +14,8 @@ from click.testing import CliRunner
 import twinloop
 from twinloop.cli import main
 
-SMALL = ["run", "quadrotor", "--generations", "30", "--experiments", "2", "--set", "model_population=40"]
+PAPER = ["run", "quadrotor", "--preset", "paper"]
+SMALL = [*PAPER, "--generations", "30", "--experiments", "2", "--set", "model_population=40"]
 
 
 def twinloop_command(*arguments, **how):
@@ -84,7 +85,7 @@ def test_options_reach_the_campaign():
         "--set", "control_quality=true", "--set", "test_population=10", "--test-generations", "2",
         "--gyroscopic", "print", "--noise", "0.001",
     ]  # fmt: skip
-    done = invoke("run", "quadrotor", "--generations", "3", "--experiments", "2", "--json", *changes)
+    done = invoke(*PAPER, "--generations", "3", "--experiments", "2", "--json", *changes)
     result = json.loads(done.stdout)
     options = result["options"]
     assert (options["model_population"], options["form"]) == (20, "increment")
@@ -103,7 +104,7 @@ def test_the_result_is_written_where_it_was_asked_for(tmp_path):
 
 def test_pictures_are_drawn_as_svg_and_png(tmp_path):
     vector, raster = tmp_path / "runs.svg", tmp_path / "runs.png"
-    fast = ["run", "quadrotor", "--generations", "2", "--experiments", "1"]
+    fast = [*PAPER, "--generations", "2", "--experiments", "1"]
     assert invoke(*fast, "--plot", str(vector)).exit_code == 0
     assert invoke(*fast, "--plot", str(raster)).exit_code == 0
     assert ElementTree.parse(vector).getroot().tag.endswith("svg")
@@ -112,7 +113,7 @@ def test_pictures_are_drawn_as_svg_and_png(tmp_path):
 
 
 def test_equal_runs_draw_equal_pictures(tmp_path):
-    fast = ["run", "quadrotor", "--generations", "2", "--experiments", "1", "--plot"]
+    fast = [*PAPER, "--generations", "2", "--experiments", "1", "--plot"]
     one, two = tmp_path / "one.svg", tmp_path / "two.svg"
     invoke(*fast, str(one))
     invoke(*fast, str(two))
@@ -120,14 +121,14 @@ def test_equal_runs_draw_equal_pictures(tmp_path):
 
 
 def test_a_person_gets_equations_gains_and_errors():
-    done = invoke("run", "quadrotor", "--generations", "2", "--experiments", "1")
+    done = invoke(*PAPER, "--generations", "2", "--experiments", "1")
     assert done.exit_code == 0
     for words in ("roll[k+1]", "roll.kp", "closed loop"):
         assert words in done.stdout
 
 
 def test_progress_goes_to_standard_error_alone():
-    done = twinloop_command("run", "quadrotor", "--generations", "3", "--experiments", "1", "--json")
+    done = twinloop_command(*PAPER, "--generations", "3", "--experiments", "1", "--json")
     json.loads(done.stdout)
     assert "quadrotor" in done.stderr
 
@@ -180,7 +181,7 @@ def test_misuse_exits_with_2_and_one_line_that_says_why(tmp_path, monkeypatch, c
 
 
 def test_misuse_in_a_process_of_its_own_leaves_no_traceback():
-    done = twinloop_command("run", "quadrotor", "--set", "pagez=3")
+    done = twinloop_command(*PAPER, "--set", "pagez=3")
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr == "twinloop: Unknown option 'pagez': did you mean 'pages'?\n"
 
@@ -198,7 +199,7 @@ def test_a_failure_exits_with_its_code_and_one_line(monkeypatch, failure, code):
         raise failure
 
     monkeypatch.setattr("twinloop.campaign.Campaign.run", fail)
-    done = invoke("run", "quadrotor", "--json")
+    done = invoke(*PAPER, "--json")
     assert done.exit_code == code and done.stdout == ""
     assert re.fullmatch(r"twinloop: [^\n]+", done.stderr.strip())  # click ends the line of a ^C first
 
@@ -207,7 +208,7 @@ def test_a_failure_exits_with_its_code_and_one_line(monkeypatch, failure, code):
 def test_ctrl_c_ends_with_130_and_the_best_so_far(tmp_path):
     file = tmp_path / "result.json"
     command = [
-        sys.executable, "-m", "twinloop", "run", "quadrotor", "--json", "--experiments", "2",
+        sys.executable, "-m", "twinloop", *PAPER, "--json", "--experiments", "2",
         "--generations", "1000000", "--set", "model_population=40", "--threads", "1", "--output", str(file),
     ]  # fmt: skip
     working = subprocess.Popen(

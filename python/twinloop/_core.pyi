@@ -8,18 +8,28 @@ from numpy.typing import ArrayLike, NDArray
 
 _Floats = NDArray[np.float64]
 _Integers = NDArray[np.int64]
+_Actuator = tuple[float, int, float | None]
+"""Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
+_Motion = tuple[float, float, float]
+"""Variance of a white disturbance, variance of a lasting one, time after which that is forgotten to 1/e (s)."""
+_Chain = tuple[Sequence[int], Sequence[float], _Motion, bool]
+"""States, the driven one first; variance of each sensor; disturbances; whether features are derivatives."""
+_Record = tuple[ArrayLike, ArrayLike, ArrayLike]
+"""Readings (n + 1, n_x), weights (n + 1, n_x) and commands (n, n_u) of a run."""
 
 __all__ = [
     "Archive",
     "Controller",
     "Family",
     "Flights",
+    "Gram",
     "Grammar",
     "Model",
     "ModelSearch",
     "Program",
     "Quadrotor",
     "Quality",
+    "Regression",
     "Runs",
     "SelectedTests",
     "Signals",
@@ -31,6 +41,7 @@ __all__ = [
     "__version__",
     "best_tradeoff",
     "closed_loop",
+    "command_effects",
     "crowding_distances",
     "disagreements",
     "discrimination",
@@ -38,10 +49,13 @@ __all__ = [
     "ideal_point",
     "instability",
     "open_loop",
+    "predictions",
     "qualities",
     "ranks",
     "rollout",
+    "search_subsets",
     "select",
+    "tune",
     "vector_widths",
 ]
 
@@ -121,13 +135,17 @@ class Signals:
         command_bounds: ArrayLike,
         command_scales: ArrayLike,
         derivative_of: Sequence[int | None],
-    ) -> Signals: ...
+        kinematics: tuple[Sequence[int], Sequence[int]] | None = None,
+    ) -> Signals:
+        """kinematics: the states of a rigid body's three angles (roll, pitch, yaw) and of its three rates."""
 
 @final
 class Model:
     """A program with the form that makes it dynamics: "absolute", "increment" or "acceleration"."""
 
-    def __new__(cls, program: Program, form: str, signals: Signals) -> Model: ...
+    def __new__(
+        cls, program: Program, form: str, signals: Signals, actuators: Sequence[_Actuator] | None = None
+    ) -> Model: ...
     @staticmethod
     def shape(form: str, signals: Signals) -> tuple[int, int]:
         """Inputs and outputs that a program must have for this form."""
@@ -135,6 +153,14 @@ class Model:
     def program(self) -> Program: ...
     @property
     def form(self) -> str: ...
+    @property
+    def actuators(self) -> list[_Actuator]:
+        """One a command; none at all where every command acts at once."""
+    @property
+    def constants(self) -> _Floats:
+        """Of the effective program, in its order."""
+    def with_constants(self, constants: Sequence[float], lags: Sequence[float] | None) -> Model:
+        """The same model without introns, with other constants, and other lags unless None."""
     def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats:
         """Next states (rows, n_x) of states (rows, n_x) and commands (rows, n_u)."""
 
@@ -344,6 +370,99 @@ def disagreements(
     workers: Workers | None = None,
 ) -> tuple[_Floats, _Integers]:
     """log det(I + D Dᵀ) of each flight (K,), and where members are the furthest apart (K, 4)."""
+
+def command_effects(actuators: Sequence[_Actuator], dt: float, commands: ArrayLike) -> list[_Floats]:
+    """What arrives of commands (n, n_u) at the start, the middle and the end of each period, (n, n_u) each."""
+
+@final
+class Regression:
+    """Records of one chain of states with the features that may drive it, p of them."""
+
+    def __new__(
+        cls,
+        states: int,
+        dt: float,
+        integrated: bool,
+        records: Sequence[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]],
+    ) -> Regression:
+        """records: readings and weights (n + 1, states), features at start, middle and end (n, p)."""
+    def residuals(self, coefficients: ArrayLike) -> list[_Floats]:
+        """Readings less what coefficients (p,) explain, (n + 1, states) for each record."""
+    def likelihood(self, coefficients: ArrayLike, sensors: ArrayLike, motion: _Motion) -> float:
+        """−2 log of the likelihood of the residuals, up to a constant."""
+    def most_likely_noise(
+        self,
+        coefficients: ArrayLike,
+        sensors: ArrayLike,
+        motion: _Motion,
+        smallest_sensors: ArrayLike,
+        smallest_motion: _Motion,
+        fixed_sensors: bool = False,
+    ) -> tuple[_Floats, _Motion, float]:
+        """Sensors' variances and motion under which residuals are most likely, and −2 log of that."""
+    def gram(self, sensors: ArrayLike, motion: _Motion, workers: Workers | None = None) -> Gram:
+        """Inner products under sensors' variances (states,) and disturbances of the motion."""
+
+@final
+class Gram:
+    """Inner products of whitened features and readings."""
+
+    @property
+    def features(self) -> int: ...
+    @property
+    def readings(self) -> int: ...
+    @property
+    def total(self) -> float:
+        """Sum of squares of the whitened readings."""
+    def solve(self, subset: Sequence[int], ridge: float = 0.0) -> tuple[_Floats, _Floats, float] | None:
+        """Coefficients (k,), their covariance (k, k) and χ²; None where the features are collinear."""
+
+def search_subsets(
+    grams: Sequence[Gram],
+    prices: Sequence[ArrayLike],
+    scales: Sequence[float],
+    *,
+    moves: int,
+    largest: int,
+    starts: int,
+    seed: int,
+    iteration: int,
+    coldest: float = 2.0,
+    workers: Workers | None = None,
+) -> list[list[tuple[list[int], float]]]:
+    """For each problem, subsets with their energies χ² / scale + prices, best first."""
+
+def tune(
+    model: Model,
+    chains: Sequence[_Chain],
+    records: Sequence[_Record],
+    *,
+    free: Sequence[int],
+    lags: Sequence[Sequence[int]],
+    iterations: int,
+    draws: int = 0,
+    spread: float = 1.0,
+    seed: int = 0,
+    iteration: int = 0,
+    unit: int = 0,
+    divergence_factor: float = 10.0,
+    workers: Workers | None = None,
+) -> tuple[Model, float, int, _Floats, list[Model]]:
+    """The model with free constants and lags of groups of commands moved until the least is left.
+
+    Returns it with χ² (infinite where it diverges), readings that counted, the covariance of what was free,
+    and members drawn from that.
+    """
+
+def predictions(
+    model: Model,
+    chains: Sequence[_Chain],
+    records: Sequence[_Record],
+    *,
+    divergence_factor: float = 10.0,
+    workers: Workers | None = None,
+) -> list[tuple[_Floats, _Floats]] | None:
+    """Whitened prediction errors and states once each reading was used, both (n + 1, n_x) for each run."""
 
 def ranks(objectives: ArrayLike) -> _Integers: ...
 def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> _Floats: ...

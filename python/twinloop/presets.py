@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -212,6 +212,10 @@ _RANGES: dict[str, tuple[float, float]] = {
 }
 
 
+@overload
+def options_of(preset: Literal["paper"], changes: Mapping[str, object] | None = None) -> Options: ...
+@overload
+def options_of(preset: str, changes: Mapping[str, object] | None = None) -> AnyOptions: ...
 def options_of(preset: str, changes: Mapping[str, object] | None = None) -> AnyOptions:
     """A preset with some options changed.
 

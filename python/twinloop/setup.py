@@ -139,17 +139,17 @@ def _purpose(
 ) -> tuple[str, Quality]:
     """What flights are for and what is minimised; the paper knows one answer to each."""
     if isinstance(options, DefaultOptions):
-        goal, quality = goal or "both", quality or "iae"
-        for what, value, known in (("goal", goal, GOALS), ("quality", quality, KINDS)):
-            if value not in known:
-                raise unknown(what, value, known)
+        purpose, kind = goal or "both", quality or "iae"
+        for what, named, known in (("goal", purpose, GOALS), ("quality", kind, KINDS)):
+            if named not in known:
+                raise unknown(what, named, known)
         if len(options.quality_weights) not in (0, signals.n_x):
             raise InvalidInput(
                 f"Option 'quality_weights': expected {signals.n_x} numbers, one a state, or none, found"
                 f" {len(options.quality_weights)}; write one for each."
             )
         weights, effort, rate = options.quality_weights, options.effort, options.effort_rate
-        return goal, quality_of(quality, signals, weights, effort, rate)
+        return purpose, quality_of(kind, signals, weights, effort, rate)
     for what, value, only in (("goal", goal, "both"), ("quality", quality, "final_distance")):
         if value not in (None, only):
             raise InvalidInput(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from twinloop.arrays import Floats
 from twinloop.identification.records import Actuator
 from twinloop.identification.structure import Sum
 from twinloop.signals import Signals
@@ -26,7 +27,7 @@ def groups(signals: Signals) -> list[list[int]]:
 
 def search_actuators(
     signals: Signals,
-    rests: Sequence[Sequence[float] | None],
+    rests: Sequence[Floats | None],
     judge: Callable[[list[Actuator]], list[Sum]],
     longest: int,
 ) -> tuple[list[Actuator], list[Sum]]:
@@ -70,7 +71,7 @@ def _tried(
     group: Sequence[int],
     lag: float,
     delay: int,
-    rest: Sequence[float] | None,
+    rest: Floats | None,
     judge: Callable[[list[Actuator]], list[Sum]],
 ) -> tuple[float, list[Actuator], list[Sum]]:
     tried = list(base)

@@ -1,7 +1,8 @@
 """Evolved features: a linear program of which every register is a feature; what read-outs use survives.
 
 Where no library holds the law, expressions are grown from what was useful so far: products and other operations of
-inputs and survivors. A found expression, up to the whole sum that drives another output, is one node and costs one term.
+inputs and survivors. A found expression, up to the whole sum that drives another output, is one node and costs one
+term.
 """
 
 from __future__ import annotations

@@ -16,8 +16,10 @@ from twinloop.test import Test
 class Method(Protocol):
     """One way through the double loop; all that it remembers is its own."""
 
-    iteration: int
-    """Number of the turn of the loop that is running or was the last."""
+    @property
+    def iteration(self) -> int:
+        """Number of the turn of the loop that is running or was the last."""
+        ...
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
         """Learns all that was told.

@@ -168,7 +168,9 @@ class IdentifyAndPlan:
             reason = f"The best gains flown: the twin prefers others in {100 * better:.0f} % of its predictions only."
             test = flown.judged(float(means.mean()), measured)
         else:
-            reason = f"Tuned on the twin, which prefers them to the best flown in {100 * better:.0f} % of its predictions."
+            reason = (
+                f"Tuned on the twin, which prefers them to the best flown in {100 * better:.0f} % of its predictions."
+            )
             number = len(book.tests) if known is None else known.number
             number_measured = None if known is None or known.excitation is not None else book.measured(number)
             test = Test(

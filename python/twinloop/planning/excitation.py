@@ -1,4 +1,4 @@
-"""Excitation: a gentle chirp on every command that fades out before the end, so that a flight tells more than its task."""
+"""Excitation: a gentle chirp on every command that fades out, so that a flight tells more than its task."""
 
 from __future__ import annotations
 
@@ -62,4 +62,5 @@ def binary(
     held = max(1, steps // 20)
     signs = np.where(stream.random((steps // held + 1, signals.n_u)) < 0.5, -1.0, 1.0)
     sizes = np.array([command.size for command in signals.commands])
-    return amplitude * sizes * np.repeat(signs, held, axis=0)[:steps] * fading[:, np.newaxis]
+    added: Floats = amplitude * sizes * np.repeat(signs, held, axis=0)[:steps] * fading[:, np.newaxis]
+    return added

@@ -82,12 +82,14 @@ class Judged:
     @property
     def mean(self) -> Floats:
         """Over members and draws (K,)."""
-        return self.qualities.mean(axis=(0, 1))
+        mean: Floats = self.qualities.mean(axis=(0, 1))
+        return mean
 
     @property
     def worst_usage(self) -> Floats:
         """Over members and draws (K,)."""
-        return self.usages.max(axis=(0, 1))
+        worst: Floats = self.usages.max(axis=(0, 1))
+        return worst
 
 
 class Planner:

@@ -10,6 +10,7 @@ import numpy as np
 
 from twinloop.campaign import Campaign
 from twinloop.console import Watch
+from twinloop.history import Iteration
 from twinloop.presets import Options, options_of
 from twinloop.reproduce.paper import DIFFERENCES, ITERATIONS
 from twinloop.result import Result, plain_dict
@@ -122,7 +123,8 @@ def described(run: Run) -> Result:
     Returns:
         Lists by iteration, from 0.
     """
-    history, first = run.campaign.history, run.campaign.experiments[0]
+    history = [record for record in run.campaign.history if isinstance(record, Iteration)]
+    first = run.campaign.experiments[0]
     return plain_dict(
         {
             "run": run.number,

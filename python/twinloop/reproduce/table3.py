@@ -78,7 +78,7 @@ def _distances(
 ) -> list[float]:
     """Final distances on the real system of the tests that the runs of the test loop select."""
     campaign = run.campaign
-    options = dataclasses.replace(campaign.options, control_quality=third)
+    options = dataclasses.replace(setting.options, control_quality=third)
     task = _core.Task(campaign.setup.initial_state, campaign.setup.target_state, campaign.setup.steps)
     workers = _core.Workers(threads=campaign.threads)
     distances = []
