@@ -16,7 +16,9 @@ from twinloop.console import Watch
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
 from twinloop.exam.command import bench
 from twinloop.files import check_picture, check_writable, write_text
-from twinloop.presets import PRESETS, options_of, parsed
+from twinloop.planning.planner import GOALS
+from twinloop.planning.quality import KINDS
+from twinloop.presets import PRESETS, DefaultOptions, options_of, parsed
 from twinloop.reproduce.command import reproduce
 from twinloop.result import Result, summary, to_json
 from twinloop.run_info import Stopwatch
@@ -63,18 +65,23 @@ def main(context: click.Context) -> None:
 @click.argument("system")
 @click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
 @click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
-@click.option("--preset", default="paper", show_default=True, help=f"Set of options: {', '.join(PRESETS)}.")
+@click.option("--preset", default="default", show_default=True, help=f"Set of options: {', '.join(PRESETS)}.")
 @click.option(
     "--experiments", type=int, default=4, show_default=True, help="Runs on the system, the first included."
 )
-@click.option("--generations", type=int, help="Of the model loop, in each iteration.")
-@click.option("--test-generations", type=int, help="Of the test loop; by default a share of --generations.")
+@click.option("--goal", help=f"What flights are for: {', '.join(GOALS)}; by default both.")
+@click.option("--quality", help=f"What is minimised: {', '.join(KINDS)}; by default the preset's.")
+@click.option("--generations", type=int, help="Preset paper: of the model loop, in each iteration.")
 @click.option(
-    "--noise", type=float, default=0.0, show_default=True, help="Of the sensors, rad; five times in rad/s."
+    "--test-generations",
+    type=int,
+    help="Preset paper: of the test loop; by default a share of --generations.",
 )
+@click.option("--noise", type=float, help="Of the sensors, rad; five times in rad/s.  [default: 0]")
 @click.option(
     "--gyroscopic", default="physical", show_default=True, help="Signs of the rotor terms: physical, print."
 )
+@click.option("--harsh", is_flag=True, help="The same vehicle with drag, slow motors, gusts and noise 0.001.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Any other option of the preset.")
 @click.option("--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON.")
 @click.option("--plot", type=Path, metavar="FILE.svg|png", help="Also draw the runs and the errors.")
@@ -87,10 +94,13 @@ def run(
     threads: int | None,
     preset: str,
     experiments: int,
+    goal: str | None,
+    quality: str | None,
     generations: int | None,
     test_generations: int | None,
-    noise: float,
+    noise: float | None,
     gyroscopic: str,
+    harsh: bool,
     changes: tuple[str, ...],
     output: Path | None,
     plot: Path | None,
@@ -103,10 +113,9 @@ def run(
         raise InvalidInput(
             f"--experiments: expected at least 1, found {experiments}; the first flight counts."
         )
-    options = dict(_change(change) for change in changes)
-    options |= {} if generations is None else {"model_generations": generations}
-    options |= {} if test_generations is None else {"test_generations": test_generations}
-    rig = BUILT_IN[system](noise=noise, seed=seed, gyroscopic=gyroscopic)
+    options = dict(_change(preset, change) for change in changes)
+    options |= _generations(preset, generations, test_generations)
+    rig = _vehicle(system, noise, seed, gyroscopic, harsh)
     watch = Watch(options_of(preset, options), experiments, system)
     campaign = Campaign(
         rig.signals,
@@ -117,6 +126,8 @@ def run(
         preset=preset,
         seed=seed,
         options=options,
+        goal=goal,
+        quality=quality,
         threads=threads,
         progress=watch,
     )
@@ -151,12 +162,19 @@ def _worked(
 ) -> Result:
     with watch:
         campaign.run(rig, experiments)
-        if not campaign.experiments:
+        if not campaign.experiments or (campaign.interrupted and _knows_nothing(campaign)):
             raise KeyboardInterrupt
         if not campaign.interrupted:
             with suppress(KeyboardInterrupt):
-                _ = campaign.twin
+                _ = campaign.best_test
+            if _knows_nothing(campaign):
+                raise KeyboardInterrupt
     return _uninterrupted(lambda: summary(campaign, system, clock.info()))
+
+
+def _knows_nothing(campaign: Campaign) -> bool:
+    """Whether the first identification was never finished: there is nothing to show then."""
+    return isinstance(campaign.options, DefaultOptions) and not campaign.history
 
 
 def _uninterrupted(work: Callable[[], Answer]) -> Answer:
@@ -174,6 +192,9 @@ def _described(name: str, rig: Quadrotor) -> dict[str, object]:
         "gyroscopic": rig.gyroscopic,
         "inertia": rig.inertia.tolist(),
         "natural_frequency": rig.natural_frequency,
+        "drag": rig.drag.tolist(),
+        "motor_lag": rig.motor_lag,
+        "gusts": rig.gusts,
     }
 
 
@@ -183,11 +204,40 @@ def _draw(campaign: Campaign, path: Path) -> None:
     campaign_picture(campaign, path)
 
 
-def _change(text: str) -> tuple[str, object]:
-    name, separator, value = text.partition("=")
+def _change(preset: str, text: str) -> tuple[str, object]:
+    name, separator, value = (part.strip() for part in text.partition("="))
     if not separator:
-        raise InvalidInput(f"--set: expected NAME=VALUE, found {text!r}; such as --set pages=3.")
-    return name.strip(), parsed(name.strip(), value.strip())
+        example = "pages=3" if preset == "paper" else "lags=false"
+        raise InvalidInput(f"--set: expected NAME=VALUE, found {text!r}; such as --set {example}.")
+    if preset in PRESETS and not hasattr(PRESETS[preset], name):
+        for other, options in PRESETS.items():
+            if hasattr(options, name):
+                raise InvalidInput(
+                    f"--set: expected an option of the preset {preset!r}, found {name!r}, which is one of the preset"
+                    f" {other!r}; leave it out, or choose --preset {other}."
+                )
+    return name, parsed(preset, name, value)
+
+
+def _generations(preset: str, models: int | None, tests: int | None) -> dict[str, object]:
+    given = {"model_generations": models, "test_generations": tests}
+    options: dict[str, object] = {name: value for name, value in given.items() if value is not None}
+    if options and preset == "default":
+        raise InvalidInput(
+            "--generations, --test-generations: expected the preset 'paper', found 'default', which identifies instead"
+            " of evolving whole models; leave them out, or choose --preset paper."
+        )
+    return options
+
+
+def _vehicle(system: str, noise: float | None, seed: int, gyroscopic: str, harsh: bool) -> Quadrotor:
+    if not harsh:
+        return BUILT_IN[system](noise=0.0 if noise is None else noise, seed=seed, gyroscopic=gyroscopic)
+    if gyroscopic != "physical":
+        raise InvalidInput(
+            f"--harsh: expected --gyroscopic physical, found {gyroscopic!r}; leave one of the two out."
+        )
+    return BUILT_IN[system].harsh(noise=1e-3 if noise is None else noise, seed=seed)
 
 
 def _fail(sentence: str, code: int) -> None:

@@ -3,22 +3,46 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from types import TracebackType
+from typing import Protocol
 
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
 from twinloop.history import Progress
-from twinloop.presets import Options
+from twinloop.presets import AnyOptions, DefaultOptions, Options
 
 LINE_SECONDS = 5.0
 """Between two plain lines."""
+STEPS = {
+    "noise": ("estimating the noise", 0.2),
+    "actuators": ("searching lags and delays", 4.0),
+    "terms": ("selecting terms", 1.2),
+    "evolution": ("growing terms", 0.7),
+    "smoothed": ("selecting again, on smoothed states", 0.5),
+    "committee": ("drawing a committee", 0.2),
+    "gains": ("tuning gains", 0.3),
+    "candidates": ("choosing the next flight", 0.1),
+}
+"""What the preset `default` does after each experiment, in order: for a person, and its usual share of the time."""
+
+
+class Remaining(Protocol):
+    """Estimates the time that is left."""
+
+    later: int
+    """Campaigns that are still to come."""
+
+    def remaining(self, progress: Progress) -> float | None:
+        """Seconds that are left; None as long as nothing is known."""
+        ...
 
 
 class Estimate:
-    """Time left of a campaign, from the work done so far.
+    """Time left of a campaign of the preset `paper`, from the work done so far.
 
     Args:
         options: of the campaign.
@@ -81,6 +105,69 @@ class Estimate:
         return left
 
 
+class StepEstimate:
+    """Time left of a campaign of the preset `default`, from how long each step took so far.
+
+    A step takes longer the more experiments are learnt; one that was not seen yet is believed to have its usual share.
+
+    Args:
+        experiments: that the campaign will make.
+        later: campaigns like it that are still to come.
+    """
+
+    def __init__(self, experiments: int, later: int = 0) -> None:
+        self.experiments = experiments
+        self.later = later
+        self._seconds = dict.fromkeys(STEPS, 0.0)
+        self._work = dict.fromkeys(STEPS, 0.0)
+        self._running: tuple[str, int] | None = None
+        self._since = time.monotonic()
+
+    def remaining(self, progress: Progress) -> float | None:
+        """Seconds that are left; None as long as nothing is known.
+
+        Args:
+            progress: where the campaign is.
+        """
+        now = time.monotonic()
+        if self._running != (progress.phase, progress.told):
+            if self._running is not None and self._running[0] in STEPS:
+                step, told = self._running
+                self._seconds[step] += now - self._since
+                self._work[step] += _work(told)
+            self._running, self._since = (progress.phase, progress.told), now
+        usual = sum(STEPS[step][1] * work for step, work in self._work.items())
+        if usual <= 0.0:
+            return None
+        pace = sum(self._seconds.values()) / usual
+        rates = {
+            step: self._seconds[step] / work if work > 0.0 else pace * STEPS[step][1]
+            for step, work in self._work.items()
+        }
+        return max(0.0, self._left(progress, rates, now - self._since))
+
+    def _left(self, progress: Progress, rates: dict[str, float], running: float) -> float:
+        names = list(STEPS)
+        left = 0.0
+        for told in range(1, self.experiments + 1):
+            last = told == self.experiments
+            steps = [name for name in names if not (last and name == "candidates")]
+            whole = sum(rates[step] for step in steps) * _work(told)
+            left += whole * self.later
+            if told > progress.told:
+                left += whole
+            elif told == progress.told and progress.phase in steps:
+                after = steps[names.index(progress.phase) + 1 :]
+                left += max(0.0, rates[progress.phase] * _work(told) - running)
+                left += sum(rates[step] for step in after) * _work(told)
+        return left
+
+
+def _work(told: int) -> float:
+    """How much there is to do after so many experiments, more or less."""
+    return 1.0 + told
+
+
 class Watch:
     """Shows the progress of campaigns; use it as a context, and as the campaigns' progress callback.
 
@@ -91,18 +178,29 @@ class Watch:
         campaigns: how many there will be, one after the other.
     """
 
-    def __init__(self, options: Options, experiments: int, name: str, campaigns: int = 1) -> None:
+    def __init__(self, options: AnyOptions, experiments: int, name: str, campaigns: int = 1) -> None:
         self.experiments = experiments
         self.label = name
         self._name, self._campaigns = name, campaigns
-        self._estimate = Estimate(options, experiments, campaigns - 1)
-        self._console = Console(stderr=True)
-        self._live = (
-            Live(console=self._console, auto_refresh=False, transient=True) if sys.stderr.isatty() else None
+        self._in_steps = isinstance(options, DefaultOptions)
+        self._estimate: Remaining = (
+            Estimate(options, experiments, campaigns - 1)
+            if isinstance(options, Options)
+            else StepEstimate(experiments, campaigns - 1)
         )
+        self._console = Console(stderr=True)
+        self._lock = threading.Lock()
+        self._seen: Progress | None = None
+        self._started = time.monotonic()
+        self._live = self._table_on_terminal() if sys.stderr.isatty() else None
         self._phase: tuple[str, int] | None = None
         self._phase_start = (0.0, 0)
         self._last_line = -LINE_SECONDS
+
+    def _table_on_terminal(self) -> Live:
+        if self._in_steps:  # a step may take seconds: the clock goes on within it
+            return Live(console=self._console, get_renderable=self._now, refresh_per_second=4, transient=True)
+        return Live(console=self._console, auto_refresh=False, transient=True)
 
     def __enter__(self) -> Watch:
         if self._live is not None:
@@ -132,26 +230,48 @@ class Watch:
             self._phase_start = (now, progress.evaluations)
         elapsed = now - self._phase_start[0]
         rate = (progress.evaluations - self._phase_start[1]) / elapsed if elapsed > 0.0 else None
-        left = self._estimate.remaining(progress)
+        with self._lock:
+            self._seen = progress
+            left = self._estimate.remaining(progress)
         if self._live is not None:
-            self._live.update(self._table(progress, rate, left), refresh=True)
+            if not self._in_steps:
+                self._live.update(self._table(progress, rate, left), refresh=True)
         elif now - self._last_line >= LINE_SECONDS:
             self._last_line = now
             self._console.print(
                 self._line(progress, rate, left), highlight=False, soft_wrap=True, markup=False
             )
 
+    def _now(self) -> Table:
+        """The table as it is at this moment; called from the thread that redraws it."""
+        with self._lock:
+            progress = self._seen
+            left = None if progress is None else self._estimate.remaining(progress)
+        if progress is None:
+            table = Table.grid()
+            table.add_row(self.label, style="bold")
+            return table
+        return self._table(progress, None, left)
+
     def _headline(self, progress: Progress, rate: float | None, left: float | None) -> list[tuple[str, str]]:
         if progress.phase == "experiment":
             return [("flying experiment", f"{progress.told + 1} of {self.experiments}")]
-        return [
-            ("experiments", f"{progress.told} of {self.experiments}"),
-            ("iteration", str(progress.iteration)),
-            (f"generation of {progress.phase}", f"{progress.generation} of {progress.generations}"),
-            ("non-dominated", str(progress.archive_size)),
-            ("evaluations/s", "–" if rate is None else f"{rate:.0f}"),
-            ("left", "–" if left is None else duration(left)),
-        ]
+        facts = [("experiments", f"{progress.told} of {self.experiments}")]
+        if progress.phase in STEPS:
+            facts.append(
+                ("step", f"{progress.generation} of {progress.generations}, {STEPS[progress.phase][0]}")
+            )
+            if progress.archive_size:
+                facts.append(("committee", str(progress.archive_size)))
+            facts.append(("elapsed", duration(time.monotonic() - self._started)))
+        else:
+            facts += [
+                ("iteration", str(progress.iteration)),
+                (f"generation of {progress.phase}", f"{progress.generation} of {progress.generations}"),
+                ("non-dominated", str(progress.archive_size)),
+                ("evaluations/s", "–" if rate is None else f"{rate:.0f}"),
+            ]
+        return [*facts, ("left", "–" if left is None else duration(left))]
 
     def _line(self, progress: Progress, rate: float | None, left: float | None) -> str:
         errors = ", ".join(
@@ -168,9 +288,15 @@ class Watch:
         facts.add_row(self.label, style="bold")
         for name, value in self._headline(progress, rate, left):
             facts.add_row(name, value)
-        errors = Table("test", "open loop", "closed loop", box=None, header_style="bold")
-        for test, step, free in zip(progress.tests, progress.open_loop, progress.closed_loop, strict=False):
-            errors.add_row(str(test), f"{step:.3g}", f"{free:.3g}")
+        if not progress.closed_loop:
+            outer.add_row(facts)
+            return outer
+        steps = progress.open_loop or (None,) * len(progress.closed_loop)
+        columns = ["test", "open loop", "closed loop"] if progress.open_loop else ["test", "closed loop"]
+        errors = Table(*columns, box=None, header_style="bold")
+        for test, step, free in zip(progress.tests, steps, progress.closed_loop, strict=False):
+            numbers = [free] if step is None else [step, free]
+            errors.add_row(str(test), *(f"{number:.3g}" for number in numbers))
         outer.add_row(facts, errors)
         return outer
 

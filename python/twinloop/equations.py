@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from twinloop import _core
 from twinloop.errors import InvalidInput
-from twinloop.signals import Signals
+from twinloop.signals import RigidBody, Signals
 
 SMALLEST_DIVISOR = 1e-6
 """A divisor whose magnitude is not above this leaves the dividend as it is (specification, section 4)."""
@@ -219,7 +219,8 @@ def equations(model: _core.Model, signals: Signals, digits: int = 6) -> str:
     writer = Writer(graph, outputs, digits, prefix)
     body = [f"{name} = {writer.expression(node, define=True)}" for node, name in writer.names.items()]
     body += _states(model.form, signals, [writer.expression(output) for output in outputs])
-    return "\n".join([*_legend(model.form, signals, symbols, writer), "", *body])
+    legend = _legend(model.form, signals, symbols, writer) + _actuators(model, signals, writer)
+    return "\n".join([*legend, "", *body])
 
 
 def _legend(form: str, signals: Signals, symbols: Sequence[str], writer: Writer) -> list[str]:
@@ -252,10 +253,39 @@ def _states(form: str, signals: Signals, outputs: Sequence[str]) -> list[str]:
             for name, text in zip(signals.state_names, outputs, strict=True)
         ]
     rates = {state.derivative_of: state.name for state in signals.states if state.derivative_of is not None}
+    if signals.kinematics is not None:
+        rates |= _turning(signals.kinematics)
     remaining = iter(outputs)
     return [
         f"d {name} / dt = {rates[name] if name in rates else next(remaining)}" for name in signals.state_names
     ]
+
+
+def _turning(body: RigidBody) -> dict[str | None, str]:
+    """How body rates turn roll, pitch and yaw."""
+    (roll, pitch, yaw), (p, q, r) = body.angles, body.rates
+    turning = f"{q} * sin({roll}) + {r} * cos({roll})"
+    return {
+        roll: f"{p} + ({turning}) * tan({pitch})",
+        pitch: f"{q} * cos({roll}) - {r} * sin({roll})",
+        yaw: f"({turning}) / cos({pitch})",
+    }
+
+
+def _actuators(model: _core.Model, signals: Signals, writer: Writer) -> list[str]:
+    """What stands between commands and their effect, one line for those that are alike."""
+    alike: dict[tuple[float, int, float | None], list[str]] = {}
+    for actuator, command in zip(model.actuators, signals.commands, strict=False):
+        alike.setdefault(actuator, []).append(command.name)
+    lines = []
+    for (lag, delay, rest), names in alike.items():
+        if lag == 0.0 and delay == 0:
+            continue
+        parts = [f"a lag of {writer.number(lag)} s"] if lag > 0.0 else []
+        parts += [f"a delay of {delay} period{'s' if delay > 1 else ''}"] if delay else []
+        start = "the first command" if rest is None else writer.number(rest)
+        lines.append(f"# {', '.join(names)}: act with {' and '.join(parts)}, from {start} at the start")
+    return lines
 
 
 def _scaled(name: str, size: float, signals: Signals) -> str:

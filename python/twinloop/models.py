@@ -67,11 +67,32 @@ class Noise:
 
     Args:
         sensors: standard deviation of each state's sensor (n_x,), in its unit.
-        moves: standard deviation of what a disturbance adds to each state in a period (n_x,), in its unit.
+        moves: standard deviation of what a white disturbance adds to each state in a period (n_x,), in its unit.
+        gusts: lasting disturbances: the states that each drives, whether as a derivative, its standard deviation, and
+            the time in s after which it is forgotten to 1/e.
+        dt: period, s.
     """
 
     sensors: Floats
     moves: Floats
+    gusts: tuple[tuple[tuple[int, ...], bool, float, float], ...] = ()
+    dt: float = 1.0
+
+    def disturbance(self, draws: int, steps: int, stream: np.random.Generator) -> Floats:
+        """Draws of what disturbances add to the states (draws, steps, n_x)."""
+        added = self.moves * stream.standard_normal((draws, steps, len(self.moves)))
+        for states, integrated, size, memory in self.gusts:
+            kept = float(np.exp(-self.dt / memory))
+            fresh = stream.standard_normal((draws, steps))
+            gust = np.empty((draws, steps))
+            gust[:, 0] = fresh[:, 0]
+            for k in range(1, steps):
+                gust[:, k] = kept * gust[:, k - 1] + np.sqrt(1.0 - kept * kept) * fresh[:, k]
+            reach = 1.0
+            for i, state in enumerate(states if integrated else states[:1]):
+                reach *= self.dt / (i + 1) if integrated else 1.0
+                added[:, :, state] += reach * size * gust
+        return np.asarray(added, dtype=np.float64)
 
 
 DRAWS = 12
@@ -149,7 +170,7 @@ class Twin:
         stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 80])))
         shape = (DRAWS, test.steps + 1, self.signals.n_x)
         noise = self.noise.sensors * stream.standard_normal(shape)
-        moves = self.noise.moves * stream.standard_normal((DRAWS, test.steps, self.signals.n_x))
+        moves = self.noise.disturbance(DRAWS, test.steps, stream)
         excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
         runs = []
         for member in self.members:
@@ -161,7 +182,7 @@ class Twin:
                     test.task,
                     self.signals.engine,
                     noise=noise,
-                    disturbance=moves if self.noise.moves.any() else None,
+                    disturbance=moves,
                     excitation=excitation,
                     divergence_factor=self.divergence_factor,
                 )

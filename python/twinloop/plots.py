@@ -12,6 +12,10 @@ import numpy as np
 
 from twinloop.campaign import Campaign
 from twinloop.errors import NotAvailable
+from twinloop.objectives import normalised_error
+from twinloop.presets import DefaultOptions
+from twinloop.result import quality_unit
+from twinloop.text import QUALITIES
 
 SUFFIXES = (".svg", ".png")
 INK, FAINT, TWIN, TARGET = "#22272e", "#c9ced6", "#d1495b", "#6b7280"
@@ -51,7 +55,9 @@ def require() -> Any:
 
 
 def campaign_picture(campaign: Campaign, path: Path) -> None:
-    """Every state of every test, flown and predicted, above the errors by iteration.
+    """Every state of every test, flown and predicted, above the errors by experiment.
+
+    Where a committee stands behind the twin, its 90 % band is drawn too, and the predicted beside the flown quality.
 
     Args:
         campaign: with at least one experiment told.
@@ -63,22 +69,85 @@ def campaign_picture(campaign: Campaign, path: Path) -> None:
     """
     with require().rc_context(STYLE):
         columns, rows = len(campaign.experiments), campaign.signals.n_x
-        figure = _figure(max(6.4, 1.2 + 2.2 * columns), 1.15 * rows + 3.4)
-        above, below = figure.subfigures(2, 1, height_ratios=[1.15 * rows + 0.6, 2.8])
+        identified = isinstance(campaign.options, DefaultOptions)
+        figure = _figure(max(8.4 if identified else 6.4, 1.2 + 2.2 * columns), 1.15 * rows + 3.6)
+        above, below = figure.subfigures(2, 1, height_ratios=[1.15 * rows + 0.6, 3.0])
         _runs(above, campaign)
-        axes = below.subplots(1, 1)
-        errors = {
-            test: [
-                (float(record.iteration), record.normalised[record.tests.index(test)])
-                for record in campaign.history
-                if test in record.tests
-            ]
-            for test in dict.fromkeys(run.test.number for run in campaign.experiments)
-        }
-        _error_lines(axes, errors, "normalised closed-loop error")
-        axes.axhline(1.0, color=TARGET, linewidth=0.8, linestyle=":")
-        axes.set_title("Error of the best trade-off by iteration (1: a model that never moves)", loc="left")
+        if identified:
+            left, right = below.subplots(1, 2)
+            _errors_by_experiment(left, campaign)
+            _qualities(right, campaign)
+        else:
+            axes = below.subplots(1, 1)
+            _error_lines(axes, _normalised(campaign), "normalised closed-loop error")
+            axes.axhline(1.0, color=TARGET, linewidth=0.8, linestyle=":")
+            axes.set_title(
+                "Error of the best trade-off by iteration (1: a model that never moves)", loc="left"
+            )
         _save(figure, path)
+
+
+def _normalised(campaign: Campaign) -> dict[int, list[tuple[float, float]]]:
+    """(iteration, normalised closed-loop error) of each test."""
+    return {
+        test: [
+            (float(record.iteration), record.normalised[record.tests.index(test)])
+            for record in campaign.history
+            if test in record.tests
+        ]
+        for test in dict.fromkeys(run.test.number for run in campaign.experiments)
+    }
+
+
+def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
+    _error_lines(axes, _normalised(campaign), "normalised error of whole flights")
+    learnt = {record.tests[-1]: float(record.iteration) for record in reversed(campaign.history)}
+    label = "before it was learnt"
+    for i, run in enumerate(campaign.experiments):
+        if run.before is None or not run.before > 0.0 or run.test.number not in learnt:
+            continue
+        axes.plot(
+            learnt[run.test.number] - 1.0, normalised_error(run.before, run.frozen),
+            color=CYCLE[i % len(CYCLE)], marker="o", markersize=5.0, markerfacecolor="white", linestyle="none",
+            label=label,
+        )  # fmt: skip
+        label = "_again"
+    axes.set_xlabel("experiments learnt")
+    axes.set_title("Error of the twin (1: a model that never moves)", loc="left")
+    axes.legend(loc="best", fontsize=8.0)
+    axes.margins(0.08, 0.15)
+
+
+def _qualities(axes: Any, campaign: Campaign) -> None:
+    flown = [(run.test.number, run.quality) for run in campaign.experiments if run.quality is not None]
+    foretold = [
+        (run.test.number, run.test.predicted, run.test.spread or 0.0)
+        for run in campaign.experiments
+        if run.test.predicted is not None and math.isfinite(run.test.predicted)
+    ]
+    numbers = [number for number, _, _ in foretold]
+    axes.plot(
+        *zip(*flown, strict=True) if flown else ([], []), color=INK, marker="o", markersize=5.0, label="flown"
+    )
+    axes.errorbar(
+        [number + 0.12 for number in numbers],
+        [value for _, value, _ in foretold],
+        yerr=[spread for _, _, spread in foretold],
+        color=TWIN, marker="D", markersize=4.5, linestyle="none", capsize=3.0, label="predicted ± spread",
+    )  # fmt: skip
+    best = campaign.best_test
+    if best.predicted is not None and math.isfinite(best.predicted):
+        axes.axhline(
+            best.predicted, color=TWIN, linewidth=0.8, linestyle=":", label="controller to fly, predicted"
+        )
+    unit = quality_unit(campaign.setup.quality)
+    axes.set_xlabel("test")
+    axes.set_ylabel(QUALITIES[campaign.setup.quality.kind] + (f" ({unit})" if unit else ""))
+    axes.set_ylim(bottom=0.0)
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.margins(x=0.1)
+    axes.set_title("Quality of the flights (less is better)", loc="left")
+    axes.legend(loc="best", fontsize=8.0)
 
 
 def iterations_picture(errors: Mapping[int, Sequence[tuple[float, float]]], title: str, path: Path) -> None:
@@ -124,6 +193,17 @@ def _runs(figure: Any, campaign: Campaign) -> None:
             flown = factor * run.trajectory.states[:, row]
             target = factor * float(run.test.target_state[row])
             axes.axhline(target, color=TARGET, linewidth=0.8, linestyle=":", label="target")
+            if predicted.band is not None:
+                low, high = factor * predicted.band[:, :, row]
+                axes.fill_between(
+                    predicted.t,
+                    low,
+                    high,
+                    color=TWIN,
+                    alpha=0.25,
+                    linewidth=0.0,
+                    label="90 % band of the twin",
+                )
             axes.plot(run.trajectory.t - start, flown, color=INK, linewidth=1.6, label="system")
             axes.plot(predicted.t, factor * predicted.states[:, row], color=TWIN, linewidth=1.2, label="twin")
             if column == 0:
@@ -134,7 +214,7 @@ def _runs(figure: Any, campaign: Campaign) -> None:
         grid[row, 0].set_ylim(low, high)
     figure.align_ylabels(grid[:, 0])
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=3)
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
 
 
 def _extent(curves: Sequence[Any]) -> tuple[float, float]:

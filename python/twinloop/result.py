@@ -6,13 +6,23 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from twinloop.campaign import Campaign
+from twinloop.flight import fly
+from twinloop.history import Experiment, Lesson, Planned
+from twinloop.models import TestErrors, Twin
+from twinloop.objectives import normalised_error
+from twinloop.planning.quality import Quality
+from twinloop.presets import DefaultOptions
+from twinloop.test import Test
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Result = dict[str, Value]
+REPEATS = 32
+"""Flights on the twin from which the scatter of a measurement is taken."""
 
 
 def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[str, object]) -> Result:
@@ -31,25 +41,14 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         NotAvailable: nothing was told.
     """
     twin, best = campaign.twin, campaign.best_test
-    experiments = [
-        {
-            "test": run.test.number,
-            "gains": run.test.parameters,
-            "ended": run.trajectory.ended,
-            "reason": run.trajectory.reason,
-            "steps": run.trajectory.steps,
-            "predicted": run.test.predicted,
-            "measured": run.final_distance,
-            **{key: value for key, value in dataclasses.asdict(row).items() if key != "test"},
-            "frozen": run.frozen,
-        }
-        for run, row in zip(campaign.experiments, twin.errors, strict=True)
-    ]
-    first = campaign.experiments[0].test
-    result = {
+    identified = isinstance(campaign.options, DefaultOptions)
+    first = campaign.experiments[0]
+    result: dict[str, object] = {
         "system": dict(system),
         "preset": campaign.setup.preset,
         "options": dataclasses.asdict(campaign.options),
+        "goal": campaign.setup.goal,
+        "quality": {"kind": campaign.setup.quality.kind, "unit": quality_unit(campaign.setup.quality)},
         "seed": campaign.setup.seed,
         "interrupted": campaign.interrupted,
         "task": {
@@ -63,7 +62,10 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "states": [dataclasses.asdict(state) for state in campaign.signals.states],
             "commands": [dataclasses.asdict(command) for command in campaign.signals.commands],
         },
-        "experiments": experiments,
+        "experiments": [
+            _experiment(run, row, identified)
+            for run, row in zip(campaign.experiments, twin.errors, strict=True)
+        ],
         "iterations": [dataclasses.asdict(iteration) for iteration in campaign.history],
         "twin": {
             "form": twin.model.form,
@@ -82,13 +84,147 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "measured": best.measured,
         },
         "first_controller": {
-            "test": first.number,
-            "gains": first.parameters,
-            "measured": campaign.experiments[0].final_distance,
+            "test": first.test.number,
+            "gains": first.test.parameters,
+            "measured": first.quality if identified else first.final_distance,
         },
         "run_info": dict(run_info),
     }
+    if identified:
+        _add_identified(result, campaign)
     return plain_dict(result)
+
+
+def quality_unit(quality: Quality) -> str:
+    """Unit of a quality, where it has one: "" where states of several units, or commands, are weighed together.
+
+    Args:
+        quality: of a campaign.
+    """
+    counted = [
+        (state, weight)
+        for state, weight in zip(quality.signals.states, quality.weights.tolist(), strict=True)
+        if weight != 0.0
+    ]
+    units = {state.unit for state, _ in counted}
+    if (
+        len(units) != 1
+        or any(weight != 1.0 for _, weight in counted)
+        or quality.effort
+        or quality.effort_rate
+    ):
+        return ""
+    unit = units.pop()
+    return {"iae": f"{unit} s", "ise": f"{unit}² s"}.get(quality.kind, unit)
+
+
+def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str, object]:
+    found: dict[str, object] = {
+        "test": run.test.number,
+        "gains": run.test.parameters,
+        "ended": run.trajectory.ended,
+        "reason": run.trajectory.reason,
+        "steps": run.trajectory.steps,
+        "predicted": run.test.predicted,
+        "measured": run.quality if identified else run.final_distance,
+        **{key: value for key, value in dataclasses.asdict(row).items() if key != "test"},
+        "frozen": run.frozen,
+    }
+    if identified:
+        both = run.test.predicted is not None and run.quality is not None
+        found |= {
+            "spread": run.test.spread,
+            "predicted_minus_measured": run.test.predicted - run.quality if both else None,  # type: ignore[operator]
+            "risk": run.test.risk,
+            "why": run.test.reason,
+            "excited": run.test.excitation is not None,
+            "final_distance": run.final_distance,
+            "normalised_before": None if row.before is None else normalised_error(row.before, run.frozen),
+        }
+    return found
+
+
+def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
+    """What only the preset `default` knows: noise, actuators, what is left, what another experiment would bring."""
+    twin, best, lesson = campaign.twin, campaign.best_test, campaign.history[-1]
+    assert isinstance(lesson, Lesson)
+    first = campaign.experiments[0].test.quiet()
+    result["twin"] |= {
+        "terms": lesson.terms,
+        "misfit": lesson.misfit,
+        "readings": lesson.readings,
+        "ignored": lesson.ignored,
+        "committee": len(campaign.committee),
+        "states": [
+            {"name": state.name, "unit": state.unit, "error": error, "sensor": sensor}
+            for state, error, sensor in zip(
+                campaign.signals.states, _errors_by_state(campaign, twin), lesson.sensors, strict=True
+            )
+        ],
+        "actuators": [
+            {"name": command.name, "lag": lag, "delay": delay}
+            for command, lag, delay in zip(campaign.signals.commands, lesson.lags, lesson.delays, strict=True)
+        ],
+        "remarks": list(lesson.remarks),
+    }
+    result["controller"] |= {
+        "spread": best.spread,
+        "risk": best.risk,
+        "why": best.reason,
+        "flown": any(run.test.number == best.number for run in campaign.experiments),
+    }
+    result["first_controller"]["predicted"] = _simulated_quality(campaign, twin, first)
+    result["advice"] = _advice(campaign, twin, best)
+
+
+def _errors_by_state(campaign: Campaign, twin: Twin) -> list[float]:
+    """Root mean square of flown minus simulated over all flights, for each state in its unit."""
+    squares, rows = np.zeros(campaign.signals.n_x), 0
+    for run in campaign.experiments:
+        simulated = twin.simulate(run.test).states[1:]
+        flown = run.trajectory.states[1 : len(simulated) + 1]
+        squares += ((flown - simulated[: len(flown)]) ** 2).sum(axis=0)
+        rows += len(flown)
+    return [float(value) for value in np.sqrt(squares / max(1, rows))]
+
+
+def _simulated_quality(campaign: Campaign, twin: Twin, test: Test) -> float | None:
+    """Quality of a flight on the twin; None if it diverges."""
+    run = fly(twin.model, test, divergence_factor=twin.divergence_factor)
+    return campaign.setup.quality.flown(run, test.target_state) if run.steps == test.steps else None
+
+
+def _advice(campaign: Campaign, twin: Twin, best: Test) -> dict[str, object]:
+    """What another experiment would bring, by the committee's own estimate, beside what a repeated flight scatters."""
+    planned = [plan for lesson in campaign.history for plan in lesson.asked if isinstance(plan, Planned)]
+    judged = [plan for plan in planned if math.isfinite(plan.predicted)]
+    gain = judged[-1].gain if judged else None
+    scatter = _scatter(campaign, twin, best)
+    quality = best.predicted if best.measured is None else best.measured
+    known = gain is not None and quality is not None and math.isfinite(quality) and quality > 0.0
+    return {
+        "before_test": judged[-1].test if judged else None,
+        "gain": gain,
+        "share": gain / quality if known else None,  # type: ignore[operator]
+        "scatter": scatter,
+        "stop": None if gain is None or scatter is None else gain <= scatter,
+    }
+
+
+def _scatter(campaign: Campaign, twin: Twin, best: Test) -> float | None:
+    """Standard deviation of the quality that would be measured if the same flight were repeated, on the twin."""
+    if twin.noise is None:
+        return None
+    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([campaign.setup.seed, 81])))
+    shape = (REPEATS, best.steps + 1, campaign.signals.n_x)
+    noise = twin.noise.sensors * stream.standard_normal(shape)
+    moves = twin.noise.disturbance(REPEATS, best.steps, stream)
+    values = []
+    for seen, moved in zip(noise, moves, strict=True):
+        run = fly(twin.model, best, noise=seen, disturbance=moved, divergence_factor=twin.divergence_factor)
+        if run.steps == best.steps:
+            values.append(campaign.setup.quality.flown(run, best.target_state))
+    return float(np.std(values)) if len(values) > 1 else None
 
 
 def plain_dict(values: Mapping[str, object]) -> Result:

@@ -47,7 +47,19 @@ def render(result: Mapping[str, Any]) -> str:
     Returns:
         Text.
     """
-    parts = [_title(result), _twin(result), _errors(result), _controller(result), _remarks(result)]
+    if "advice" in result:
+        parts = [
+            _title(result),
+            _twin(result),
+            _states(result),
+            _identified_errors(result),
+            _flights(result),
+            _controller_to_fly(result),
+            _advice(result),
+            _time(result),
+        ]
+    else:
+        parts = [_title(result), _twin(result), _errors(result), _controller(result), _remarks(result)]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -130,7 +142,161 @@ def _remarks(result: Mapping[str, Any]) -> str:
         f" non-dominated models, {100 * last['intron_share']:.0f} % introns, {last['evaluations']}"
         f" evaluations, {last['spared']} spared."
     )
-    seconds = result["run_info"].get("seconds")
-    if isinstance(seconds, float):
-        remarks.append(f"{seconds:.1f} s on {result['run_info']['threads']} threads.")
+    remarks += [line for line in [_time(result)] if line]
     return "\n".join(remarks)
+
+
+def _time(result: Mapping[str, Any]) -> str:
+    seconds = result["run_info"].get("seconds")
+    if not isinstance(seconds, float):
+        return ""
+    return f"{seconds:.1f} s on {result['run_info']['threads']} threads."
+
+
+# The preset "default"
+
+QUALITIES = {
+    "iae": "integrated absolute error",
+    "ise": "integrated squared error",
+    "final_distance": "distance of the last state to the target",
+}
+
+
+def _states(result: Mapping[str, Any]) -> str:
+    twin = result["twin"]
+    rows = [
+        [
+            state["name"],
+            state["unit"] or "1",
+            state["error"],
+            state["sensor"],
+            None if not state["sensor"] or state["error"] is None else state["error"] / state["sensor"],
+        ]
+        for state in twin["states"]
+    ]
+    head = ["state", "unit", "error of the twin", "noise of the sensor", "ratio"]
+    lines = [
+        "WHAT THE TWIN LEAVES, STATE BY STATE",
+        table(head, rows),
+        "Errors: root mean square of flown minus simulated, over whole flights from their first reading. Noise:"
+        " standard\ndeviation, as estimated. A ratio of 1 is a twin that leaves the sensors' noise alone.",
+        _actuators(twin["actuators"]),
+        f"{twin['terms']} terms, {twin['committee']} models in the committee; χ² a reading {cell(twin['misfit'])}"
+        f" (1: only noise is left) over {twin['readings']} readings, {twin['ignored']} ignored.",
+        *twin["remarks"],
+    ]
+    return "\n".join(lines)
+
+
+def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
+    """Lags and delays in words; commands that have the same are named together."""
+    groups: dict[tuple[float, int], list[str]] = {}
+    for actuator in actuators:
+        groups.setdefault((actuator["lag"], actuator["delay"]), []).append(actuator["name"])
+    if list(groups) == [(0.0, 0)]:
+        return "Actuators: no lag and no delay were found."
+    words = []
+    for (lag, delay), names in groups.items():
+        slow = f"lag {lag:.3g} s" if lag else "no lag"
+        late = f"delay {delay} period{'s' if delay != 1 else ''}" if delay else "no delay"
+        words.append(f"{', '.join(names)}: {slow}, {late}")
+    return f"Actuators: {'; '.join(words)}."
+
+
+def _identified_errors(result: Mapping[str, Any]) -> str:
+    head = ["test", "ended", "one step", "whole flight", "normalised", "before learning"]
+    rows = [
+        [
+            run["test"],
+            run["ended"],
+            run["open_loop"],
+            run["closed_loop"],
+            run["normalised"],
+            run["normalised_before"],
+        ]
+        for run in result["experiments"]
+    ]
+    note = (
+        f"Mean squares over steps and states ({_squares(result)}), to the noisy readings. Normalised: over that of a"
+        " model that\nnever moves; 1 is useless. Before learning: the same, of the twin that had not seen the flight."
+    )
+    return "ERRORS OF THE TWIN, ONE ROW A TEST\n" + table(head, rows) + "\n" + note
+
+
+def _flights(result: Mapping[str, Any]) -> str:
+    head = ["test", "predicted", "± spread", "flown", "predicted − flown", "risk"]
+    keys = ("test", "predicted", "spread", "measured", "predicted_minus_measured", "risk")
+    rows = [[run[key] for key in keys] for run in result["experiments"]]
+    reasons = [
+        f"Test {run['test']}: {run['why'] or _own(run)}"
+        + (f" It was cut: {run['reason']}." if run["reason"] else "")
+        for run in result["experiments"]
+    ]
+    title = f"FLIGHTS: {QUALITIES[result['quality']['kind']].upper()}{_in_unit(result)}, LESS IS BETTER"
+    note = "Risk: probability that the flight leaves the envelope, by the committee."
+    return "\n".join([title, table(head, rows), note, *reasons])
+
+
+def _own(run: Mapping[str, Any]) -> str:
+    return "Gains of your own" + (", gently excited." if run["excited"] else ".")
+
+
+def _controller_to_fly(result: Mapping[str, Any]) -> str:
+    best, first = result["controller"], result["first_controller"]
+    gains = [
+        [
+            gain["name"],
+            gain["value"],
+            first["gains"][gain["name"]],
+            gain["unit"],
+            f"{gain['low']:g} to {gain['high']:g}",
+        ]
+        for gain in best["gains"]
+    ]
+    state = f"TEST {best['test']}, FLOWN" if best["flown"] else "NOT FLOWN YET"
+    qualities = [
+        ["this controller", best["predicted"], best["spread"], best["measured"]],
+        ["first controller", first["predicted"], None, first["measured"]],
+    ]
+    return "\n".join(
+        [
+            f"CONTROLLER TO FLY: {state}",
+            table(["gain", "value", "first", "unit", "bounds"], gains),
+            "",
+            table(["quality", "predicted", "± spread", "measured"], qualities),
+            f"{best['why']} Risk {cell(best['risk'])}.",
+        ]
+    )
+
+
+def _advice(result: Mapping[str, Any]) -> str:
+    advice, unit = result["advice"], result["quality"]["unit"]
+    title = "ANOTHER EXPERIMENT?\n"
+    scatter = advice["scatter"]
+    if advice["gain"] is None:
+        return title + "No committee was asked for a flight yet; ask for one to hear what it would bring."
+    share = f", {100.0 * advice['share']:.2g} % of what is flown now" if advice["share"] is not None else ""
+    words = (
+        f"When test {advice['before_test']} was planned, knowing which model is right would have improved the"
+        f" quality\nby {_with_unit(advice['gain'], unit)}{share}."
+    )
+    if scatter is None:
+        return title + words
+    repeated = f"the scatter of one measurement, {_with_unit(scatter, unit)}"
+    if advice["stop"]:
+        return f"{title}{words}\nThat is below {repeated}. For the controller, stop."
+    return f"{title}{words}\nThat is above {repeated}: another experiment may pay."
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.2g} {unit}".rstrip()
+
+
+def _in_unit(result: Mapping[str, Any]) -> str:
+    unit = result["quality"]["unit"]
+    return f" ({unit})" if unit else ""
+
+
+def _squares(result: Mapping[str, Any]) -> str:
+    units = dict.fromkeys(state["unit"] or "1" for state in result["signals"]["states"])
+    return ", ".join(f"({unit})²" if "/" in unit or " " in unit else f"{unit}²" for unit in units)

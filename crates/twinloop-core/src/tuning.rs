@@ -391,6 +391,7 @@ impl Part<'_> {
         let mut workspace = model.variants::<V>(&pack(&constants), &pack(&lags));
         let mut state: Vec<V> = record.states[..n_x].iter().map(|&x| V::splat(x)).collect();
         let mut command = vec![V::splat(0.0); n_u];
+        let mut gusts = vec![V::splat(0.0); observer.len()];
         let mut innovation = [V::splat(0.0); 4];
         let mut squares = V::splat(0.0);
         let mut alive = V::splat(1.0);
@@ -399,7 +400,7 @@ impl Part<'_> {
         let mut states = Vec::with_capacity(if self.keep { record.states.len() } else { 0 });
         let steps = record.commands.len() / n_u;
         for k in 0..=steps {
-            for (observed, whitening) in observer.iter().zip(self.whitenings) {
+            for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
                 let d = observed.states.len();
                 let (gain, root) = (whitening.gain(k), whitening.root(k));
                 for (i, &at) in observed.states.iter().enumerate() {
@@ -420,6 +421,11 @@ impl Part<'_> {
                         }
                     }
                 }
+                if whitening.inner > d {
+                    for l in 0..d {
+                        *gust = *gust + innovation[l] * gain[d * d + l];
+                    }
+                }
             }
             if self.keep {
                 states.extend(state.iter().map(|value| value.lane(0)));
@@ -431,6 +437,14 @@ impl Part<'_> {
                 *command = V::splat(value);
             }
             model.step(&mut workspace, &mut state, &command);
+            for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
+                if whitening.inner > observed.states.len() {
+                    for (&at, reach) in observed.states.iter().zip(observed.chain.reach()) {
+                        state[at] = state[at] + *gust * reach;
+                    }
+                    *gust = *gust * whitening.kept;
+                }
+            }
             for (state, &limit) in state.iter().zip(limits) {
                 alive = state.abs().select_less(V::splat(limit), alive, V::splat(0.0));
             }

@@ -12,6 +12,8 @@ use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
 use crate::workers::{PyWorkers, or_default};
 
+/// Process variance, gust variance, memory in s.
+type Motion = (f64, f64, f64);
 /// Readings, weights, and the features at the start, the middle and the end of each period.
 type RecordArrays<'py> = (Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>);
 
@@ -77,12 +79,12 @@ impl PyRegression {
             .collect())
     }
 
-    fn likelihood(&self, coefficients: Vector<'_>, sensors: Vector<'_>, process: f64) -> Result<f64> {
+    fn likelihood(&self, coefficients: Vector<'_>, sensors: Vector<'_>, motion: Motion) -> Result<f64> {
         let residuals = self.leftovers(&coefficients)?;
-        Ok(likelihood(&self.chain, &self.records, &residuals, &self.noise(&sensors, process)?))
+        Ok(likelihood(&self.chain, &self.records, &residuals, &self.noise(&sensors, motion)?))
     }
 
-    #[pyo3(signature = (coefficients, sensors, process, smallest_sensors, smallest_process, fixed_sensors = false))]
+    #[pyo3(signature = (coefficients, sensors, motion, smallest_sensors, smallest_motion, fixed_sensors = false))]
     #[expect(
         clippy::too_many_arguments,
         reason = "a start and a floor of each variance, by keyword in Python"
@@ -92,30 +94,30 @@ impl PyRegression {
         py: Python<'py>,
         coefficients: Vector<'py>,
         sensors: Vector<'py>,
-        process: f64,
+        motion: Motion,
         smallest_sensors: Vector<'py>,
-        smallest_process: f64,
+        smallest_motion: Motion,
         fixed_sensors: bool,
-    ) -> Result<(Bound<'py, PyArray1<f64>>, f64, f64)> {
+    ) -> Result<(Bound<'py, PyArray1<f64>>, Motion, f64)> {
         let residuals = self.leftovers(&coefficients)?;
-        let start = self.noise(&sensors, process)?;
-        let smallest = self.noise(&smallest_sensors, smallest_process)?;
+        let start = self.noise(&sensors, motion)?;
+        let smallest = self.noise(&smallest_sensors, smallest_motion)?;
         let (noise, score) = py.detach(|| {
             most_likely_noise(&self.chain, &self.records, &residuals, &start, &smallest, fixed_sensors)
         });
-        Ok((to_vector(py, noise.sensors), noise.process, score))
+        Ok((to_vector(py, noise.sensors), (noise.process, noise.gust, noise.memory), score))
     }
 
-    #[pyo3(signature = (sensors, process, workers = None))]
+    #[pyo3(signature = (sensors, motion, workers = None))]
     fn gram(
         &self,
         py: Python<'_>,
         sensors: Vector<'_>,
-        process: f64,
+        motion: Motion,
         workers: Option<&PyWorkers>,
     ) -> Result<PyGram> {
         let workers = or_default(workers)?;
-        let noise = self.noise(&sensors, process)?;
+        let noise = self.noise(&sensors, motion)?;
         let gram = py.detach(|| Gram::new(&self.chain, &self.records, self.features, &noise, &workers));
         Ok(PyGram(Arc::new(gram)))
     }
@@ -139,16 +141,18 @@ impl PyRegression {
         Ok(self.records.iter().map(|record| record.residual(&self.chain, &coefficients)).collect())
     }
 
-    fn noise(&self, sensors: &Vector<'_>, process: f64) -> Result<Noise> {
+    fn noise(&self, sensors: &Vector<'_>, (process, gust, memory): Motion) -> Result<Noise> {
         let sensors = vector(sensors);
         let positive = sensors.iter().all(|x| x.is_finite() && *x > 0.0);
-        if sensors.len() != self.chain.states || !positive || !(process.is_finite() && process >= 0.0) {
+        let motion = [process, gust, memory].iter().all(|x| x.is_finite() && *x >= 0.0) && memory > 0.0;
+        if sensors.len() != self.chain.states || !positive || !motion {
             return Err(misuse(format!(
-                "noise: expected {} sensor variances above 0 and a process variance, found {sensors:?} and {process}",
+                "noise: expected {} sensor variances above 0 and (process variance, gust variance, memory), found \
+                 {sensors:?} and {process}, {gust}, {memory}",
                 self.chain.states
             )));
         }
-        Ok(Noise { sensors, process })
+        Ok(Noise { sensors, process, gust, memory })
     }
 }
 

@@ -9,23 +9,29 @@ use crate::error::{Result, misuse};
 use crate::model::PyModel;
 use crate::workers::{PyWorkers, or_default};
 
-/// States, sensor variances, process variance and whether features are derivatives, for each chain.
-type Chains = Vec<(Vec<usize>, Vec<f64>, f64, bool)>;
+/// States, sensor variances, (process variance, gust variance, memory) and whether features are derivatives, for each
+/// chain.
+type Chains = Vec<(Vec<usize>, Vec<f64>, (f64, f64, f64), bool)>;
 /// Readings, weights and commands of each run.
 type Records<'py> = Vec<(Matrix<'py>, Matrix<'py>, Matrix<'py>)>;
 
 fn observer(chains: Chains, dt: f64) -> Result<Vec<Observed>> {
-    let of_chain = |(states, sensors, process, integrated): (Vec<usize>, Vec<f64>, f64, bool)| {
+    let of_chain = |(states, sensors, (process, gust, memory), integrated): (
+        Vec<usize>,
+        Vec<f64>,
+        (f64, f64, f64),
+        bool,
+    )| {
         if !(1..=4).contains(&states.len())
             || sensors.iter().any(|s| !(s.is_finite() && *s > 0.0))
-            || !(process >= 0.0)
+            || !(process >= 0.0 && gust >= 0.0 && memory > 0.0)
         {
             return Err(misuse(
                 "chain: expected 1 to 4 states, sensor variances above 0 and a process variance".into(),
             ));
         }
         let chain = Chain { states: states.len(), dt, integrated };
-        Ok(Observed { states, chain, noise: Noise { sensors, process } })
+        Ok(Observed { states, chain, noise: Noise { sensors, process, gust, memory } })
     };
     chains.into_iter().map(of_chain).collect()
 }

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-ABLATIONS: dict[str, Mapping[str, object]] = {}
+ABLATIONS: dict[str, Mapping[str, object]] = {
+    "annealing": {"moves": 100, "starts": 1},
+    "ladder": {"libraries": ("linear", "quadratic")},
+    "evolution": {"generations": 0},
+    "tuning": {"tuning": False},
+    "second-pass": {"passes": 1},
+    "lags": {"lags": False},
+    "gusts": {"gusts": False},
+    "excitation": {"excitation": 0.0, "excitation_most": 0.0},
+    "committee": {"committee_size": 1, "tuning_members": 1},
+    "noise-draws": {"draws": 1},
+    "starts": {"tuning_starts": 1},
+}
 """Each idea of the preset `default` switched off: name → options. Studied at k ≤ 2 with 10 seeds."""
 
 TEST_KINDS = ("random", "chirp", "prbs")
@@ -25,6 +37,19 @@ SMOKE_OPTIONS: dict[str, Mapping[str, object]] = {
         "committee_size": 6,
         "mutants": 3,
     },
-    "default": {},
+    "default": {
+        "libraries": ("linear", "quadratic"),
+        "generations": 1,
+        "population": 70,
+        "moves": 500,
+        "starts": 1,
+        "lags": False,
+        "passes": 1,
+        "committee_size": 3,
+        "candidates": 16,
+        "draws": 2,
+        "evaluations": 128,
+        "tuning_starts": 1,
+    },
 }
 """Options that make a preset fast and useless, for `--smoke`, by preset."""

@@ -9,6 +9,11 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.signals import Signals
 
+Motion = tuple[float, float, float]
+"""(variance of a white disturbance, variance of a lasting one, its memory in s)."""
+QUIET: Motion = (0.0, 0.0, 1.0)
+"""Nothing disturbs."""
+
 
 @dataclass(frozen=True, eq=False)
 class Chain:
@@ -20,23 +25,26 @@ class Chain:
             rigid body).
         integrated: whether the output is a derivative, not an increment.
         sensors: variance of each state's sensor, in its unit squared.
-        process: variance of the disturbance per second (per period for increments).
+        rough: variance of each state's readings about a parabola through neighbours: the sensor's or more.
+        motion: variance of a white disturbance per second (per period for increments), variance of a lasting one such
+            as gusts, and the time in s after which that is forgotten to 1/e.
     """
 
     states: tuple[int, ...]
     output: int | None
     integrated: bool
     sensors: Floats
-    process: float
+    rough: Floats
+    motion: Motion = QUIET
 
-    def with_noise(self, sensors: Floats, process: float) -> Chain:
+    def with_noise(self, sensors: Floats, motion: Motion) -> Chain:
         """The same states with other noise."""
-        return replace(self, sensors=np.asarray(sensors, dtype=np.float64), process=float(process))
+        return replace(self, sensors=np.asarray(sensors, dtype=np.float64), motion=motion)
 
     @property
-    def engine(self) -> tuple[list[int], list[float], float, bool]:
+    def engine(self) -> tuple[list[int], list[float], Motion, bool]:
         """The same for the native engine."""
-        return list(self.states), self.sensors.tolist(), self.process, self.integrated
+        return list(self.states), self.sensors.tolist(), self.motion, self.integrated
 
 
 def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
@@ -51,7 +59,7 @@ def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
         Every state is in one of them.
     """
     if form != "acceleration":
-        return [Chain((i,), i, False, sensors[[i]], 0.0) for i in range(signals.n_x)]
+        return [Chain((i,), i, False, sensors[[i]], sensors[[i]]) for i in range(signals.n_x)]
     driven, given = [], []
     names = signals.state_names
     outputs = [i for i in range(signals.n_x) if not signals.is_given(i)]
@@ -63,8 +71,8 @@ def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
             states.append(names.index(parent))
             parent = signals.states[states[-1]].derivative_of
         seen.update(states)
-        driven.append(Chain(tuple(states), output, True, sensors[states], 0.0))
+        driven.append(Chain(tuple(states), output, True, sensors[states], sensors[states]))
     for i in range(signals.n_x):
         if i not in seen:
-            given.append(Chain((i,), None, True, sensors[[i]], 0.0))
+            given.append(Chain((i,), None, True, sensors[[i]], sensors[[i]]))
     return [*driven, *given]

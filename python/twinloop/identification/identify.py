@@ -19,6 +19,7 @@ from twinloop.errors import engine_input
 from twinloop.identification.actuation import groups, search_actuators, total
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.evolution import evolve
+from twinloop.identification.formulas import term
 from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, stages
@@ -76,8 +77,13 @@ class Identified:
         moves = np.zeros(signals.n_x)
         for chain in self.chains:
             period = signals.dt if chain.integrated else 1.0
-            moves[chain.states[0]] = np.sqrt(chain.process * period)
-        return Noise(self.sensors(signals.n_x), moves)
+            moves[chain.states[0]] = np.sqrt(chain.motion[0] * period)
+        gusts = [
+            (chain.states, chain.integrated, float(np.sqrt(chain.motion[1])), chain.motion[2])
+            for chain in self.chains
+            if chain.motion[1] > 0.0
+        ]
+        return Noise(self.sensors(signals.n_x), moves, tuple(gusts), signals.dt)
 
     def sensors(self, n_x: int) -> Floats:
         """Standard deviation of each state's sensor (n_x,)."""
@@ -103,7 +109,8 @@ def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:
         return low
     squares = np.sort(np.concatenate(thirds) ** 2, axis=0)
     # The median of a squared normal number is 0.4549; a third difference has 20 times the variance.
-    return np.maximum(squares[len(squares) // 2] / (0.4549 * 20.0), low)
+    guess: Floats = np.maximum(squares[len(squares) // 2] / (0.4549 * 20.0), low)
+    return guess
 
 
 def identify_runs(
@@ -163,6 +170,7 @@ class _Learner:
         self.workers = workers
         self.watch = watch
         self.scales = np.array([state.scale for state in signals.states])
+        self.known: Identified | None
         if known is not None and known.model.form == self.form:
             # A copy: what an interrupted attempt has entered must not change the next one.
             self.pool, self.known = copy.deepcopy(known.pool), known
@@ -174,6 +182,9 @@ class _Learner:
         options = self.options
         ladder = rungs(self.pool, self.signals, options.libraries, options.most_terms)
         base = ladder or [[self.pool.one, *range(self.pool.inputs)]]
+        seeds = [term(formula, self.pool, self.signals) for formula in options.seed_terms]
+        self.pool.rungs.update(dict.fromkeys(seeds, 0))
+        base = [list(dict.fromkeys([*terms, *seeds])) for terms in base]
         guess = guessed_noise(self.runs, self.scales)
         all_chains = chains(self.signals, self.form, guess)
         driven = [chain for chain in all_chains if chain.output is not None]
@@ -184,7 +195,10 @@ class _Learner:
             actuators = self.known.actuators
         problem = self._problem(actuators)
         start = base[0]
-        driven = [first_noise(problem, chain, problem.usable(start), self.scales) for chain in driven]
+        driven = [
+            first_noise(problem, chain, problem.usable(start), self.scales, self.options.gusts)
+            for chain in driven
+        ]
         known: list[Sum | None] = [None] * len(driven)
         if self.known is not None:
             known = [replace(s, others=[]) for s in self.known.sums]
@@ -223,7 +237,7 @@ class _Learner:
 
     def _given_noise(self, chain: Chain) -> Chain:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
-        return chain.with_noise(chain.sensors, 1e-4 * float(chain.sensors[0]) / self.signals.dt)
+        return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / self.signals.dt, 0.0, 1.0))
 
     def _next(self) -> int:
         self.stream += 1
@@ -263,8 +277,8 @@ class _Learner:
                 best, current = list(sums), [found.chain for found in sums]
         if options.generations and not (brief and options.libraries):
             self.watch("evolution")
-            seeds = [self.pool.one, *range(self.pool.inputs)]
-            seeds += [term for found in best if found for term in found.weights]
+            seeds = list(ladder[0]) if not options.libraries else [self.pool.one, *range(self.pool.inputs)]
+            seeds += [node for found in best if found for node in found.weights]
             for restart in range(options.restarts):
                 grown = evolve(
                     problem, current, best, seeds, self.scales,
@@ -378,7 +392,10 @@ class _Learner:
         """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
         factor = left / max(1, readings) if np.isfinite(left) else 1.0
         factor = max(1.0, factor)
-        return [c.with_noise(c.sensors * factor, c.process * factor) for c in observer]
+        return [
+            c.with_noise(c.sensors * factor, (c.motion[0] * factor, c.motion[1] * factor, c.motion[2]))
+            for c in observer
+        ]
 
     def _committee(
         self,
@@ -413,7 +430,7 @@ class _Learner:
                 terms = problem.usable(subset)
                 if (i, subset) not in grams:
                     regression = problem.regression(found.chain, terms)
-                    grams[i, subset] = regression.gram(found.chain.sensors, found.chain.process, self.workers)
+                    grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, self.workers)
                 solved = grams[i, subset].solve(list(range(len(terms))))
                 if solved is None:
                     varied.append(found)

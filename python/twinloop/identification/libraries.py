@@ -22,8 +22,10 @@ def quadratic(pool: Pool, signals: Signals) -> Terms:
 
 
 def damping(pool: Pool, signals: Signals) -> Terms:
-    """|x| x of each input, and each speed times the length of the vector of its kind."""
-    terms = [pool.product(pool.add(("abs", i, None)), i) for i in range(pool.inputs)]
+    """|x| x of each input that has two signs and is no angle, each speed times the length of the vector of its kind."""
+    signed = [i for i in range(signals.n_x) if i not in angles(signals)]
+    signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
+    terms = [pool.product(pool.add(("abs", i, None)), i) for i in signed]
     for group in speeds(signals):
         if len(group) > 1:
             total = pool.product(group[0], group[0])
@@ -37,8 +39,8 @@ def damping(pool: Pool, signals: Signals) -> Terms:
 def trigonometric(pool: Pool, signals: Signals) -> Terms:
     """Sin and cos of angles, alone and times every input."""
     terms: Terms = []
-    for i, state in enumerate(signals.states):
-        if state.unit == "rad":
+    for i in range(signals.n_x):
+        if i in angles(signals):
             for function in ("sin", "cos"):
                 wave = pool.add((function, i, None))
                 terms += [wave, *(pool.product(j, wave) for j in range(pool.inputs) if j != i)]
@@ -60,6 +62,11 @@ LIBRARIES: dict[str, Callable[[Pool, Signals], Terms]] = {
     "cubic": cubic,
 }
 """Libraries by name, in the order in which they are tried."""
+
+
+def angles(signals: Signals) -> set[int]:
+    """States that are measured in rad."""
+    return {i for i, state in enumerate(signals.states) if state.unit == "rad"}
 
 
 def speeds(signals: Signals) -> list[list[int]]:

@@ -18,6 +18,8 @@ class IdentificationOptions:
             body, else increments.
         libraries: that terms are taken from, any of "linear", "quadratic", "damping", "trigonometric", "cubic"; none:
             evolved programs only.
+        seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
+            the first rung of the ladder.
         operators: that evolved programs may use.
         generations: of evolved features; 0: none.
         restarts: of the evolution.
@@ -27,6 +29,7 @@ class IdentificationOptions:
         starts: walks for each output.
         largest: terms of an output at most.
         most_terms: of a library at most; a larger one is left out.
+        gusts: whether disturbances may last, as gusts do, rather than be white.
         lags: whether lags and delays of the actuators are searched.
         longest_delay: of an actuator, periods.
         tuning: whether constants are tuned on predictions.
@@ -38,6 +41,7 @@ class IdentificationOptions:
 
     form: str = "auto"
     libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "trigonometric", "cubic")
+    seed_terms: tuple[str, ...] = ()
     operators: tuple[str, ...] = ("+", "-", "*", "/", "abs", "sqrt", "sin", "cos", "min", "max")
     generations: int = 6
     restarts: int = 1
@@ -47,6 +51,7 @@ class IdentificationOptions:
     starts: int = 4
     largest: int = 16
     most_terms: int = 450
+    gusts: bool = True
     lags: bool = True
     longest_delay: int = 2
     tuning: bool = True

@@ -10,13 +10,15 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
-from twinloop.identification.chains import Chain
+from twinloop.identification.chains import Chain, Motion
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, Stages
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
 NOISE_ROUNDS = 3
+BEST_SENSOR = 0.1
+"""Share of its readings' roughness that a sensor's standard deviation is at least."""
 RIDGE = 1e-9
 RUNG = 20.0
 """What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
@@ -76,10 +78,10 @@ class Problem:
 
     def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
         """Of one chain on terms that were found usable."""
-        stages = [np.stack([self._values[term][s] for term in terms], axis=1) for s in range(3)]
+        start, middle, end = (np.stack([self._values[term][s] for term in terms], axis=1) for s in range(3))
         states = list(chain.states)
         records = [
-            (run.states[:, states], run.weights[:, states], *(stage[rows] for stage in stages))
+            (run.states[:, states], run.weights[:, states], start[rows], middle[rows], end[rows])
             for run, rows in zip(self.runs, self.stages.runs, strict=True)
         ]
         with engine_input():
@@ -103,16 +105,24 @@ def prices(pool: Pool, terms: Sequence[int], readings: int, favoured: Mapping[in
         Prices (terms,).
     """
     lengths = [favoured.get(term, pool.length(term)) for term in terms]
-    return np.log(max(readings, 2)) + 2.0 * np.array(lengths)
+    costs: Floats = np.log(max(readings, 2)) + 2.0 * np.array(lengths)
+    return costs
 
 
-def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, float]:
-    """Variances below which noise is not believed: rounding and integration leave that much."""
-    sensors = (1e-7 * scales[list(chain.states)]) ** 2
-    return sensors, 1e-9 * float(sensors[0]) / (dt if chain.integrated else 1.0)
+def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:
+    """Variances below which noise is not believed: rounding and integration leave that much.
+
+    Disturbances could explain every reading exactly. Sensors are therefore never taken to be much better than their
+    own roughness says, which is all noise of theirs or less.
+    """
+    sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR**2 * chain.rough)
+    period = dt if chain.integrated else 1.0
+    return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / period**2, dt)
 
 
-def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], scales: Floats) -> Chain:
+def first_noise(
+    problem: Problem, chain: Chain, terms: Sequence[int], scales: Floats, gusts: bool = True
+) -> Chain:
     """The noise that a fit of all terms leaves, with the freedom that it used up given back.
 
     Args:
@@ -120,6 +130,7 @@ def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], scales: Fl
         chain: with a first guess of its sensors' noise.
         terms: usable ones.
         scales: of all states (n_x,).
+        gusts: whether disturbances may last.
 
     Returns:
         The chain with its noise estimated.
@@ -128,19 +139,24 @@ def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], scales: Fl
     low, slow = floor_of(chain, scales, problem.dt)
     period = problem.dt if chain.integrated else 1.0
     sensors = np.maximum(chain.sensors, low)
-    process = max(1e-3 * float(sensors[0]) / period, slow)
+    first = float(sensors[0])
+    motion = (
+        max(1e-3 * first / period, slow[0]),
+        1e-2 * first / period**2 if gusts else 0.0,
+        10.0 * problem.dt,
+    )
     readings = problem.readings(chain)
     for _ in range(2):
-        gram = regression.gram(sensors, process, problem.workers)
+        gram = regression.gram(sensors, motion, problem.workers)
         solved = gram.solve(list(range(len(terms))), RIDGE)
         if solved is None:
             break
-        sensors, process, _ = regression.most_likely_noise(
-            solved[0], sensors, process, smallest_sensors=low, smallest_process=slow
+        sensors, motion, _ = regression.most_likely_noise(
+            solved[0], sensors, motion, smallest_sensors=low, smallest_motion=slow
         )
         used = min(len(terms), 0.7 * readings)
-        sensors, process = sensors * readings / (readings - used), process
-    return chain.with_noise(sensors, process)
+        sensors = sensors * readings / (readings - used)
+    return chain.with_noise(sensors, motion)
 
 
 def search(
@@ -193,7 +209,7 @@ def search(
     current = list(chains)
     for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
         grams = [
-            r.gram(c.sensors, c.process, problem.workers) for r, c in zip(regressions, current, strict=True)
+            r.gram(c.sensors, c.motion, problem.workers) for r, c in zip(regressions, current, strict=True)
         ]
         with engine_input():
             walks = _core.search_subsets(
@@ -228,17 +244,18 @@ def search(
             noisy = chain
             if not fixed_noise:
                 low, slow = floor_of(chain, scales, problem.dt)
-                sensors, process, _ = regressions[i].most_likely_noise(
-                    coefficients, chain.sensors, max(chain.process, slow), low, slow
+                sensors, motion, _ = regressions[i].most_likely_noise(
+                    coefficients, chain.sensors, chain.motion, low, slow
                 )
                 readings = problem.readings(chain)
                 sensors = sensors * readings / max(1.0, readings - len(subset))
                 changed |= bool(
                     np.any(np.abs(np.log(sensors / chain.sensors)) > 0.3)
-                    or abs(np.log((process + slow) / (chain.process + slow))) > 1.0
+                    or abs(np.log((motion[0] + slow[0]) / (chain.motion[0] + slow[0]))) > 1.0
+                    or abs(np.log((motion[1] + slow[1]) / (chain.motion[1] + slow[1]))) > 1.0
                 )
-                noisy = chain.with_noise(sensors, process)
-            score = regressions[i].likelihood(coefficients, noisy.sensors, noisy.process)
+                noisy = chain.with_noise(sensors, motion)
+            score = regressions[i].likelihood(coefficients, noisy.sensors, noisy.motion)
             rung = RUNG * problem.pool.rung(usable[j] for j in subset)
             total = rung + score + float(costs[i][list(subset)].sum())
             chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}

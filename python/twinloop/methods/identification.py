@@ -124,6 +124,7 @@ class IdentifyAndPlan:
             number,
             len(book.experiments),
             self._first_quality(book),
+            self._used(book),
             exploit,
         )
         test = book.new_test(
@@ -168,9 +169,7 @@ class IdentifyAndPlan:
             reason = f"The best gains flown: the twin prefers others in {100 * better:.0f} % of its predictions only."
             test = flown.judged(float(means.mean()), measured)
         else:
-            reason = (
-                f"Tuned on the twin, which prefers them to the best flown in {100 * better:.0f} % of its predictions."
-            )
+            reason = f"Tuned on the twin, which prefers them to the best flown in {100 * better:.0f} % of its predictions."
             number = len(book.tests) if known is None else known.number
             number_measured = None if known is None or known.excitation is not None else book.measured(number)
             test = Test(
@@ -253,6 +252,17 @@ class IdentifyAndPlan:
         committee = self._committee()
         genes = book.experiments[0].test.genes[np.newaxis]
         return float(self.planner.judge(committee.members[:1], genes, committee.sds, 1).mean[0])
+
+    def _used(self, book: Logbook) -> float:
+        """Largest usage of the envelope that was flown."""
+        used = 0.0
+        for i, state in enumerate(self.setup.signals.states):
+            if state.envelope is not None:
+                low, high = state.envelope
+                for run in book.experiments:
+                    off = np.abs(run.trajectory.states[:, i] - 0.5 * (low + high)).max()
+                    used = max(used, float(off) / (0.5 * (high - low)))
+        return used
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""

@@ -235,6 +235,7 @@ class Planner:
         number: int,
         told: int,
         first_quality: float,
+        used: float,
         exploit: bool,
     ) -> Proposal:
         """The next test.
@@ -246,6 +247,7 @@ class Planner:
             number: of the test, for its stream.
             told: experiments so far.
             first_quality: of the first controller, as flown or predicted.
+            used: largest usage of the envelope that was flown so far.
             exploit: whether the tuned gains are flown as they are.
 
         Returns:
@@ -261,7 +263,11 @@ class Planner:
         self.watch("candidates", 1.0)
         per_member = judged.qualities.mean(axis=1)
         mean = per_member.mean(axis=0)
-        keeps = judged.worst_usage <= 1.0 - self.options.margin
+        # A model is believed near what was flown: each flight may go somewhat further than those before it.
+        reach = min(
+            1.0 - self.options.margin, max(self.options.reach_first, self.options.reach_growth * used)
+        )
+        keeps = judged.worst_usage <= reach
         limit = self._limit(float(mean[0]), goal, told, first_quality)
         allowed = keeps & (mean <= limit)
         if exploit and keeps[0]:
@@ -327,7 +333,7 @@ class Planner:
     def _limit(self, tuned: float, goal: str, told: int, first: float) -> float:
         """Predicted quality that a test may have at most."""
         if goal == "model":
-            return max(3.0 * first, 3.0 * tuned)
+            return max(first, 2.0 * tuned)
         share = self.options.share ** max(1, told)
         if goal == "control":
             share *= 0.1

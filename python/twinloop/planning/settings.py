@@ -23,6 +23,8 @@ class PlanningOptions:
             more, after the first flight; it is multiplied by itself with every further one.
         draws: of sensor noise under which a flight is judged.
         margin: share of the envelope that a proposal keeps free on every member of the committee.
+        reach_first: usage of the envelope that a proposal may always have.
+        reach_growth: factor by which its usage may exceed the largest one flown.
         evaluations: flights on which gains are tuned, for each member and draw.
         tuning_starts: of the tuning of gains.
         tuning_members: of the committee on which gains are tuned; 1: the best model only.
@@ -42,6 +44,8 @@ class PlanningOptions:
     share: float = 0.25
     draws: int = 6
     margin: float = 0.1
+    reach_first: float = 0.5
+    reach_growth: float = 1.25
     evaluations: int = 3000
     tuning_starts: int = 3
     tuning_members: int = 4

@@ -28,6 +28,22 @@ pub struct Noise {
     pub sensors: Vec<f64>,
     /// Of the white disturbance that drives the first state, per second (per period where features are increments).
     pub process: f64,
+    /// Of a disturbance that lasts, as gusts do, in the features' own unit squared; 0 for none.
+    pub gust: f64,
+    /// Time after which such a disturbance is forgotten to 1/e, s.
+    pub memory: f64,
+}
+
+impl Noise {
+    /// States of the filter beside those of the chain.
+    pub(crate) fn hidden(&self) -> usize {
+        usize::from(self.gust > 0.0)
+    }
+
+    /// Share of a lasting disturbance that is left after a period.
+    pub(crate) fn kept(&self, dt: f64) -> f64 {
+        libm::exp(-dt / self.memory.max(1e-3 * dt))
+    }
 }
 
 impl Chain {
@@ -51,19 +67,37 @@ impl Chain {
         out
     }
 
-    /// Moves states by a period in which nothing drives them.
+    /// Moves states by a period in which nothing drives them but the lasting disturbance behind them, if there is one,
+    /// of which a share is `kept`.
     #[inline(always)]
-    pub fn coast(&self, states: &mut [f64]) {
-        if !self.integrated {
-            return;
-        }
-        for i in (1..self.states).rev() {
-            let mut power = 1.0;
-            for m in 1..=i {
-                power *= self.dt / m as f64;
-                states[i] += power * states[i - m];
+    pub fn coast(&self, states: &mut [f64], kept: f64) {
+        let hidden = states.get(self.states).copied();
+        if self.integrated {
+            for i in (1..self.states).rev() {
+                let mut power = 1.0;
+                for m in 1..=i {
+                    power *= self.dt / m as f64;
+                    states[i] += power * states[i - m];
+                }
             }
         }
+        if let Some(gust) = hidden {
+            for (state, reach) in states[..self.states].iter_mut().zip(self.reach()) {
+                *state += reach * gust;
+            }
+            states[self.states] = kept * gust;
+        }
+    }
+
+    /// How far each state is moved in a period by a disturbance of 1 that is held.
+    pub(crate) fn reach(&self) -> [f64; LONGEST] {
+        let mut reach = [0.0; LONGEST];
+        let mut power = 1.0;
+        for (i, reach) in reach.iter_mut().enumerate() {
+            power *= self.dt / (i + 1) as f64;
+            *reach = if self.integrated { power } else { f64::from(u8::from(i == 0)) };
+        }
+        reach
     }
 
     /// Covariance that a period of the disturbance adds (states × states).
@@ -90,7 +124,11 @@ impl Chain {
 #[derive(Clone, Debug)]
 pub(crate) struct Whitening {
     states: usize,
-    /// K of each reading (states × states).
+    /// States of the filter: those of the chain, and the lasting disturbance.
+    pub inner: usize,
+    /// Share of the lasting disturbance that is left after a period.
+    pub kept: f64,
+    /// K of each reading (inner × states).
     gains: Vec<f64>,
     /// L⁻¹ of each reading with L Lᵀ the covariance of its innovation (states × states).
     roots: Vec<f64>,
@@ -107,89 +145,112 @@ impl Whitening {
     /// For a record of which each reading has a weight: 1, or 0 to ignore it. `spread` is the sd of each first state.
     pub fn new(chain: &Chain, noise: &Noise, weights: &[f64], spread: &[f64]) -> Self {
         let d = chain.states;
-        let readings = weights.len() / d;
+        let inner = d + noise.hidden();
+        let kept = noise.kept(chain.dt);
         let disturbance = chain.disturbance(noise.process);
-        let mut covariance = vec![0.0; d * d];
+        let mut covariance = vec![0.0; inner * inner];
         for i in 0..d {
-            covariance[i * d + i] = spread[i] * spread[i];
+            covariance[i * inner + i] = spread[i] * spread[i];
+        }
+        for i in d..inner {
+            covariance[i * inner + i] = noise.gust;
         }
         let mut whitening = Self {
             states: d,
-            gains: Vec::with_capacity(readings * d * d),
-            roots: Vec::with_capacity(readings * d * d),
+            inner,
+            kept,
+            gains: vec![],
+            roots: vec![],
             log_determinant: 0.0,
             readings: weights.iter().filter(|&&w| w > 0.0).count(),
         };
-        for k in 0..readings {
-            let mut innovation = covariance.clone();
-            for i in 0..d {
-                let ignored = if weights[k * d + i] > 0.0 { 1.0 } else { IGNORED };
-                innovation[i * d + i] += noise.sensors[i] * ignored;
-            }
-            let factor = Cholesky::new(&innovation, d, 0.0).unwrap_or_else(|| {
-                let diagonal: Vec<f64> = (0..d * d)
-                    .map(|ij| if ij / d == ij % d { innovation[ij].abs() + f64::MIN_POSITIVE } else { 0.0 })
-                    .collect();
-                Cholesky::new(&diagonal, d, 0.0).expect("a positive diagonal")
-            });
-            let inverse = factor.inverse();
-            let mut gain = vec![0.0; d * d];
-            for i in 0..d {
-                for j in 0..d {
-                    gain[i * d + j] = (0..d).map(|l| covariance[i * d + l] * inverse[l * d + j]).sum();
-                }
-            }
-            let mut root = vec![0.0; d * d];
-            let mut unit = vec![0.0; d];
-            for j in 0..d {
-                unit.fill(0.0);
-                unit[j] = 1.0;
-                for (i, value) in factor.forward(&unit).into_iter().enumerate() {
-                    // A reading that is ignored adds nothing to the sum of squares.
-                    root[i * d + j] = if weights[k * d + i] > 0.0 { value } else { 0.0 };
-                }
-                if weights[k * d + j] > 0.0 {
-                    let mut pivot = factor.forward(&unit)[j];
-                    pivot = -2.0 * libm::log(pivot);
-                    whitening.log_determinant += pivot;
-                }
-            }
-            // P ← Φ (P − K P) Φᵀ + Q, kept symmetric.
-            let mut posterior = covariance.clone();
-            for i in 0..d {
-                for j in 0..d {
-                    posterior[i * d + j] -=
-                        (0..d).map(|l| gain[i * d + l] * covariance[l * d + j]).sum::<f64>();
-                }
-            }
+        for weights in weights.chunks_exact(d) {
+            let gain = whitening.update(&covariance, &noise.sensors, weights);
+            let mut next = after(&covariance, &gain, inner, d);
             for _ in 0..2 {
                 // Φ on the columns, then, transposed, on the rows.
-                for j in 0..d {
-                    let mut column: Vec<f64> = (0..d).map(|i| posterior[i * d + j]).collect();
-                    chain.coast(&mut column);
-                    (0..d).for_each(|i| posterior[i * d + j] = column[i]);
+                for j in 0..inner {
+                    let mut column: Vec<f64> = (0..inner).map(|i| next[i * inner + j]).collect();
+                    chain.coast(&mut column, kept);
+                    (0..inner).for_each(|i| next[i * inner + j] = column[i]);
                 }
-                posterior = (0..d * d).map(|ij| posterior[(ij % d) * d + ij / d]).collect();
+                next = (0..inner * inner).map(|ij| next[(ij % inner) * inner + ij / inner]).collect();
             }
-            for i in 0..d {
-                for j in 0..d {
-                    let symmetric = 0.5 * (posterior[i * d + j] + posterior[j * d + i]);
-                    covariance[i * d + j] = symmetric + disturbance[i * d + j];
+            for i in 0..inner {
+                for j in 0..inner {
+                    covariance[i * inner + j] = 0.5 * (next[i * inner + j] + next[j * inner + i]);
+                    if i < d && j < d {
+                        covariance[i * inner + j] += disturbance[i * d + j];
+                    }
                 }
+            }
+            for i in d..inner {
+                covariance[i * inner + i] += noise.gust * (1.0 - kept * kept);
             }
             whitening.gains.extend(gain);
-            whitening.roots.extend(root);
         }
         whitening
     }
 
-    /// Gain of a reading (states × states).
+    /// Takes in a reading: keeps its whitening matrix, and returns its gain.
+    fn update(&mut self, covariance: &[f64], sensors: &[f64], weights: &[f64]) -> Vec<f64> {
+        let (d, inner) = (self.states, self.inner);
+        let mut innovation = vec![0.0; d * d];
+        for i in 0..d {
+            for j in 0..d {
+                innovation[i * d + j] = covariance[i * inner + j];
+            }
+            innovation[i * d + i] += sensors[i] * if weights[i] > 0.0 { 1.0 } else { IGNORED };
+        }
+        let factor = Cholesky::new(&innovation, d, 0.0).unwrap_or_else(|| {
+            let diagonal: Vec<f64> = (0..d * d)
+                .map(|ij| if ij / d == ij % d { innovation[ij].abs() + f64::MIN_POSITIVE } else { 0.0 })
+                .collect();
+            Cholesky::new(&diagonal, d, 0.0).expect("a positive diagonal")
+        });
+        let inverse = factor.inverse();
+        let mut gain = vec![0.0; inner * d];
+        for i in 0..inner {
+            for j in 0..d {
+                gain[i * d + j] = (0..d).map(|l| covariance[i * inner + l] * inverse[l * d + j]).sum();
+            }
+        }
+        let mut root = vec![0.0; d * d];
+        let mut unit = vec![0.0; d];
+        for j in 0..d {
+            unit.fill(0.0);
+            unit[j] = 1.0;
+            for (i, value) in factor.forward(&unit).into_iter().enumerate() {
+                // A reading that is ignored adds nothing to the sum of squares.
+                root[i * d + j] = if weights[i] > 0.0 { value } else { 0.0 };
+            }
+            if weights[j] > 0.0 {
+                self.log_determinant -= 2.0 * libm::log(root[j * d + j]);
+            }
+        }
+        self.roots.extend(root);
+        gain
+    }
+
+    /// Gain of a reading (inner × states).
     pub fn gain(&self, k: usize) -> &[f64] {
-        &self.gains[k * self.states * self.states..][..self.states * self.states]
+        &self.gains[k * self.inner * self.states..][..self.inner * self.states]
     }
 
     /// Whitening matrix of a reading (states × states, lower triangular).
     pub fn root(&self, k: usize) -> &[f64] {
         &self.roots[k * self.states * self.states..][..self.states * self.states]
     }
+}
+
+/// P − K P of a reading: what is not known yet once it is used (inner × inner).
+fn after(covariance: &[f64], gain: &[f64], inner: usize, d: usize) -> Vec<f64> {
+    let mut posterior = covariance.to_vec();
+    for i in 0..inner {
+        for j in 0..inner {
+            posterior[i * inner + j] -=
+                (0..d).map(|l| gain[i * d + l] * covariance[l * inner + j]).sum::<f64>();
+        }
+    }
+    posterior
 }

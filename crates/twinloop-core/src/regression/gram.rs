@@ -51,7 +51,7 @@ impl Record {
         let mut residual = self.measured.clone();
         let mut state = vec![0.0; d];
         for k in 0..self.steps(chain) {
-            chain.coast(&mut state);
+            chain.coast(&mut state, 1.0);
             for (i, state) in state.iter_mut().enumerate() {
                 for (j, c) in coefficients.iter().enumerate() {
                     *state += c * self.increments[(k * p + j) * d + i];
@@ -108,17 +108,17 @@ impl Gram {
         let width = p + 1;
         let whitening = Whitening::new(chain, noise, &record.weights, &record.spread(chain));
         let mut products = vec![0.0; width * width];
+        let inner = whitening.inner;
         // What the filter has not explained yet, column after column; that of the readings is their prediction.
-        let mut state = vec![0.0; d * width];
+        let mut state = vec![0.0; inner * width];
         let mut rows: Vec<f64> = Vec::with_capacity(BLOCK * width);
         let steps = record.steps(chain);
-        let mut moved = [0.0; LONGEST];
         for k in 0..=steps {
             let (gain, root) = (whitening.gain(k), whitening.root(k));
             let first = rows.len();
             rows.resize(first + d * width, 0.0);
             for j in 0..width {
-                let column = &mut state[j * d..][..d];
+                let column = &mut state[j * inner..][..inner];
                 // A feature's own response, or the readings less their prediction.
                 let mut innovation = [0.0; LONGEST];
                 for i in 0..d {
@@ -126,17 +126,12 @@ impl Gram {
                 }
                 let sign = if j < p { -1.0 } else { 1.0 };
                 for i in 0..d {
-                    let mut white = 0.0;
-                    let mut step = 0.0;
-                    for l in 0..d {
-                        white += root[i * d + l] * innovation[l];
-                        step += gain[i * d + l] * innovation[l];
-                    }
-                    rows[first + i * width + j] = white;
-                    moved[i] = column[i] + sign * step;
+                    rows[first + i * width + j] = (0..d).map(|l| root[i * d + l] * innovation[l]).sum();
                 }
-                chain.coast(&mut moved[..d]);
-                column.copy_from_slice(&moved[..d]);
+                for i in 0..inner {
+                    column[i] += sign * (0..d).map(|l| gain[i * d + l] * innovation[l]).sum::<f64>();
+                }
+                chain.coast(column, whitening.kept);
                 if j < p && k < steps {
                     let increments = &record.increments[(k * p + j) * d..][..d];
                     column.iter_mut().zip(increments).for_each(|(a, b)| *a += b);

@@ -10,7 +10,7 @@ pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noi
     for (record, residual) in records.iter().zip(residuals) {
         let whitening = Whitening::new(chain, noise, &record.weights, &record.spread(chain));
         total += whitening.log_determinant;
-        let mut state = vec![0.0; d];
+        let mut state = vec![0.0; whitening.inner];
         for k in 0..residual.len() / d {
             let (gain, root) = (whitening.gain(k), whitening.root(k));
             let mut innovation = [0.0; LONGEST];
@@ -20,9 +20,11 @@ pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noi
             for i in 0..d {
                 let white: f64 = (0..d).map(|l| root[i * d + l] * innovation[l]).sum();
                 total += white * white;
-                state[i] += (0..d).map(|l| gain[i * d + l] * innovation[l]).sum::<f64>();
             }
-            chain.coast(&mut state);
+            for (i, state) in state.iter_mut().enumerate() {
+                *state += (0..d).map(|l| gain[i * d + l] * innovation[l]).sum::<f64>();
+            }
+            chain.coast(&mut state, whitening.kept);
         }
     }
     total
@@ -46,13 +48,19 @@ pub fn most_likely_noise(
     for step in STEPS {
         for _ in 0..8 {
             let mut moved = false;
-            for which in (if fixed_sensors { d } else { 0 })..=d {
+            // Sensors, process, and where there are any the size and the memory of gusts.
+            for which in (if fixed_sensors { d } else { 0 })..=d + 2 * best.hidden() {
                 for factor in [step, 1.0 / step] {
                     let mut tried = best.clone();
                     if which < d {
                         tried.sensors[which] = (tried.sensors[which] * factor).max(smallest.sensors[which]);
-                    } else {
+                    } else if which == d {
                         tried.process = (tried.process * factor).max(smallest.process);
+                    } else if which == d + 1 {
+                        tried.gust = (tried.gust * factor).max(smallest.gust);
+                    } else {
+                        // Shorter than a few periods it is white, longer than this it is a constant.
+                        tried.memory = (tried.memory * factor).clamp(3.0 * chain.dt, 300.0 * chain.dt);
                     }
                     if tried == best {
                         continue;
