@@ -20,10 +20,10 @@ from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
 from twinloop.presets import PRESETS, DefaultOptions, options_of, parsed
 from twinloop.reproduce.command import reproduce
-from twinloop.result import Result, summary, to_json
+from twinloop.result import Result, quality_unit, summary, to_json
 from twinloop.run_info import Stopwatch
 from twinloop.systems import BUILT_IN, Quadrotor
-from twinloop.text import render
+from twinloop.text import quality_words, render
 
 Answer = TypeVar("Answer")
 
@@ -201,7 +201,8 @@ def _described(name: str, rig: Quadrotor) -> dict[str, object]:
 def _draw(campaign: Campaign, path: Path) -> None:
     from twinloop.plots import campaign_picture  # only who draws pays for matplotlib
 
-    campaign_picture(campaign, path)
+    measure = campaign.setup.quality
+    campaign_picture(campaign, path, quality_words(measure.kind, quality_unit(measure)))
 
 
 def _change(preset: str, text: str) -> tuple[str, object]:

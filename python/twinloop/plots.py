@@ -14,8 +14,6 @@ from twinloop.campaign import Campaign
 from twinloop.errors import NotAvailable
 from twinloop.objectives import normalised_error
 from twinloop.presets import DefaultOptions
-from twinloop.result import quality_unit
-from twinloop.text import QUALITIES
 
 SUFFIXES = (".svg", ".png")
 INK, FAINT, TWIN, TARGET = "#22272e", "#c9ced6", "#d1495b", "#6b7280"
@@ -54,7 +52,7 @@ def require() -> Any:
         ) from missing
 
 
-def campaign_picture(campaign: Campaign, path: Path) -> None:
+def campaign_picture(campaign: Campaign, path: Path, quality: str = "quality") -> None:
     """Every state of every test, flown and predicted, above the errors by experiment.
 
     Where a committee stands behind the twin, its 90 % band is drawn too, and the predicted beside the flown quality.
@@ -62,6 +60,7 @@ def campaign_picture(campaign: Campaign, path: Path) -> None:
     Args:
         campaign: with at least one experiment told.
         path: where to write; its suffix is .svg or .png.
+        quality: what is minimised, with its unit, for a person.
 
     Raises:
         NotAvailable: matplotlib is missing, or nothing was told.
@@ -76,7 +75,7 @@ def campaign_picture(campaign: Campaign, path: Path) -> None:
         if identified:
             left, right = below.subplots(1, 2)
             _errors_by_experiment(left, campaign)
-            _qualities(right, campaign)
+            _qualities(right, campaign, quality)
         else:
             axes = below.subplots(1, 1)
             _error_lines(axes, _normalised(campaign), "normalised closed-loop error")
@@ -101,7 +100,10 @@ def _normalised(campaign: Campaign) -> dict[int, list[tuple[float, float]]]:
 
 def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
     _error_lines(axes, _normalised(campaign), "normalised error of whole flights")
-    learnt = {record.tests[-1]: float(record.iteration) for record in reversed(campaign.history)}
+    learnt: dict[int, float] = {}
+    for record in campaign.history:
+        for test in record.tests:
+            learnt.setdefault(test, float(record.iteration))
     label = "before it was learnt"
     for i, run in enumerate(campaign.experiments):
         if run.before is None or not run.before > 0.0 or run.test.number not in learnt:
@@ -118,7 +120,7 @@ def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
     axes.margins(0.08, 0.15)
 
 
-def _qualities(axes: Any, campaign: Campaign) -> None:
+def _qualities(axes: Any, campaign: Campaign, label: str) -> None:
     flown = [(run.test.number, run.quality) for run in campaign.experiments if run.quality is not None]
     foretold = [
         (run.test.number, run.test.predicted, run.test.spread or 0.0)
@@ -140,9 +142,8 @@ def _qualities(axes: Any, campaign: Campaign) -> None:
         axes.axhline(
             best.predicted, color=TWIN, linewidth=0.8, linestyle=":", label="controller to fly, predicted"
         )
-    unit = quality_unit(campaign.setup.quality)
     axes.set_xlabel("test")
-    axes.set_ylabel(QUALITIES[campaign.setup.quality.kind] + (f" ({unit})" if unit else ""))
+    axes.set_ylabel(label)
     axes.set_ylim(bottom=0.0)
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.margins(x=0.1)

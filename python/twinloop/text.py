@@ -232,8 +232,9 @@ def _flights(result: Mapping[str, Any]) -> str:
         + (f" It was cut: {run['reason']}." if run["reason"] else "")
         for run in result["experiments"]
     ]
-    title = f"FLIGHTS: {QUALITIES[result['quality']['kind']].upper()}{_in_unit(result)}, LESS IS BETTER"
-    note = "Risk: probability that the flight leaves the envelope, by the committee."
+    measure = result["quality"]
+    title = f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; less is better."
+    note = "Spread: standard deviation over the committee. Risk: probability that the flight leaves the envelope."
     return "\n".join([title, table(head, rows), note, *reasons])
 
 
@@ -292,9 +293,17 @@ def _with_unit(value: float, unit: str) -> str:
     return f"{value:.2g} {unit}".rstrip()
 
 
-def _in_unit(result: Mapping[str, Any]) -> str:
-    unit = result["quality"]["unit"]
-    return f" ({unit})" if unit else ""
+def quality_words(kind: str, unit: str) -> str:
+    """What is minimised, for a person.
+
+    Args:
+        kind: "iae", "ise" or "final_distance".
+        unit: of it; "" where it has none.
+
+    Returns:
+        Such as "integrated absolute error (rad s)".
+    """
+    return QUALITIES[kind] + (f" ({unit})" if unit else "")
 
 
 def _squares(result: Mapping[str, Any]) -> str:
