@@ -29,7 +29,7 @@ help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{ printf "%-12s  %s\n", $$1, $$2 }'
 
 demo: $(VENV)/.installed-plot $(NATIVE) ## identify the built-in quadrotor from four flights; writes demo.svg
-	$(BIN)/twinloop run quadrotor --experiments 4 --generations 1000 --seed 0 --plot demo.svg
+	$(BIN)/twinloop run quadrotor --experiments 4 --noise 0.001 --seed 0 --plot demo.svg
 
 test: $(VENV)/.installed-test $(NATIVE) ## all tests, and the benchmarks in smoke mode
 	cargo test --package twinloop-core

@@ -14,10 +14,12 @@ from twinloop.campaign import Campaign
 from twinloop.errors import NotAvailable
 from twinloop.objectives import normalised_error
 from twinloop.presets import DefaultOptions
+from twinloop.trajectory import Trajectory
 
 SUFFIXES = (".svg", ".png")
 INK, FAINT, TWIN, TARGET = "#22272e", "#c9ced6", "#d1495b", "#6b7280"
 CYCLE = ("#22577a", "#d1495b", "#2a9d8f", "#e09f3e", "#7b4b94", "#6b7280", "#8ab17d", "#b5651d")
+BAND: dict[str, Any] = {"color": TWIN, "alpha": 0.22, "linewidth": 0.0}
 STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.size": 9.0,
@@ -67,8 +69,8 @@ def campaign_picture(campaign: Campaign, path: Path, quality: str = "quality") -
         OSError: the file cannot be written.
     """
     with require().rc_context(STYLE):
-        columns, rows = len(campaign.experiments), campaign.signals.n_x
         identified = isinstance(campaign.options, DefaultOptions)
+        columns, rows = len(campaign.experiments), campaign.signals.n_x + identified
         figure = _figure(max(8.4 if identified else 6.4, 1.2 + 2.2 * columns), 1.15 * rows + 3.6)
         above, below = figure.subfigures(2, 1, height_ratios=[1.15 * rows + 0.6, 3.0])
         _runs(above, campaign)
@@ -110,7 +112,7 @@ def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
             continue
         axes.plot(
             learnt[run.test.number] - 1.0, normalised_error(run.before, run.frozen),
-            color=CYCLE[i % len(CYCLE)], marker="o", markersize=5.0, markerfacecolor="white", linestyle="none",
+            color=CYCLE[i % len(CYCLE)], marker="o", markersize=6.0, markerfacecolor="none", linestyle="none",
             label=label,
         )  # fmt: skip
         label = "_again"
@@ -182,7 +184,9 @@ def _save(figure: Any, path: Path) -> None:
 
 def _runs(figure: Any, campaign: Campaign) -> None:
     states, runs, twin = campaign.signals.states, campaign.experiments, campaign.twin
-    grid = figure.subplots(len(states), len(runs), sharex=True, sharey="row", squeeze=False)
+    banded = twin.noise is not None
+    rows = len(states) + banded
+    grid = figure.subplots(rows, len(runs), sharex=True, sharey="row", squeeze=False)
     best = campaign.best_test.number
     for column, run in enumerate(runs):
         predicted = twin.simulate(run.test)
@@ -196,19 +200,22 @@ def _runs(figure: Any, campaign: Campaign) -> None:
             axes.axhline(target, color=TARGET, linewidth=0.8, linestyle=":", label="target")
             if predicted.band is not None:
                 low, high = factor * predicted.band[:, :, row]
-                axes.fill_between(
-                    predicted.t,
-                    low,
-                    high,
-                    color=TWIN,
-                    alpha=0.25,
-                    linewidth=0.0,
-                    label="90 % band of the twin",
-                )
-            axes.plot(run.trajectory.t - start, flown, color=INK, linewidth=1.6, label="system")
-            axes.plot(predicted.t, factor * predicted.states[:, row], color=TWIN, linewidth=1.2, label="twin")
+                axes.fill_between(predicted.t, low, high, label="90 % band of the twin", **BAND)
+            axes.plot(
+                run.trajectory.t - start, flown, color=INK, linewidth=2.4 if banded else 1.6, label="system"
+            )
+            axes.plot(
+                predicted.t,
+                factor * predicted.states[:, row],
+                color=TWIN,
+                linewidth=1.1,
+                linestyle=(0, (4, 2)) if banded else "-",
+                label="twin",
+            )
             if column == 0:
                 axes.set_ylabel(f"{state.name.replace('_', ' ')}\n({unit})")
+        if banded:
+            _inside_the_band(grid[-1, column], run.trajectory, predicted, first=column == 0)
         grid[-1, column].set_xlabel("time (s)")
     for row, state in enumerate(states):
         low, high = _extent([shown_unit(state.unit)[0] * run.trajectory.states[:, row] for run in runs])
@@ -216,6 +223,21 @@ def _runs(figure: Any, campaign: Campaign) -> None:
     figure.align_ylabels(grid[:, 0])
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
+
+
+def _inside_the_band(axes: Any, flown: Trajectory, predicted: Trajectory, first: bool) -> None:
+    """Every state's distance to the middle of the band, in half-widths: 1 is its edge."""
+    assert predicted.band is not None
+    rows = min(len(flown.states), len(predicted.states))
+    low, high = predicted.band[0, :rows], predicted.band[1, :rows]
+    places = (flown.states[:rows] - 0.5 * (low + high)) / np.maximum(0.5 * (high - low), 1e-300)
+    inside = float((np.abs(places[1:]) <= 1.0).mean()) if rows > 1 else 1.0
+    axes.fill_between(predicted.t[:rows], -1.0, 1.0, **BAND)
+    axes.plot(predicted.t[:rows], places, color=INK, linewidth=0.5, alpha=0.8)
+    axes.set_title(f"{100.0 * inside:.0f} % of the readings inside the band", loc="left", fontsize=8.0)
+    axes.set_ylim(-3.5, 3.5)
+    if first:
+        axes.set_ylabel("all states,\nin the band")
 
 
 def _extent(curves: Sequence[Any]) -> tuple[float, float]:

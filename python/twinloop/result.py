@@ -165,6 +165,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
             {"name": command.name, "lag": lag, "delay": delay}
             for command, lag, delay in zip(campaign.signals.commands, lesson.lags, lesson.delays, strict=True)
         ],
+        "disturbances": _disturbances(campaign, twin),
         "remarks": list(lesson.remarks),
     }
     result["controller"] |= {
@@ -175,6 +176,23 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
     }
     result["first_controller"]["predicted"] = _simulated_quality(campaign, twin, first)
     result["advice"] = _advice(campaign, twin, best)
+
+
+def _disturbances(campaign: Campaign, twin: Twin) -> list[dict[str, object]]:
+    """What moves the states beside the commands: white, and lasting with a memory; those that are felt at all."""
+    if twin.noise is None:
+        return []
+    lasting = {states[0]: (size, memory) for states, _, size, memory in twin.noise.gusts}
+    found: list[dict[str, object]] = []
+    for i, (state, white) in enumerate(zip(campaign.signals.states, twin.noise.moves.tolist(), strict=True)):
+        size, memory = lasting.get(i, (0.0, 0.0))
+        # Over the memory, or a period: what is far below the sensor's noise cannot be told from nothing.
+        felt = max(white, size * max(memory, campaign.signals.dt))
+        if felt > 0.01 * float(twin.noise.sensors[i]):
+            found.append(
+                {"name": state.name, "unit": state.unit, "white": white, "lasting": size, "memory": memory}
+            )
+    return found
 
 
 def _errors_by_state(campaign: Campaign, twin: Twin) -> list[float]:

@@ -180,12 +180,27 @@ def _states(result: Mapping[str, Any]) -> str:
         table(head, rows),
         "Errors: root mean square of flown minus simulated, over whole flights from their first reading. Noise:"
         " standard\ndeviation, as estimated. A ratio of 1 is a twin that leaves the sensors' noise alone.",
+        _disturbances(twin["disturbances"]),
         _actuators(twin["actuators"]),
         f"{twin['terms']} terms, {twin['committee']} models in the committee; χ² a reading {cell(twin['misfit'])}"
-        f" (1: only noise is left) over {twin['readings']} readings, {twin['ignored']} ignored.",
+        f" (1: noise and disturbances explain what is left)\nover {twin['readings']} readings,"
+        f" {twin['ignored']} ignored.",
         *twin["remarks"],
     ]
     return "\n".join(lines)
+
+
+def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
+    if not disturbances:
+        return "Disturbances: none were found beside the sensors' noise."
+    words = []
+    for found in disturbances:
+        name, unit = found["name"], found["unit"] or "1"
+        parts = [f"{found['white']:.2g} {unit} a period"] if found["white"] else []
+        if found["lasting"]:
+            parts.append(f"{found['lasting']:.2g} ({unit})/s that lasts {found['memory']:.2g} s")
+        words.append(f"{name} {' and '.join(parts)}")
+    return f"Disturbances (standard deviations): {'; '.join(words)}."
 
 
 def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
@@ -259,13 +274,16 @@ def _controller_to_fly(result: Mapping[str, Any]) -> str:
         ["this controller", best["predicted"], best["spread"], best["measured"]],
         ["first controller", first["predicted"], None, first["measured"]],
     ]
+    excited = (
+        " The first controller was excited when it was flown." if result["experiments"][0]["excited"] else ""
+    )
     return "\n".join(
         [
             f"CONTROLLER TO FLY: {state}",
             table(["gain", "value", "first", "unit", "bounds"], gains),
             "",
             table(["quality", "predicted", "± spread", "measured"], qualities),
-            f"{best['why']} Risk {cell(best['risk'])}.",
+            f"{best['why']} Risk {cell(best['risk'])}.{excited}",
         ]
     )
 
