@@ -112,6 +112,7 @@ class Twin:
         members: of the committee, for the band of a simulated run; none: no band.
         noise: of sensors and disturbances, for the band.
         seed: of the band's random numbers.
+        inflation: factor on the spread of the members, where they were found to be too sure.
     """
 
     def __init__(
@@ -123,7 +124,9 @@ class Twin:
         members: Sequence[_core.Model] = (),
         noise: Noise | None = None,
         seed: int = 0,
+        inflation: float = 1.0,
     ) -> None:
+        self.inflation = inflation
         self.members = tuple(members)
         self.noise = noise
         self.seed = seed
@@ -160,13 +163,25 @@ class Twin:
         """
         check_signals(test, self.signals)
         run = fly(self.model, test, divergence_factor=self.divergence_factor)
-        if not self.members or self.noise is None:
+        spread = self.spread(test)
+        if spread is None or self.noise is None:
             return run
-        return dataclasses.replace(run, band=self._band(test, run))
+        mean, variance = (values[: len(run.states)] for values in spread)
+        half = NINE_OF_TEN * np.sqrt(self.inflation**2 * variance + self.noise.sensors**2)
+        return dataclasses.replace(run, band=np.stack([mean - half, mean + half]))
 
-    def _band(self, test: Test, run: Trajectory) -> Floats:
-        """Between these nine of ten readings are expected: members, disturbances and sensors drawn together."""
-        assert self.noise is not None
+    def spread(self, test: Test) -> tuple[Floats, Floats] | None:
+        """What members and disturbances, drawn together, make of a test.
+
+        Args:
+            test: any test for the same signals.
+
+        Returns:
+            Mean and variance of the true states (n + 1, n_x) over the runs that last; None where no committee stands
+            behind the twin.
+        """
+        if not self.members or self.noise is None:
+            return None
         stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 80])))
         shape = (DRAWS, test.steps + 1, self.signals.n_x)
         noise = self.noise.sensors * stream.standard_normal(shape)
@@ -187,13 +202,12 @@ class Twin:
                     divergence_factor=self.divergence_factor,
                 )
             runs.append(drawn.states)
-        states = np.concatenate(runs)[:, : len(run.states)]
+        states = np.concatenate(runs)
         lasted = np.isfinite(states)
         count = np.maximum(1, lasted.sum(axis=0))
         mean = np.where(lasted, states, 0.0).sum(axis=0) / count
         variance = np.where(lasted, (states - mean) ** 2, 0.0).sum(axis=0) / count
-        half = NINE_OF_TEN * np.sqrt(variance + self.noise.sensors**2)
-        return np.stack([mean - half, mean + half])
+        return mean, variance
 
     def predict(self, states: ArrayLike, commands: ArrayLike) -> Floats:
         """One step.

@@ -24,10 +24,14 @@ from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, stages
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Problem, Sum, first_noise, search
+from twinloop.identification.structure import Problem, Sum, Weights, first_noise, search
 from twinloop.models import Noise
 from twinloop.signals import Signals
 
+PRUNINGS = 3
+"""How often terms that tuning has shown to be nothing are dropped."""
+TWINS = 4.0
+"""Description length within which two laws are equally good."""
 OUTLIER = 6.0
 """Whitened prediction errors beyond this many standard deviations are no noise."""
 
@@ -145,6 +149,18 @@ def identify_runs(
     return learner.learn()
 
 
+@dataclass(frozen=True, eq=False)
+class _Tuned:
+    """A model with its sums, its noise, what it leaves, and the covariance of its constants."""
+
+    model: _core.Model
+    sums: list[Sum]
+    observer: list[Chain]
+    left: float
+    readings: int
+    covariance: Floats
+
+
 class _Learner:
     """One identification; its steps share the runs, the pool and the noise."""
 
@@ -208,19 +224,21 @@ class _Learner:
             problem = self._problem(actuators)
         self.watch("terms")
         sums = self._climb(problem, driven, known, base)
-        model, observer, left, readings = self._tuned(sums, given, actuators, options.tuning_steps)
+        tuned = self._tuned(sums, given, actuators)
         for _ in range(options.passes - 1):
-            smoothed = self._smoothed(model, observer)
-            if not smoothed:
+            if not self._smoothed(tuned.model, tuned.observer):
                 break
             self.watch("smoothed")
-            problem = self._problem(self._lags_of(model))
-            again = self._climb(problem, [s.chain for s in sums], list(sums), base, brief=True)
-            other = self._tuned(again, given, self._lags_of(model), options.tuning_steps)
-            if not np.isfinite(other[2]) and np.isfinite(left):
+            lags = self._lags_of(tuned.model)
+            problem = self._problem(lags)
+            known = list(tuned.sums)
+            again = self._climb(problem, [s.chain for s in tuned.sums], known, base, brief=True)
+            other = self._tuned(again, given, lags)
+            if not np.isfinite(other.left) and np.isfinite(tuned.left):
                 break
-            sums, (model, observer, left, readings) = again, other
-        observer = self._rescaled(observer, left, readings)
+            tuned = other
+        model, sums, left, readings = tuned.model, tuned.sums, tuned.left, tuned.readings
+        observer = self._rescaled(tuned.observer, left, readings)
         self.watch("committee")
         members = self._committee(problem, sums, observer, given, model)
         ignored = int(sum((run.weights == 0.0).sum() for run in self.runs))
@@ -301,18 +319,61 @@ class _Learner:
         )
         return actuators, list(sums)
 
-    def _tuned(
-        self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator], steps: int
-    ) -> tuple[_core.Model, list[Chain], float, int]:
-        """The model of the sums with its constants tuned; where it diverges on the runs, as it is."""
+    def _tuned(self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator]) -> _Tuned:
+        """The model of the sums with its constants tuned, and without terms that tuning has shown to be nothing."""
+        tuned = self._fitted(sums, given, actuators)
+        if not np.isfinite(tuned.left) or not self.options.tuning:
+            return tuned
+        errors = self._predictions(tuned.model, tuned.observer)
+        if errors is not None and self._ignore_outliers([e for e, _ in errors]):
+            tuned = self._fitted(tuned.sums, given, self._lags_of(tuned.model))
+        for _ in range(PRUNINGS if self.form != "absolute" else 0):
+            kept, saved = self._without_weak(tuned)
+            if saved == 0.0:
+                break
+            other = self._fitted(kept, given, self._lags_of(tuned.model))
+            if not other.left - tuned.left < saved:
+                break
+            tuned = other
+        return tuned
+
+    def _fitted(self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator]) -> _Tuned:
         observer = [*(found.chain for found in sums), *given]
         model = self._model(sums, actuators)
-        tuned, left, readings, _, _ = self._tune(model, observer, steps, 0)
-        if np.isfinite(left):
-            errors = self._predictions(tuned, observer)
-            if errors is not None and self._ignore_outliers([e for e, _ in errors]):
-                tuned, left, readings, _, _ = self._tune(tuned, observer, steps, 0)
-        return tuned, observer, left, readings
+        tuned, left, readings, covariance, _ = self._tune(model, observer, self.options.tuning_steps, 0)
+        constants = tuned.constants
+        written = list(sums)
+        if np.isfinite(left) and self.form != "absolute":
+            place = self._first_weight(sums)
+            for i, found in enumerate(sums):
+                values = constants[place : place + len(found.weights)].tolist()
+                written[i] = replace(found, weights=dict(zip(found.weights, values, strict=True)))
+                place += len(found.weights)
+        return _Tuned(tuned, written, observer, left, readings, covariance)
+
+    def _first_weight(self, sums: Sequence[Sum]) -> int:
+        """Where the weights begin among a program's constants: those inside nodes come before them."""
+        nodes = self.pool.needed(term for found in sums for term in found.weights if term != self.pool.one)
+        inner = [node for node in map(self.pool.node, nodes) if node is not None]
+        return sum(isinstance(node[2], float) for node in inner)
+
+    def _without_weak(self, tuned: _Tuned) -> tuple[list[Sum], float]:
+        """The sums without terms whose uncertain weights do not pay for them, and what those cost."""
+        place, saved = self._first_weight(tuned.sums), 0.0
+        variances = np.diag(tuned.covariance)
+        kept = []
+        for found in tuned.sums:
+            price = np.log(max(2, sum(int(run.weights[:, found.chain.states[0]].sum()) for run in self.runs)))
+            weights: Weights = {}
+            for term, weight in found.weights.items():
+                cost = price + 2.0 * self.pool.length(term)
+                if weight * weight >= cost * variances[place] or len(found.weights) == 1:
+                    weights[term] = weight
+                else:
+                    saved += cost
+                place += 1
+            kept.append(replace(found, weights=weights or dict(found.weights)))
+        return kept, float(saved)
 
     def _model(self, sums: Sequence[Sum], actuators: Sequence[Actuator]) -> _core.Model:
         outputs = [dict(found.weights) for found in sums]
@@ -451,6 +512,21 @@ class _Learner:
         pick = int(np.searchsorted(np.cumsum(chances) / chances.sum(), stream.random()))
         return None if pick == 0 else found.others[min(pick, len(found.others)) - 1][0]
 
+    def _identities(self, found: Sum) -> list[str]:
+        """The nearest other law that the runs cannot tell from this one: an identity that held on them, if there is any."""
+        symbols = [*self.signals.state_names, *self.signals.command_names]
+        driven = self.signals.state_names[found.chain.states[0]]
+        ours = set(found.weights)
+        for subset, above in found.others:
+            out, into = ours - set(subset), set(subset) - ours
+            if above < TWINS and out and into and len(out) + len(into) <= 6:
+                gone, come = (
+                    ", ".join(sorted(self.pool.text(node, symbols) for node in terms))
+                    for terms in (out, into)
+                )
+                return [f"On these runs {driven} is described as well with {come} in place of {gone}."]
+        return []
+
     def _remarks(self, left: float, readings: int, sums: Sequence[Sum], ignored: int) -> list[str]:
         remarks = []
         if not np.isfinite(left):
@@ -461,6 +537,7 @@ class _Learner:
             remarks.append(
                 f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."
             )
+        remarks += [remark for found in sums for remark in self._identities(found)]
         if ignored:
             remarks.append(f"{ignored} reading{'s' if ignored > 1 else ''} taken for outliers and ignored.")
         return remarks

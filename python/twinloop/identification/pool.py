@@ -104,6 +104,22 @@ class Pool:
         pairs = float(np.log(1 + n + n * (n + 1) / 2))
         return pairs + max(0, self.leaves(number) - 2) * float(np.log(n) + np.log(self.operations))
 
+    def text(self, number: int, symbols: Sequence[str]) -> str:
+        """An expression as it would be written, with a symbol for each input."""
+        node = self.node(number)
+        if node is None:
+            return symbols[number]
+        operation, a, b = node
+        if node == ONE:
+            return "1"
+        first = self.text(a, symbols)
+        if operation in UNARY:
+            return f"{operation}({first})"
+        second = self.text(b, symbols) if isinstance(b, int) else f"{b:.4g}"
+        if operation in ("min", "max"):
+            return f"{operation}({first}, {second})"
+        return f"{first} {operation} {second}" if operation == "*" else f"({first} {operation} {second})"
+
     def values(self, numbers: Sequence[int], rows: Floats) -> Floats:
         """Nodes evaluated.
 

@@ -12,8 +12,9 @@ from twinloop.history import Lesson, Planned, Progress
 from twinloop.identification.identify import Identified, identify_runs
 from twinloop.identification.records import Run
 from twinloop.logbook import Logbook
+from twinloop.methods.calibration import factor, needed_factor
 from twinloop.methods.errors import errors
-from twinloop.models import Twin
+from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
 from twinloop.planning.planner import Committee, Planner, Task
 from twinloop.presets import DefaultOptions
@@ -57,6 +58,7 @@ class IdentifyAndPlan:
         self._tuned: tuple[int, Floats] | None = None
         self._best: tuple[int, Test] | None = None
         self._lessons: list[Lesson] = []
+        self._needed: list[float] = []
         task = Task(setup.initial_state, setup.target_state, setup.steps)
         self.planner = Planner(
             setup.family,
@@ -75,6 +77,7 @@ class IdentifyAndPlan:
         if told == self._learnt or (at_once and self.identified is not None):
             return
         self._told = tuple(run.test.number for run in book.experiments)
+        needed = self._calibrated(book)
         runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in book.experiments]
         identified = identify_runs(
             runs,
@@ -97,6 +100,7 @@ class IdentifyAndPlan:
         kept |= set(order[: max(0, FEWEST - len(kept))].tolist())
         self._believed = [identified.members[i] for i in sorted(kept)]
         self.identified, self._learnt, self.iteration = identified, told, told
+        self._needed = needed
         self._lessons.append(self._lesson(identified, book, free[0].tolist()))
 
     def ask(self, book: Logbook, last: bool) -> Test:
@@ -194,16 +198,30 @@ class IdentifyAndPlan:
 
     def twin(self, book: Logbook) -> Twin:
         """The best model, with the committee and the sensors' noise for its band."""
+        return self._twin(errors(self._known().model, book, self.workers))
+
+    def _twin(self, rows: Sequence[TestErrors]) -> Twin:
         known = self._known()
         return Twin(
             known.model,
             self.setup.signals,
-            errors(known.model, book, self.workers),
+            rows,
             self.options.divergence_factor,
             members=self._believed,
             noise=known.noise(self.setup.signals),
             seed=self.setup.seed,
+            inflation=factor(self._needed),
         )
+
+    def _calibrated(self, book: Logbook) -> list[float]:
+        """Factors that the flights told since the last identification would have needed, after those before them."""
+        needed = list(self._needed)
+        if self.identified is not None:
+            twin = self._twin([])
+            for run in book.experiments[self._learnt :]:
+                found = needed_factor(twin, run.test, run.trajectory)
+                needed += [] if found is None else [found]
+        return needed
 
     @property
     def best_model(self) -> _core.Model | None:
