@@ -32,6 +32,8 @@ pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noi
 
 /// Factors by which a variance is tried in turn, coarse to fine.
 const STEPS: [f64; 5] = [100.0, 10.0, 3.0, 1.5, 1.15];
+/// Times that all of them are gone through: where one variance began far too large, the others are small after the first.
+const LADDERS: usize = 3;
 
 /// The noise under which residuals are most likely, by coordinate search from `start`; never below `smallest`.
 pub fn most_likely_noise(
@@ -45,35 +47,42 @@ pub fn most_likely_noise(
     let d = chain.states;
     let mut best = start.clone();
     let mut score = likelihood(chain, records, residuals, &best);
-    for step in STEPS {
-        for _ in 0..8 {
-            let mut moved = false;
-            // Sensors, process, and where there are any the size and the memory of gusts.
-            for which in (if fixed_sensors { d } else { 0 })..=d + 2 * best.hidden() {
-                for factor in [step, 1.0 / step] {
-                    let mut tried = best.clone();
-                    if which < d {
-                        tried.sensors[which] = (tried.sensors[which] * factor).max(smallest.sensors[which]);
-                    } else if which == d {
-                        tried.process = (tried.process * factor).max(smallest.process);
-                    } else if which == d + 1 {
-                        tried.gust = (tried.gust * factor).max(smallest.gust);
-                    } else {
-                        // Shorter than a few periods it is white, longer than this it is a constant.
-                        tried.memory = (tried.memory * factor).clamp(3.0 * chain.dt, 300.0 * chain.dt);
-                    }
-                    if tried == best {
-                        continue;
-                    }
-                    let found = likelihood(chain, records, residuals, &tried);
-                    if found < score {
-                        (best, score, moved) = (tried, found, true);
+    for _ in 0..LADDERS {
+        let before = score;
+        for step in STEPS {
+            for _ in 0..8 {
+                let mut moved = false;
+                // Sensors, process, and where there are any the size and the memory of gusts.
+                for which in (if fixed_sensors { d } else { 0 })..=d + 2 * best.hidden() {
+                    for factor in [step, 1.0 / step] {
+                        let mut tried = best.clone();
+                        if which < d {
+                            tried.sensors[which] =
+                                (tried.sensors[which] * factor).max(smallest.sensors[which]);
+                        } else if which == d {
+                            tried.process = (tried.process * factor).max(smallest.process);
+                        } else if which == d + 1 {
+                            tried.gust = (tried.gust * factor).max(smallest.gust);
+                        } else {
+                            // Shorter than a few periods it is white, longer than this it is a constant.
+                            tried.memory = (tried.memory * factor).clamp(3.0 * chain.dt, 300.0 * chain.dt);
+                        }
+                        if tried == best {
+                            continue;
+                        }
+                        let found = likelihood(chain, records, residuals, &tried);
+                        if found < score {
+                            (best, score, moved) = (tried, found, true);
+                        }
                     }
                 }
+                if !moved {
+                    break;
+                }
             }
-            if !moved {
-                break;
-            }
+        }
+        if before - score < 0.1 {
+            break;
         }
     }
     (best, score)

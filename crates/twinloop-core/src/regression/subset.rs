@@ -314,8 +314,9 @@ pub fn search(gram: &Gram, prices: &Prices, annealing: &Annealing, stream: &mut 
     let cooled = annealing.moves - annealing.moves / 10;
     for n in 0..annealing.moves {
         let heat = if n < cooled { hottest * libm::exp(cooling * n as f64 / cooled as f64) } else { 0.0 };
+        // Early subsets are passed through only, but the best of a walk is often one that it never leaves again.
         if walk.step(annealing.largest, heat, stream, &mut work)
-            && (heat <= 20.0 * annealing.coldest || n % 16 == 0)
+            && (heat <= 20.0 * annealing.coldest || n % 16 == 0 || walk.energy() < kept[0].energy)
         {
             keep(&walk, &mut kept);
         }
