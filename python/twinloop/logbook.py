@@ -41,6 +41,8 @@ class Logbook:
         spread: float | None = None,
         risk: float | None = None,
         reason: str = "",
+        initial_state: Floats | None = None,
+        target_state: Floats | None = None,
     ) -> Test:
         """Enters a test.
 
@@ -51,6 +53,8 @@ class Logbook:
             spread: standard deviation of it.
             risk: probability that the flight leaves the envelope.
             reason: why this test.
+            initial_state: where it starts (n_x,); None: where the campaign does.
+            target_state: where it leads (n_x,); None: where the campaign does.
 
         Returns:
             The test, under the next number.
@@ -58,8 +62,8 @@ class Logbook:
         test = Test(
             self.setup.family,
             genes,
-            self.setup.initial_state,
-            self.setup.target_state,
+            self.setup.initial_state if initial_state is None else initial_state,
+            self.setup.target_state if target_state is None else target_state,
             self.setup.steps,
             excitation,
             number=len(self.tests),

@@ -71,8 +71,8 @@ def campaign_picture(campaign: Campaign, path: Path, quality: str = "quality") -
     with require().rc_context(STYLE):
         identified = isinstance(campaign.options, DefaultOptions)
         columns, rows = len(campaign.experiments), campaign.signals.n_x + identified
-        figure = _figure(max(8.4 if identified else 6.4, 1.2 + 2.2 * columns), 1.15 * rows + 3.6)
-        above, below = figure.subfigures(2, 1, height_ratios=[1.15 * rows + 0.6, 3.0])
+        figure = _figure(max(8.4 if identified else 6.4, 1.2 + 2.2 * columns), 1.15 * rows + 3.4)
+        above, below = figure.subfigures(2, 1, height_ratios=[1.15 * rows + 0.6, 2.8])
         _runs(above, campaign)
         if identified:
             left, right = below.subplots(1, 2)
@@ -178,6 +178,10 @@ def _figure(width: float, height: float) -> Any:
 
 
 def _save(figure: Any, path: Path) -> None:
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes in figure.get_axes():  # the layout's solver differs in the last bits from run to run
+        axes.set_position([round(float(edge), 4) for edge in axes.get_position().bounds])
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
     figure.savefig(path, dpi=150, metadata=metadata)
 

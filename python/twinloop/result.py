@@ -186,9 +186,11 @@ def _disturbances(campaign: Campaign, twin: Twin) -> list[dict[str, object]]:
     found: list[dict[str, object]] = []
     for i, (state, white) in enumerate(zip(campaign.signals.states, twin.noise.moves.tolist(), strict=True)):
         size, memory = lasting.get(i, (0.0, 0.0))
-        # Over the memory, or a period: what is far below the sensor's noise cannot be told from nothing.
-        felt = max(white, size * max(memory, campaign.signals.dt))
-        if felt > 0.01 * float(twin.noise.sensors[i]):
+        # What is far below the sensor's noise within its memory cannot be told from nothing.
+        least = 0.01 * float(twin.noise.sensors[i])
+        white = white if white > least else 0.0
+        size = size if size * max(memory, campaign.signals.dt) > least else 0.0
+        if white or size:
             found.append(
                 {"name": state.name, "unit": state.unit, "white": white, "lasting": size, "memory": memory}
             )

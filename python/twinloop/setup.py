@@ -143,11 +143,13 @@ def _purpose(
         for what, named, known in (("goal", purpose, GOALS), ("quality", kind, KINDS)):
             if named not in known:
                 raise unknown(what, named, known)
-        if len(options.quality_weights) not in (0, signals.n_x):
-            raise InvalidInput(
-                f"Option 'quality_weights': expected {signals.n_x} numbers, one a state, or none, found"
-                f" {len(options.quality_weights)}; write one for each."
-            )
+        for name in ("quality_weights", "initial_range", "target_range"):
+            numbers = getattr(options, name)
+            if len(numbers) not in (0, signals.n_x) or any(value < 0.0 for value in numbers):
+                raise InvalidInput(
+                    f"Option {name!r}: expected {signals.n_x} numbers of at least 0, one a state, or none, found"
+                    f" {numbers}; write one for each."
+                )
         weights, effort, rate = options.quality_weights, options.effort, options.effort_rate
         return purpose, quality_of(kind, signals, weights, effort, rate)
     for what, value, only in (("goal", goal, "both"), ("quality", quality, "final_distance")):

@@ -15,7 +15,7 @@ HIGHEST = 6
 """Power of an expression at most."""
 
 
-def term(text: str, pool: Pool, signals: Signals) -> int:
+def parsed_term(text: str, pool: Pool, signals: Signals) -> int:
     """A formula as a node of the pool.
 
     A command stands for itself in units of its scale, as a model sees it; states are in their units.

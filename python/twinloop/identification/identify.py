@@ -19,7 +19,7 @@ from twinloop.errors import engine_input
 from twinloop.identification.actuation import groups, search_actuators, total
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.evolution import evolve
-from twinloop.identification.formulas import term
+from twinloop.identification.formulas import parsed_term
 from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, stages
@@ -198,7 +198,7 @@ class _Learner:
         options = self.options
         ladder = rungs(self.pool, self.signals, options.libraries, options.most_terms)
         base = ladder or [[self.pool.one, *range(self.pool.inputs)]]
-        seeds = [term(formula, self.pool, self.signals) for formula in options.seed_terms]
+        seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
         self.pool.rungs.update(dict.fromkeys(seeds, 0))
         base = [list(dict.fromkeys([*terms, *seeds])) for terms in base]
         guess = guessed_noise(self.runs, self.scales)
@@ -537,6 +537,13 @@ class _Learner:
             remarks.append(
                 f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."
             )
+        still = [
+            self.signals.state_names[i]
+            for i in range(self.signals.n_x)
+            if max(float(np.ptp(run.states[:, i])) for run in self.runs) <= 1e-9 * self.scales[i]
+        ]
+        if still:
+            remarks.append(f"{', '.join(still)} never moved: nothing could be learnt of what drives it.")
         remarks += [remark for found in sums for remark in self._identities(found)]
         if ignored:
             remarks.append(f"{ignored} reading{'s' if ignored > 1 else ''} taken for outliers and ignored.")

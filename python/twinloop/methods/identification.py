@@ -8,6 +8,9 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.controllers import lqr_gains
+from twinloop.controllers.state_feedback import FeedbackFamily
+from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.history import Lesson, Planned, Progress
 from twinloop.identification.identify import Identified, identify_runs
 from twinloop.identification.records import Run
@@ -138,6 +141,8 @@ class IdentifyAndPlan:
             spread=found.spread,
             risk=found.risk,
             reason=found.reason,
+            initial_state=found.initial_state,
+            target_state=found.target_state,
         )
         plan = Planned(
             test=test.number,
@@ -256,12 +261,23 @@ class IdentifyAndPlan:
             first = book.experiments[0].test.genes
             if first.tobytes() != starts[0].tobytes():
                 starts.append(first)
+            starts += self._linear_gains(committee)
             if committee.trusted:
                 genes, _ = self.planner.tune(committee, starts, 2 * len(book.experiments))
             else:
                 genes = starts[0]
             self._tuned = (len(book.experiments), genes)
         return self._tuned[1]
+
+    def _linear_gains(self, committee: Committee) -> list[Floats]:
+        """Gains of a full state feedback by LQR on the linearised twin; none for other families, or where it fails."""
+        family = self.setup.family
+        if not isinstance(family, FeedbackFamily) or not committee.trusted:
+            return []
+        try:
+            return [family.genes(lqr_gains(committee.members[0], family, self.setup.target_state))]
+        except (NotAvailable, InvalidInput):
+            return []
 
     def _first_quality(self, book: Logbook) -> float:
         first = book.measured(book.experiments[0].test.number)

@@ -17,6 +17,8 @@ from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 
 GOALS = ("both", "model", "control")
+Ends = tuple[Floats, Floats]
+"""Initial states and target states (K, n_x)."""
 HOPELESS = 1e9
 """What a flight that diverges is worth."""
 
@@ -51,6 +53,8 @@ class Proposal:
 
     Args:
         genes: its gains (size,).
+        initial_state: where it starts (n_x,).
+        target_state: where it leads (n_x,).
         excitation: (n, n_u), or None.
         predicted: mean quality over members and draws; infinite if any diverges.
         spread: standard deviation of the members' means.
@@ -62,6 +66,8 @@ class Proposal:
     """
 
     genes: Floats
+    initial_state: Floats
+    target_state: Floats
     excitation: Floats | None
     predicted: float
     spread: float
@@ -137,11 +143,12 @@ class Planner:
         sds: Floats,
         draws: int,
         excitation: Floats | None = None,
+        ends: Ends | None = None,
     ) -> Judged:
         """Flies candidates on members under noise; what diverges is worth `HOPELESS`."""
         noise = self.noise(sds, draws)
         values, usages = qualities(
-            members, self._flights(genes, excitation), self.quality.engine, self.signals,
+            members, self._flights(genes, excitation, ends), self.quality.engine, self.signals,
             noise=noise, workers=self.workers,
         )  # fmt: skip
         return Judged(
@@ -254,9 +261,10 @@ class Planner:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
         genes, excitation = self._candidates(tuned, goal, number, exploit)
+        ends = self._ends(number, len(genes))
         self.watch("candidates", 0.0)
-        judged = self.judge(committee.members, genes, committee.sds, 1, excitation)
-        flights = self._flights(genes, excitation)
+        judged = self.judge(committee.members, genes, committee.sds, 1, excitation, ends)
+        flights = self._flights(genes, excitation, ends)
         values, where = disagreements(
             committee.members, flights, np.maximum(committee.sds, self._smallest()), workers=self.workers
         )
@@ -282,25 +290,33 @@ class Planner:
         gain = float((best - per_member[:, keeps].min(axis=1)).mean()) if keeps.any() else 0.0
         row, state, high, low = (int(i) for i in where[chosen])
         noisy = self.judge(
-            committee.members, genes[[chosen]], committee.sds, self.options.draws, excitation[[chosen]]
+            committee.members,
+            genes[[chosen]],
+            committee.sds,
+            self.options.draws,
+            excitation[[chosen]],
+            (ends[0][[chosen]], ends[1][[chosen]]),
         )
+        safe = bool(judged.worst_usage[chosen] <= 1.0 - self.options.margin)
         left = int((noisy.usages > 1.0).sum())
         flown = noisy.usages.size
         means = noisy.qualities.mean(axis=(1, 2))
         diverges = bool((noisy.qualities >= HOPELESS).any())
         return Proposal(
             genes=genes[chosen],
+            initial_state=ends[0][chosen],
+            target_state=ends[1][chosen],
             excitation=excitation[chosen] if excitation[chosen].any() else None,
             predicted=float("inf") if diverges else float(means.mean()),
             spread=float(means.std()),
             risk=(left + 0.5) / (flown + 1.0),
-            safe=bool(keeps[chosen]),
+            safe=safe,
             disagreement=float(values[chosen]),
             gain=max(0.0, gain),
             reason=self._reason(
                 goal,
                 exploit and chosen == 0,
-                bool(keeps[chosen]),
+                safe,
                 float(values[chosen]),
                 row,
                 state,
@@ -343,9 +359,24 @@ class Planner:
         """Differences below this are rounding (n_x,)."""
         return np.array([1e-6 * state.scale for state in self.signals.states])
 
-    def _flights(self, genes: Floats, excitation: Floats | None) -> _core.Flights:
+    def _ends(self, number: int, count: int) -> Ends:
+        """Start and target of each candidate (K, n_x); those of the campaign for the first one."""
+        stream = self._stream(6, number)
+        ends = []
+        for middle, reach in (
+            (self.task.initial_state, self.options.initial_range),
+            (self.task.target_state, self.options.target_range),
+        ):
+            states = np.tile(middle, (count, 1))
+            if any(reach):
+                states[1:] += np.array(reach) * stream.uniform(-1.0, 1.0, (count - 1, len(middle)))
+            ends.append(states)
+        return ends[0], ends[1]
+
+    def _flights(self, genes: Floats, excitation: Floats | None, ends: Ends | None) -> _core.Flights:
+        initial, target = ends or (self.task.initial_state, self.task.target_state)
         return candidates(
-            self.family, genes, self.task.initial_state, self.task.target_state, self.task.steps,
+            self.family, genes, initial, target, self.task.steps,
             excitation=excitation, divergence_factor=self.divergence_factor,
         )  # fmt: skip
 

@@ -17,6 +17,9 @@ class PlanningOptions:
         excitation: amplitude of the first test's excitation, in units of each command's scale; 0: none.
         excitation_most: largest amplitude of a later test.
         fade: share of a flight, at its end, over which excitation fades out.
+        initial_range: how far from the campaign's initial state a test may start, either way (n_x,), in the states'
+            units; none: every test starts there.
+        target_range: how far from the campaign's target a test may lead, likewise.
         candidates: flights that are compared for each proposal.
         nearness: standard deviation of the candidates' gains around the tuned ones, in ranges of the gains.
         share: of the way from the tuned quality back to the first controller's that a test may give up to be told
@@ -39,6 +42,8 @@ class PlanningOptions:
     excitation: float = 0.02
     excitation_most: float = 0.04
     fade: float = 0.25
+    initial_range: tuple[float, ...] = ()
+    target_range: tuple[float, ...] = ()
     candidates: int = 256
     nearness: float = 0.1
     share: float = 0.25
