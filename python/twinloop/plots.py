@@ -180,7 +180,10 @@ def _figure(width: float, height: float) -> Any:
 def _save(figure: Any, path: Path) -> None:
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
-    for axes in figure.get_axes():  # the layout's solver differs in the last bits from run to run
+    # The layout's solver differs in the last bits from run to run.
+    for part in figure.subfigs:
+        part.bbox_relative.set_points(np.round(part.bbox_relative.get_points(), 4))
+    for axes in figure.get_axes():
         axes.set_position([round(float(edge), 4) for edge in axes.get_position().bounds])
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
     figure.savefig(path, dpi=150, metadata=metadata)

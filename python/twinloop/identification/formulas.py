@@ -21,7 +21,7 @@ def parsed_term(text: str, pool: Pool, signals: Signals) -> int:
     A command stands for itself in units of its scale, as a model sees it; states are in their units.
 
     Args:
-        text: such as "rate * abs(rate)" or "sin(angle)"; + − * / **, abs, sqrt, sin, cos, tanh, exp, min, max, numbers.
+        text: such as "rate * abs(rate)" or "sin(angle)": numbers, + − * / **, abs, sqrt, sin, cos, tanh, exp, min, max.
         pool: where it is entered.
         signals: whose names it may use.
 

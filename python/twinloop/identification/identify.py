@@ -28,6 +28,8 @@ from twinloop.identification.structure import Problem, Sum, Weights, first_noise
 from twinloop.models import Noise
 from twinloop.signals import Signals
 
+LAGS_AGAIN = 4
+"""Runs up to which lags and delays are searched anew; from then on they are only tuned."""
 PRUNINGS = 3
 """How often terms that tuning has shown to be nothing are dropped."""
 TWINS = 4.0
@@ -218,7 +220,7 @@ class _Learner:
         known: list[Sum | None] = [None] * len(driven)
         if self.known is not None:
             known = [replace(s, others=[]) for s in self.known.sums]
-        if options.lags:
+        if options.lags and (self.known is None or len(self.runs) <= LAGS_AGAIN):
             self.watch("actuators")
             actuators, known = self._actuators(start, driven)
             problem = self._problem(actuators)
@@ -513,7 +515,7 @@ class _Learner:
         return None if pick == 0 else found.others[min(pick, len(found.others)) - 1][0]
 
     def _identities(self, found: Sum) -> list[str]:
-        """The nearest other law that the runs cannot tell from this one: an identity that held on them, if there is any."""
+        """The nearest other law that the runs cannot tell from this one: an identity that held on them."""
         symbols = [*self.signals.state_names, *self.signals.command_names]
         driven = self.signals.state_names[found.chain.states[0]]
         ours = set(found.weights)

@@ -62,6 +62,8 @@ LIBRARIES: dict[str, Callable[[Pool, Signals], Terms]] = {
     "cubic": cubic,
 }
 """Libraries by name, in the order in which they are tried."""
+TOGETHER = {"quadratic": "linear", "trigonometric": "damping"}
+"""Libraries that share a rung with the one before them."""
 
 
 def angles(signals: Signals) -> set[int]:
@@ -99,16 +101,17 @@ def rungs(pool: Pool, signals: Signals, names: Sequence[str], most: int) -> list
     """
     ladder: list[Terms] = []
     below: Terms = []
+    last = ""
     for name in LIBRARIES:
         if name not in names:
             continue
         terms = list(dict.fromkeys([*below, *LIBRARIES[name](pool, signals)]))
         if len(terms) > most or len(terms) == len(below):
             continue
-        if ladder and name in ("quadratic", "trigonometric"):
+        if last == TOGETHER.get(name):
             ladder.pop()
         ladder.append(terms)
-        below = terms
+        below, last = terms, name
     for number, terms in enumerate(ladder):
         for term in terms:
             pool.rungs.setdefault(term, number)
