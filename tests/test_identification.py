@@ -1,0 +1,316 @@
+"""Pools of expressions, ladders of libraries, and whether the law of a small plant is found from its runs."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import twinloop as tl
+from oracles import UNARY, operate, same_bits
+from twinloop import _core
+from twinloop.identification.chains import chains
+from twinloop.identification.identify import guessed_noise, identify_runs
+from twinloop.identification.libraries import rungs
+from twinloop.identification.pool import Pool
+from twinloop.identification.records import Run
+from twinloop.identification.structure import prices
+from twinloop.presets import options_of
+
+WORKERS = _core.Workers()
+FAST = {
+    "moves": 2000, "starts": 2, "generations": 0, "lags": False, "committee_size": 3, "tuning_steps": 8,
+}  # fmt: skip
+INPUTS = 3
+
+# Pools
+
+
+@st.composite
+def pools(draw):
+    """A pool with a few nodes, and those of them that stay moderate."""
+    pool = Pool(INPUTS)
+    for _ in range(draw(st.integers(0, 8))):
+        operand = st.integers(0, len(pool) - 1)
+        constant = st.floats(-5.0, 5.0).filter(lambda x: abs(x) > 1e-3)
+        operation = draw(
+            st.sampled_from(["+", "-", "*", "/", "min", "max", "abs", "sqrt", "sin", "cos", "tanh"])
+        )
+        second = None if operation in UNARY else draw(st.one_of(operand, constant))
+        pool.add((operation, draw(operand), second))
+    return pool
+
+
+def value(pool, number, rows):
+    """A node, written once more as a recursion."""
+    node = pool.node(number)
+    if node is None:
+        return rows[:, number]
+    operation, a, b = node
+    if operation == "one":
+        return np.ones(len(rows))
+    first = value(pool, a, rows)
+    if b is None:
+        return operate(operation, first)
+    second = value(pool, b, rows) if isinstance(b, int) else np.full(len(rows), b)
+    return operate(operation, first, second)
+
+
+@given(pools(), st.data(), st.integers(0, 2**32 - 1))
+def test_a_program_of_sums_is_those_sums(pool, data, seed):
+    rows = np.random.default_rng(seed).uniform(-2.0, 2.0, (7, INPUTS))
+    node, weight = st.integers(0, len(pool) - 1), st.floats(-9.0, 9.0)
+    outputs = data.draw(st.lists(st.dictionaries(node, weight, max_size=6), min_size=1, max_size=3))
+    found = pool.program(outputs).run(rows)
+    with np.errstate(all="ignore"):
+        for i, terms in enumerate(outputs):
+            parts = [w * value(pool, n, rows) for n, w in terms.items()]
+            size = 1.0 + np.sum(np.abs(parts), axis=0) if parts else np.ones(len(rows))
+            expected = np.sum(parts, axis=0) if parts else np.zeros(len(rows))
+            tame = size < 1e6
+            assert (np.abs(found[tame, i] - expected[tame]) <= 1e-9 * size[tame]).all()
+
+
+@given(pools(), st.integers(0, 2**32 - 1))
+def test_values_of_nodes_are_those_of_the_recursion(pool, seed):
+    rows = np.random.default_rng(seed).uniform(-2.0, 2.0, (7, INPUTS))
+    numbers = list(range(len(pool)))[::-1]
+    with np.errstate(all="ignore"):
+        expected = np.stack([value(pool, n, rows) for n in numbers], axis=1)
+        tame = (np.abs(expected) < 1e6).all()
+    found = pool.values(numbers, rows)
+    assert found.shape == expected.shape
+    if tame:
+        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
+
+
+def test_equal_expressions_are_one_node():
+    pool = Pool(INPUTS)
+    assert pool.product(0, 1) == pool.product(1, 0) and pool.add(("+", 2, 1)) == pool.add(("+", 1, 2))
+    assert pool.add(("-", 2, 1)) != pool.add(("-", 1, 2))
+    assert pool.node(0) is None and pool.needed([pool.product(0, 1, 2)]) == [
+        pool.product(0, 1),
+        pool.product(0, 1, 2),
+    ]
+
+
+def test_an_empty_sum_is_zero_and_one_is_one():
+    pool = Pool(INPUTS)
+    found = pool.program([{}, {pool.one: 2.5}, {0: 1.0, pool.one: -1.0}]).run([[3.0, 0.0, 0.0]])
+    assert found.tolist() == [[0.0, 2.5, 2.0]]
+
+
+def test_longer_expressions_cost_more_and_what_is_known_elsewhere_its_own_price():
+    pool = Pool(INPUTS)
+    terms = [0, pool.product(0, 1), pool.product(0, 1, 2), pool.product(0, 1, 2, 2), pool.add(("+", 0, 0.5))]
+    lengths = [pool.length(term) for term in terms]
+    assert lengths[0] == lengths[1] < lengths[2] < lengths[3]
+    assert lengths[4] == lengths[1]
+    found = prices(pool, terms, 1000, {terms[3]: 1.25})
+    expected = np.log(1000.0) + 2.0 * np.array([*lengths[:3], 1.25, lengths[4]])
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert (prices(pool, terms, 0, {}) > 0.0).all()
+
+
+def pendulum_like():
+    return tl.Signals(
+        [tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 6.0, derivative_of="angle")],
+        [tl.Command("torque", "N m", (-2.0, 2.0), scale=1.0)],
+        0.02,
+    )
+
+
+def test_each_rung_has_the_terms_of_those_below_and_a_stranger_stands_above_all():
+    pool = Pool(INPUTS)
+    ladder = rungs(pool, pendulum_like(), ("linear", "quadratic", "trigonometric", "cubic"), 450)
+    assert all(set(low) < set(high) for low, high in pairwise(ladder))
+    assert all(len(set(terms)) == len(terms) for terms in ladder)
+    sine = pool.add(("sin", 0, None))
+    assert sine not in ladder[0] and sine in ladder[1]
+    assert pool.rung([0, 1]) == 0 and pool.rung([0, sine]) == 1
+    assert pool.rung([pool.add(("tanh", 0, None))]) == len(ladder)
+    assert rungs(Pool(INPUTS), pendulum_like(), (), 450) == []
+    assert len(rungs(Pool(INPUTS), pendulum_like(), ("linear", "cubic"), 4)) == 1
+
+
+def test_every_state_is_in_one_chain():
+    body = tl.RigidBody(("a", "b", "c"), ("p", "q", "r"))
+    states = [tl.State(n, "rad", 1.0) for n in "abc"] + [tl.State(n, "rad/s", 1.0) for n in "pqr"]
+    states += [tl.State("x", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="x")]
+    signals = tl.Signals(states, [tl.Command("u", "1", (-1.0, 1.0))], 0.1, kinematics=body)
+    for form in ("acceleration", "increment"):
+        found = chains(signals, form, np.ones(8))
+        assert sorted(i for chain in found for i in chain.states) == list(range(8))
+    found = chains(signals, "acceleration", np.arange(8.0))
+    assert [(c.states, c.output) for c in found] == [
+        ((3,), 0), ((4,), 1), ((5,), 2), ((7, 6), 3), ((0,), None), ((1,), None), ((2,), None),
+    ]  # fmt: skip
+    assert found[3].sensors.tolist() == [7.0, 6.0]
+
+
+def test_a_first_guess_of_the_noise_is_its_variance_and_never_nothing():
+    stream = np.random.default_rng(0)
+    t = 0.02 * np.arange(2000)[:, None]
+    states = np.sin(t * [1.0, 2.0]) + stream.normal(size=(2000, 2)) * [0.01, 0.3]
+    np.testing.assert_allclose(guessed_noise([Run.of(states, t)], np.ones(2)), [1e-4, 0.09], rtol=0.2)
+    still = Run.of(np.zeros((50, 2)), np.zeros((49, 1)))
+    assert guessed_noise([still], np.ones(2)).tolist() == [pytest.approx(1e-14)] * 2
+    assert (guessed_noise([Run.of(np.ones((3, 2)), np.ones((2, 1)))], np.ones(2)) > 0.0).all()
+
+
+# Laws of small plants
+
+
+def swung(slope, seed, steps=100, dt=0.02, start=(0.5, 0.0), noise=0.0, amplitude=1.5):
+    """A run of a second-order plant under a command that changes now and then, in fine steps."""
+    stream = np.random.default_rng(seed)
+    commands = np.repeat(stream.uniform(-amplitude, amplitude, (steps // 5 + 1, 1)), 5, axis=0)[:steps]
+    x, states = np.array(start, dtype=float), [np.array(start, dtype=float)]
+    for u in commands[:, 0]:
+        for _ in range(20):
+            h = dt / 20
+            middle = x + 0.5 * h * np.array([x[1], slope(*x, u)])
+            x = x + h * np.array([middle[1], slope(*middle, u)])
+        states.append(x)
+    states = np.array(states)
+    return Run.of(states + noise * stream.normal(size=states.shape), commands)
+
+
+def gravity(angle, rate, torque):
+    return -9.0 * np.sin(angle) - 0.4 * rate + 5.0 * torque
+
+
+def identified(runs, signals, **changes):
+    return identify_runs(runs, signals, options_of("default", {**FAST, **changes}), workers=WORKERS)
+
+
+def law(found, output=0):
+    """Coefficients by how their term is written."""
+    names = []
+    for number in found.sums[output].weights:
+        node = found.pool.node(number)
+        names.append(number if node is None else "1" if node[0] == "one" else node)
+    model = dict(zip(names, found.model.constants.tolist(), strict=True))
+    return model
+
+
+def test_the_law_of_a_pendulum_is_found():
+    runs = [swung(gravity, seed, start=(0.5 + seed, 0.0)) for seed in range(2)]
+    found = identified(runs, pendulum_like())
+    assert found.model.form == "acceleration" and found.terms == 3
+    terms = law(found)
+    assert set(terms) == {1, 2, ("sin", 0, None)}
+    assert terms["sin", 0, None] == pytest.approx(-9.0, rel=0.01)
+    assert terms[1] == pytest.approx(-0.4, rel=0.01) and terms[2] == pytest.approx(5.0, rel=0.01)
+    assert len(found.members) == 3 and found.ignored == 0 and found.readings == 404
+    assert found.members[0] is found.model
+
+
+def test_a_lag_of_the_actuator_is_found():
+    dt, lag = 0.02, 0.06
+    stream, runs = np.random.default_rng(1), []
+    signals = tl.Signals([tl.State("speed", "m/s", 3.0)], [tl.Command("u", "V", (-2.0, 2.0), scale=1.0)], dt)
+    for _ in range(2):
+        commands = np.repeat(stream.uniform(-2.0, 2.0, (12, 1)), 10, axis=0)
+        effect, speed, states = commands[0, 0], 0.0, [0.0]
+        for u in commands[:, 0]:
+            for _ in range(50):
+                effect += dt / 50 * (u - effect) / lag
+                speed += dt / 50 * (3.0 * effect - 0.8 * speed)
+            states.append(speed)
+        readings = np.array(states)[:, None]
+        runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands))
+    found = identified(runs, signals, lags=True, form="acceleration", longest_delay=1)
+    [(time, delay, _)] = found.actuators
+    assert time == pytest.approx(lag, rel=0.1) and delay == 0
+    terms = law(found)
+    assert set(terms) == {0, 1}
+    assert terms[0] == pytest.approx(-0.8, rel=0.1) and terms[1] == pytest.approx(3.0, rel=0.1)
+
+
+def test_a_law_in_increments_is_found():
+    stream = np.random.default_rng(2)
+    signals = tl.Signals(
+        [tl.State("x", "1", 2.0), tl.State("y", "1", 2.0)], [tl.Command("u", "1", (-1.0, 1.0))], 0.1
+    )
+    states, commands = [np.array([0.3, -0.5])], np.repeat(stream.uniform(-1.0, 1.0, (40, 1)), 4, axis=0)
+    for u in commands[:, 0]:
+        x, y = states[-1]
+        states.append(states[-1] + [0.2 * y - 0.1 * x, 0.25 * u - 0.3 * y + 0.05 * x * u])
+    found = identified([Run.of(np.array(states), commands)], signals)
+    assert found.model.form == "increment"
+    assert found.sums[0].weights.keys() == {0, 1}
+    assert found.sums[1].weights.keys() == {2, 1, found.pool.product(0, 2)}
+    np.testing.assert_allclose(sorted(found.model.constants), [-0.3, -0.1, 0.05, 0.2, 0.25], rtol=1e-3)
+
+
+def test_an_outlier_is_not_learnt_from():
+    run = swung(gravity, 0, noise=1e-3)
+    spoilt = run.states.copy()
+    spoilt[40, 1] += 4.0
+    clean, found = (identified([Run.of(s, run.commands)], pendulum_like()) for s in (run.states, spoilt))
+    assert clean.ignored <= 1 and 1 <= found.ignored <= 2
+    assert any("ignored" in remark for remark in found.remarks)
+    for x in ([0.3, 0.5], [1.0, -1.0]):
+        one, other = (f.model.step([x], [[0.4]])[0] for f in (clean, found))
+        np.testing.assert_allclose(one, other, atol=0.01)
+
+
+def finite(found, signals):
+    """Whether everything about an identification can be used."""
+    states, commands = np.full((1, signals.n_x), 0.1), np.full((1, signals.n_u), 0.1)
+    steps = [member.step(states, commands) for member in found.members]
+    return all(np.isfinite(s).all() for s in steps) and np.isfinite(found.sensors(signals.n_x)).all()
+
+
+def test_a_run_that_never_moves_is_handled():
+    signals = pendulum_like()
+    still = Run.of(np.zeros((60, 2)), np.zeros((59, 1)))
+    found = identified([still], signals)
+    assert finite(found, signals)
+    assert np.abs(found.model.step([[0.0, 0.0]], [[0.0]])).max() < 1e-3
+
+
+def test_a_state_that_is_constant_stays():
+    signals = tl.Signals(
+        [tl.State("x", "m", 2.0), tl.State("load", "kg", 3.0)], [tl.Command("u", "N", (-1.0, 1.0))], 0.05
+    )
+    stream, states = np.random.default_rng(3), [np.array([0.2, 1.5])]
+    commands = np.repeat(stream.uniform(-1.0, 1.0, (20, 1)), 4, axis=0)
+    for u in commands[:, 0]:
+        states.append(states[-1] + [0.1 * u - 0.05 * states[-1][0], 0.0])
+    found = identified([Run.of(np.array(states), commands)], signals)
+    assert finite(found, signals)
+    following = found.model.step([[0.5, 1.5]], [[0.4]])[0]
+    np.testing.assert_allclose(following, [0.5 + 0.04 - 0.025, 1.5], atol=1e-3)
+
+
+def test_commands_at_their_bounds_all_the_time_are_handled():
+    signals = pendulum_like()
+    run = swung(gravity, 5)
+    full = Run.of(run.states, np.full_like(run.commands, 2.0))
+    assert finite(identified([full], signals), signals)
+
+
+def test_a_very_short_run_is_handled():
+    run = swung(gravity, 6, steps=5)
+    for steps in (2, 3, 5):
+        short = Run.of(run.states[: steps + 1], run.commands[:steps])
+        assert finite(identified([short], pendulum_like()), pendulum_like())
+
+
+def test_what_was_learnt_before_is_not_changed_and_the_same_bits_come_again():
+    signals, options = pendulum_like(), options_of("default", FAST)
+    runs = [swung(gravity, seed, noise=1e-3) for seed in range(2)]
+    first = identify_runs(runs[:1], signals, options, workers=WORKERS, iteration=1)
+    before = (len(first.pool), first.model.constants, dict(first.sums[0].weights))
+    later = [
+        identify_runs(runs, signals, options, workers=workers, iteration=2, known=first)
+        for workers in (WORKERS, _core.Workers(threads=2), WORKERS)
+    ]
+    assert len(first.pool) == before[0] and dict(first.sums[0].weights) == before[2]
+    assert same_bits(first.model.constants, before[1])
+    for other in later[1:]:
+        assert [str(m.program) for m in other.members] == [str(m.program) for m in later[0].members]
+        assert other.energy == later[0].energy

@@ -1,0 +1,312 @@
+"""Actuators, rigid bodies and the tuning of constants, beside plain loops, SciPy's rotations and its least squares."""
+
+from collections import deque
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from oracles import Pid, close_loop, rk4, same_bits
+from strategies import program_text
+from twinloop import _core
+
+DT = 0.05
+QUIET = (0.0, 0.0, 1.0)
+
+
+class Line:
+    """One actuator: whole periods of delay, then a first-order lag, solved exactly within each period."""
+
+    def __init__(self, lag, delay, rest):
+        self.lag, self.delay, self.rest, self.waiting = lag, delay, rest, None
+
+    def effects(self, command, dt):
+        if self.waiting is None:
+            before = command if self.rest is None else self.rest
+            self.waiting, self.value = deque([before] * self.delay), before
+        self.waiting.append(command)
+        arrived = self.waiting.popleft()
+        if self.lag == 0.0:
+            self.value = arrived
+            return [arrived] * 3
+        found = [arrived + (self.value - arrived) * np.exp(-t / self.lag) for t in (0.0, dt / 2, dt)]
+        self.value = found[2]
+        return found
+
+
+ACTUATORS = [
+    [(0.08, 0, None), (0.0, 2, None)],
+    [(0.03, 3, 0.5), (0.2, 0, -1.0)],
+    [(0.0, 0, None), (0.5, 1, 0.0)],
+]
+
+
+@pytest.mark.parametrize("actuators", ACTUATORS)
+def test_the_effects_of_commands_are_those_of_a_plain_loop(actuators):
+    commands = np.random.default_rng(0).normal(size=(25, 2))
+    found = _core.command_effects(actuators, DT, commands)
+    lines = [Line(*actuator) for actuator in actuators]
+    expected = np.array(
+        [[line.effects(c, DT) for line, c in zip(lines, row, strict=True)] for row in commands]
+    )
+    for stage in range(3):
+        np.testing.assert_allclose(found[stage], expected[:, :, stage], rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("actuators", ACTUATORS)
+@pytest.mark.parametrize("form", ["increment", "acceleration"])
+def test_a_model_with_actuators_flies_as_a_plain_loop_does(rig, rig_family, form, actuators):
+    text = program_text(4, 2, 6, [["r4 = r1 * 0.1", "r5 = r2 * 0.4", "r4 = r4 + r5", "r5 = r3 - r1"]])
+    if form == "acceleration":
+        text = program_text(4, 1, 6, [["r4 = r2 * 2.0", "r5 = r3 - r1", "r4 = r4 + r5"]])
+    program, scales = _core.Program.parse(text), np.array([1.0, 4.0])
+    model = _core.Model(program, form, rig, actuators)
+    assert model.actuators == actuators
+    genes, steps = np.random.default_rng(1).uniform(0.0, 2.0, (5, 6)), 20
+    runs = _core.rollout(model, rig_family, genes, _core.Task([0.4, 0.0], [-0.2, 0.0], steps), rig)
+    for i in range(len(genes)):
+        lines = [Line(*actuator) for actuator in actuators]
+
+        def step(x, u, lines=lines):
+            effects = np.array([line.effects(c, 0.1) for line, c in zip(lines, u, strict=True)]).T / scales
+            if form == "increment":
+                return x + program.run([[*x, *effects[1]]])[0]
+            stages = iter([effects[0], effects[1], effects[1], effects[2]])
+            return rk4(lambda s: np.array([s[1], program.run([[*s, *next(stages)]])[0, 0]]), np.array(x), 0.1)
+
+        pid = Pid(
+            [(0, 1), (1, None)], genes[i], 0.1, [[1.0, 0.25], [0.5, -2.0]], [0.1, -0.2], 1.0,
+            [(-1.0, 1.0), (-3.0, 2.0)],
+        )  # fmt: skip
+        states, _, commands, lasted = close_loop(
+            step, pid, [0.4, 0.0], np.array([-0.2, 0.0]), steps, np.array([10.0, 20.0])
+        )
+        assert lasted == runs.lasted[i]
+        np.testing.assert_allclose(runs.states[i, : lasted + 1], states, rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(runs.commands[i, :lasted], commands, rtol=1e-9, atol=1e-11)
+
+
+def test_actuators_that_act_at_once_are_none(rig, rig_family):
+    program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r2 + 0.0", "r5 = r3 + 0.0"]]))
+    plain, direct = (
+        _core.Model(program, "absolute", rig),
+        _core.Model(program, "absolute", rig, [(0.0, 0, 1.0)] * 2),
+    )
+    assert direct.actuators == []
+    task, genes = _core.Task([0.4, 0.0], [-0.2, 0.0], 9), np.ones((1, 6))
+    runs = [_core.rollout(model, rig_family, genes, task, rig).states for model in (plain, direct)]
+    assert same_bits(*runs)
+
+
+@pytest.mark.parametrize(
+    "actuators", [[(0.1, 0, None)], [(-0.1, 0, None)] * 2, [(0.1, 0, np.nan)] * 2, [(0.0, 1001, None)] * 2]
+)
+def test_actuators_that_there_are_none_of_are_refused(rig, actuators):
+    program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r2 + 0.0"]]))
+    with pytest.raises(ValueError, match="expected"):
+        _core.Model(program, "absolute", rig, actuators)
+
+
+@pytest.fixture(scope="module")
+def body():
+    """Signals of a rigid body whose states are in no particular order, and the names of their places."""
+    angles, rates = [4, 0, 2], [1, 5, 3]
+    return (
+        _core.Signals(0.01, [4.0] * 6, [(-1.0, 1.0)] * 3, [1.0] * 3, [None] * 6, (angles, rates)),
+        np.array(angles),
+        np.array(rates),
+    )
+
+
+def spinning(body, acceleration=(0.0, 0.0, 0.0)):
+    signals, _, _ = body
+    lines = [f"r{9 + i} = r{9 + i} + {float(a)!r}" for i, a in enumerate(acceleration)]
+    return _core.Model(_core.Program.parse(program_text(9, 3, 12, [lines])), "acceleration", signals)
+
+
+def orientation(states, angles):
+    return Rotation.from_euler("ZYX", states[..., angles[::-1]])
+
+
+def test_constant_rates_turn_a_body_about_a_fixed_axis(body):
+    signals, angles, rates = body
+    stream = np.random.default_rng(2)
+    states = stream.uniform(-1.2, 1.2, (50, 6))
+    model = spinning(body)
+    assert model.shape("acceleration", signals) == (9, 3)
+    after = model.step(states, np.zeros((50, 3)))
+    expected = orientation(states, angles) * Rotation.from_rotvec(0.01 * states[:, rates])
+    assert (orientation(after, angles).inv() * expected).magnitude().max() < 1e-9
+    assert same_bits(after[:, rates], states[:, rates])
+
+
+def test_a_turn_of_many_periods_is_the_product_of_small_rotations(body):
+    _, angles, rates = body
+    model, state = spinning(body, (1.0, -2.0, 0.5)), np.array([0.3, 0.2, -1.0, 0.4, 0.1, 0.5])[None]
+    attitude, small = orientation(state[0], angles), 200
+    rate = state[0, rates].copy()
+    change = np.array([1.0, 0.5, -2.0])  # outputs are in the order of the states: p, r, q
+    for _ in range(40):
+        for _ in range(small):  # the middle of each small step
+            h = 0.01 / small
+            attitude = attitude * Rotation.from_rotvec(h * (rate + 0.5 * h * change))
+            rate += h * change
+        state = model.step(state, np.zeros((1, 3)))
+    assert (orientation(state[0], angles).inv() * attitude).magnitude() < 1e-7
+    np.testing.assert_allclose(state[0, rates], rate, rtol=1e-12)
+
+
+def test_a_body_that_points_straight_up_stays_finite(body):
+    _, angles, rates = body
+    state = np.zeros((1, 6))
+    state[0, angles[1]], state[0, rates] = np.pi / 2, 1.0
+    assert np.isfinite(spinning(body).step(state, np.zeros((1, 3)))).all()
+
+
+@pytest.mark.parametrize("kinematics", [([0, 1, 2], [3, 4, 4]), ([0, 1, 2], [3, 4, 6])])
+def test_a_body_of_states_that_there_are_none_of_is_refused(kinematics):
+    with pytest.raises(ValueError, match="six different states"):
+        _core.Signals(0.01, [1.0] * 6, [(-1.0, 1.0)], [1.0], [None] * 6, kinematics)
+
+
+# Tuning
+
+
+SENSOR = 4e-4
+"""Variance of the speed's sensor."""
+
+
+def lagging(a, b, lag):
+    """speed' = a speed + b u behind a lag, as a model with two constants."""
+    signals = _core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None])
+    text = program_text(2, 1, 4, [["r2 = r0 * " + repr(a), "r3 = r1 * " + repr(b), "r2 = r2 + r3"]])
+    return _core.Model(_core.Program.parse(text), "acceleration", signals, [(lag, 0, 0.0)])
+
+
+def flown(seed, steps=120, truth=(-1.3, 2.0, 0.12)):
+    """A noisy run of the true plant under commands that change now and then."""
+    a, b, lag = truth
+    stream = np.random.default_rng(seed)
+    commands = np.repeat(stream.uniform(-2.0, 2.0, (steps // 10, 1)), 10, axis=0)
+    states = loop(a, b, lag, commands, np.array([0.5]), lambda x, k: (x, 0.0))[1]
+    readings = states + np.sqrt(SENSOR) * stream.normal(size=states.shape)
+    return readings, np.ones_like(readings), commands
+
+
+def loop(a, b, lag, commands, state, correct):
+    """Innovations and states of the model, each state corrected after its reading."""
+    line, errors, states = Line(lag, 0, 0.0), [], []
+    for k in range(len(commands) + 1):
+        state, error = correct(state, k)
+        errors.append(error)
+        states.append(state)
+        if k < len(commands):
+            start, middle, end = line.effects(commands[k, 0], DT)
+            stages = iter([start, middle, middle, end])
+            state = rk4(lambda x, stages=stages: a * x + b * next(stages), np.asarray(state), DT)
+    return np.array(errors), np.array(states)
+
+
+def residuals(values, records):
+    """What tuning should make small: errors of a filter that only has to find out where a run began."""
+    found = []
+    for readings, weights, commands in records:
+        spread, gains = np.abs(readings).max() ** 2, []
+        for weight in weights[:, 0]:
+            variance = SENSOR if weight else 1e12 * SENSOR
+            gains.append((spread / (spread + variance), np.sqrt(spread + variance)))
+            spread *= 1.0 - gains[-1][0]
+
+        def correct(state, k, readings=readings, gains=gains):
+            gain, size = gains[k]
+            innovation = readings[k] - state
+            return state + gain * innovation, float(innovation[0] / size)
+
+        errors = loop(*values, commands, readings[0], correct)[0]
+        found.append(np.where(weights[:, 0] > 0.0, errors, 0.0))
+    return np.concatenate(found)
+
+
+CHAIN = [([0], [SENSOR], QUIET, True)]
+
+
+def test_constants_and_a_lag_are_those_that_scipy_finds():
+    records = [flown(1), flown(2)]
+    start = (-0.8, 1.5, 0.2)
+    tuned, left, readings, covariance, members = _core.tune(
+        lagging(*start), CHAIN, records, free=[0, 1], lags=[[0]], iterations=30, draws=400, seed=3
+    )
+    expected = least_squares(residuals, start, args=(records,), xtol=1e-12, ftol=1e-12)
+    errors = np.sqrt(np.diag(np.linalg.inv(expected.jac.T @ expected.jac)))
+    found = np.array([*tuned.constants, tuned.actuators[0][0]])
+    assert (np.abs(found - expected.x) < 0.05 * errors).all()
+    assert (np.abs(found - [-1.3, 2.0, 0.12]) < 4.0 * errors).all()
+    assert left == pytest.approx(2.0 * expected.cost, rel=1e-4) and readings == 242
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), errors, rtol=1e-2)
+    drawn = np.array([[*member.constants, member.actuators[0][0]] for member in members])
+    np.testing.assert_allclose(np.cov(drawn.T), covariance, rtol=0.3, atol=0.1 * covariance.max() * 0.1)
+
+
+def test_predictions_are_those_of_a_plain_loop_and_a_reading_that_does_not_count_is_not_used():
+    readings, weights, commands = flown(4)
+    weights[37], readings[37] = 0.0, 3.0
+    values = (-1.2, 1.9, 0.1)
+    [(errors, states)] = _core.predictions(lagging(*values), CHAIN, [(readings, weights, commands)])
+    np.testing.assert_allclose(errors[:, 0], residuals(values, [(readings, weights, commands)]), atol=1e-6)
+    assert errors[37, 0] == 0.0 and abs(states[37, 0] - 3.0) > 0.5
+    _, left, counted, _, _ = _core.tune(
+        lagging(*values), CHAIN, [(readings, weights, commands)], free=[], lags=[], iterations=5
+    )
+    assert left == pytest.approx((errors**2).sum(), rel=1e-9) and counted == 120
+
+
+def test_only_what_is_free_moves_and_the_rest_stays_to_the_bit():
+    start = (-0.8, 2.0, 0.12)
+    tuned, left, *_ = _core.tune(lagging(*start), CHAIN, [flown(1)], free=[0], lags=[], iterations=30)
+    assert tuned.constants[1] == 2.0 and tuned.actuators == [(0.12, 0, 0.0)]
+    assert tuned.constants[0] == pytest.approx(-1.3, rel=0.05)
+    assert left < (residuals(start, [flown(1)]) ** 2).sum()
+    same, *_ = _core.tune(lagging(*start), CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=0)
+    assert same.constants.tolist() == [-0.8, 2.0]
+
+
+def test_a_model_that_diverges_is_told_as_such():
+    wild = lagging(40.0, 2.0, 0.1)
+    _, left, _, covariance, members = _core.tune(
+        wild, CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=5, draws=2
+    )
+    assert left == np.inf and covariance.size == 0
+    assert [member.constants.tolist() for member in members] == [[40.0, 2.0]] * 2
+    assert _core.predictions(wild, CHAIN, [flown(1)]) is None
+
+
+def test_tuning_gives_the_same_bits_for_any_workers():
+    def bits(workers):
+        model, left, _, covariance, members = _core.tune(
+            lagging(-0.8, 1.5, 0.2), CHAIN, [flown(1), flown(2)], free=[0, 1], lags=[[0]], iterations=6, draws=3,
+            workers=workers,
+        )  # fmt: skip
+        return [*model.constants, left, *covariance.ravel(), *(c for m in members for c in m.constants)]
+
+    expected = bits(_core.Workers())
+    for workers in [_core.Workers(threads=2), *(_core.Workers(width=w) for w in _core.vector_widths())]:
+        assert same_bits(bits(workers), expected)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"chains": [([0], [0.0], QUIET, True)]},
+        {"chains": [([1], [1.0], QUIET, True)]},
+        {"chains": []},
+        {"chains": [([0], [1.0, 1.0], QUIET, True)]},
+        {"free": [2]},
+        {"lags": [[1]]},
+        {"records": [(np.zeros((4, 1)), np.zeros((4, 1)), np.zeros((4, 1)))]},
+    ],
+)
+def test_parts_that_do_not_fit_the_model_are_refused(wrong):
+    given = {"chains": CHAIN, "records": [flown(1)], "free": [0], "lags": [], **wrong}
+    with pytest.raises(ValueError, match="expected"):
+        _core.tune(lagging(-1.0, 1.0, 0.1), given.pop("chains"), given.pop("records"), iterations=1, **given)
