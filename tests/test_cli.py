@@ -17,6 +17,13 @@ from twinloop.cli import main
 PAPER = ["run", "quadrotor", "--preset", "paper"]
 SMALL = [*PAPER, "--generations", "30", "--experiments", "2", "--set", "model_population=40"]
 
+QUICK = [
+    "run", "quadrotor", "--noise", "0.001", "--experiments", "2", "--set", "moves=1000", "--set", "generations=0",
+    "--set", "lags=false", "--set", "libraries=linear,quadratic", "--set", "evaluations=200", "--set", "passes=1",
+    "--set", "committee_size=3", "--set", "tuning_steps=5", "--set", "candidates=8",
+]  # fmt: skip
+"""The preset `default` with little work."""
+
 
 def twinloop_command(*arguments, **how):
     return subprocess.run(
@@ -133,6 +140,85 @@ def test_progress_goes_to_standard_error_alone():
     assert "quadrotor" in done.stderr
 
 
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory):
+    """What the preset `default` answers: standard output, standard error, the picture."""
+    picture = tmp_path_factory.mktemp("identified") / "runs.svg"
+    done = twinloop_command(*QUICK, "--json", "--plot", str(picture))
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr, picture
+
+
+def test_the_preset_default_is_what_runs_by_default(identified):
+    result = json.loads(identified[0])
+    assert (result["preset"], result["goal"], result["quality"]["kind"]) == ("default", "both", "iae")
+    assert len(result["experiments"]) == 2 and [r["iteration"] for r in result["iterations"]] == [1, 2]
+    assert any(line.startswith("d roll_rate / dt = ") for line in result["twin"]["equations"])
+    assert result["iterations"][0]["asked"][0]["flown"] == result["experiments"][1]["measured"]
+
+
+def test_predictions_stand_beside_what_was_flown(identified):
+    flight = json.loads(identified[0])["experiments"][1]
+    assert flight["predicted_minus_measured"] == pytest.approx(flight["predicted"] - flight["measured"])
+    assert flight["spread"] >= 0.0 and 0.0 < flight["risk"] < 1.0 and flight["why"]
+
+
+def test_advice_compares_what_is_gained_with_what_can_be_measured(identified):
+    advice = json.loads(identified[0])["advice"]
+    assert advice["before_test"] == 1 and advice["scatter"] > 0.0
+    assert advice["stop"] is (advice["gain"] <= advice["scatter"])
+
+
+def test_equal_runs_of_default_are_equal_and_say_it_in_words(identified, tmp_path):
+    file = tmp_path / "result.json"
+    again = invoke(*QUICK, "--output", str(file), "--threads", "1")
+    same_but_for_run_info(identified[0], file.read_text(encoding="utf-8"))
+    for words in (
+        "CONTROLLER TO FLY",
+        "predicted − flown",
+        "noise of the sensor",
+        "ANOTHER EXPERIMENT?",
+        "rad s",
+    ):
+        assert words in again.stdout
+
+
+def test_progress_of_default_is_plain_lines_where_there_is_no_terminal(identified):
+    assert "quadrotor: flying experiment 1 of 2" in identified[1]
+    assert "\x1b" not in identified[1]
+
+
+def test_the_picture_of_default_shows_the_band(identified):
+    text = identified[2].read_text(encoding="utf-8")
+    assert "90 % band of the twin" in text and "of the readings inside the band" in text
+
+
+def test_goal_quality_and_the_harsh_vehicle_reach_the_campaign():
+    done = invoke(
+        *QUICK[:2],
+        *QUICK[6:],
+        "--experiments",
+        "1",
+        "--harsh",
+        "--goal",
+        "model",
+        "--quality",
+        "ise",
+        "--json",
+    )
+    result = json.loads(done.stdout)
+    assert (result["goal"], result["quality"]) == ("model", {"kind": "ise", "unit": "rad² s"})
+    assert result["system"]["motor_lag"] == 0.03 and result["system"]["noise"] == 1e-3
+    assert result["advice"]["gain"] is None  # nobody was asked for a flight
+
+
+def test_generations_belong_to_the_preset_paper():
+    done = invoke("run", "quadrotor", "--generations", "30")
+    assert done.exit_code == 2 and "choose --preset paper" in done.stderr
+    other = invoke("run", "quadrotor", "--set", "pages=3")
+    assert other.exit_code == 2 and "--preset paper" in other.stderr
+
+
 def test_help_and_version_are_answers():
     assert "run" in invoke().stdout and "reproduce" in invoke("--help").stdout
     version = invoke("--version")
@@ -145,13 +231,23 @@ MISUSE = {
     "no system": ["run"],
     "an unknown option": ["run", "quadrotor", "--generation", "3"],
     "an unknown preset": ["run", "quadrotor", "--preset", "papr"],
-    "an unknown setting": ["run", "quadrotor", "--set", "pagez=3"],
-    "a setting without a value": ["run", "quadrotor", "--set", "pages"],
-    "a setting of another type": ["run", "quadrotor", "--set", "pages=three"],
-    "a setting that the engine refuses": ["run", "quadrotor", "--set", "operations=+,pow"],
+    "an unknown goal": ["run", "quadrotor", "--goal", "controll"],
+    "an unknown quality": ["run", "quadrotor", "--quality", "itae"],
+    "a quality that the paper does not have": [*PAPER, "--quality", "iae"],
+    "generations of another preset": ["run", "quadrotor", "--generations", "3"],
+    "generations of tests of another preset": ["run", "quadrotor", "--test-generations", "3"],
+    "the harsh vehicle with other signs": ["run", "quadrotor", "--harsh", "--gyroscopic", "print"],
+    "a setting of another preset": ["run", "quadrotor", "--set", "pages=3"],
+    "a setting of default that is unknown": ["run", "quadrotor", "--set", "movez=3"],
+    "a setting of default of another type": ["run", "quadrotor", "--set", "lags=perhaps"],
+    "an unknown library": ["run", "quadrotor", "--set", "libraries=quartic"],
+    "an unknown setting": [*PAPER, "--set", "pagez=3"],
+    "a setting without a value": [*PAPER, "--set", "pages"],
+    "a setting of another type": [*PAPER, "--set", "pages=three"],
+    "a setting that the engine refuses": [*PAPER, "--set", "operations=+,pow"],
     "unknown signs": ["run", "quadrotor", "--gyroscopic", "metric"],
-    "no generations": ["run", "quadrotor", "--generations", "0"],
-    "generations in words": ["run", "quadrotor", "--generations", "many"],
+    "no generations": [*PAPER, "--generations", "0"],
+    "generations in words": [*PAPER, "--generations", "many"],
     "no experiments": ["run", "quadrotor", "--experiments", "0"],
     "no threads": ["run", "quadrotor", "--threads", "0"],
     "a negative seed": ["run", "quadrotor", "--seed", "-1"],
@@ -183,7 +279,7 @@ def test_misuse_exits_with_2_and_one_line_that_says_why(tmp_path, monkeypatch, c
 def test_misuse_in_a_process_of_its_own_leaves_no_traceback():
     done = twinloop_command(*PAPER, "--set", "pagez=3")
     assert done.returncode == 2 and done.stdout == ""
-    assert done.stderr == "twinloop: Unknown option 'pagez': did you mean 'pages'?\n"
+    assert done.stderr == "twinloop: Unknown option of the preset 'paper' 'pagez': did you mean 'pages'?\n"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from twinloop.console import Estimate, duration
 from twinloop.history import Progress
 from twinloop.presets import options_of
 from twinloop.result import plain, to_json
-from twinloop.text import table
+from twinloop.text import quality_words, render, table
 
 
 @pytest.mark.parametrize(
@@ -55,3 +55,63 @@ def test_the_time_left_shrinks_to_nothing_with_the_work(monkeypatch):
     assert estimate.remaining(progress("experiment", 0, 0, 0)) is None
     left = [estimate.remaining(progress("models", 1, generation, 10)) for generation in range(1, 11)]
     assert left == pytest.approx([9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0])
+
+
+def result_of_default(**advice):
+    """The least that `render` needs of a run of the preset `default`."""
+    return {
+        "system": {"name": "rig"}, "preset": "default", "seed": 7, "interrupted": False,
+        "quality": {"kind": "iae", "unit": "rad s"},
+        "signals": {"states": [{"unit": "rad"}, {"unit": "rad/s"}]},
+        "experiments": [
+            {
+                "test": 0, "ended": "aborted", "reason": "rate above 12", "open_loop": 1e-4, "closed_loop": 1e-3,
+                "normalised": 0.1, "normalised_before": None, "predicted": None, "spread": None, "measured": None,
+                "predicted_minus_measured": None, "risk": None, "why": "", "excited": True,
+            }
+        ],
+        "twin": {
+            "equations": ["d rate / dt = torque"], "terms": 1, "committee": 1, "misfit": 1.0, "readings": 80,
+            "ignored": 0, "remarks": ["Fly another test before you trust it."],
+            "states": [{"name": "angle", "unit": "rad", "error": 2e-3, "sensor": 1e-3}],
+            "disturbances": [{"name": "rate", "unit": "rad/s", "white": 0.0, "lasting": 0.5, "memory": 0.2}],
+            "actuators": [{"name": "torque", "lag": 0.03, "delay": 1}],
+        },
+        "controller": {
+            "test": 1, "flown": False, "why": "Tuned on the twin.", "predicted": 0.9, "spread": 0.1,
+            "measured": None, "risk": 0.01,
+            "gains": [{"name": "angle.kp", "value": 2.0, "unit": "N m/rad", "low": 0.0, "high": 6.0}],
+        },
+        "first_controller": {"gains": {"angle.kp": 1.0}, "predicted": 2.0, "measured": None},
+        "advice": {"before_test": 1, "gain": 0.5, "share": 0.25, "scatter": 0.1, "stop": False} | advice,
+        "run_info": {},
+    }  # fmt: skip
+
+
+def test_a_result_of_default_says_what_a_person_must_know():
+    text = render(result_of_default())
+    for words in (
+        "torque: lag 0.03 s, delay 1 period.", "rate 0.5 (rad/s)/s that lasts 0.2 s", "It was cut: rate above 12.",
+        "CONTROLLER TO FLY: NOT FLOWN YET", "rad², (rad/s)²", "Fly another test before you trust it.",
+    ):  # fmt: skip
+        assert words in text
+
+
+@pytest.mark.parametrize(
+    ("advice", "words"),
+    [
+        (
+            {},
+            "0.5 rad s, 25 % of what is flown now.\nThat is above the scatter of one measurement, 0.1 rad s",
+        ),
+        ({"gain": 0.01, "share": None, "stop": True}, "by 0.01 rad s.\nThat is below the scatter"),
+        ({"gain": None}, "No committee was asked for a flight yet"),
+    ],
+)
+def test_advice_to_stop_is_given_where_a_gain_could_not_be_measured(advice, words):
+    assert words in render(result_of_default(**advice))
+
+
+def test_a_quality_without_a_unit_is_named_without_one():
+    assert quality_words("ise", "") == "integrated squared error"
+    assert quality_words("iae", "rad s") == "integrated absolute error (rad s)"

@@ -1,0 +1,71 @@
+"""Progress: how much time is left, and what a person is shown meanwhile."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from twinloop.console import STEPS, StepEstimate, Watch
+from twinloop.history import Progress
+from twinloop.methods.identification import STEPS as DONE
+from twinloop.presets import options_of
+
+
+def progress(phase, told, tests=(), errors=()):
+    number = list(STEPS).index(phase) + 1 if phase in STEPS else 0
+    return Progress(phase, told, number, len(STEPS), told, tests, (), errors, 8, 0)
+
+
+def flown(experiments):
+    """All that a campaign reports, in order."""
+    for told in range(experiments + 1):
+        for step in STEPS if told else ():
+            if not (told == experiments and step == "candidates"):
+                yield progress(step, told)
+        if told < experiments:
+            yield progress("experiment", told)
+
+
+def test_every_step_of_the_preset_has_words_and_a_share():
+    assert tuple(STEPS) == tuple(DONE)
+
+
+def test_the_time_left_of_default_is_right_where_steps_take_their_usual_share(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("twinloop.console.time.monotonic", lambda: clock[0])
+    estimate = StepEstimate(experiments=3)
+    whole = sum(STEPS[p.phase][1] * (1 + p.told) for p in flown(3) if p.phase in STEPS)
+    told = []
+    for now in flown(3):
+        left = estimate.remaining(now)
+        if left is not None:
+            told.append((clock[0], left))
+        clock[0] += STEPS[now.phase][1] * (1 + now.told) if now.phase in STEPS else 0.0
+    assert len(told) > 20
+    for moment, left in told:
+        assert moment + left == pytest.approx(whole)
+
+
+def test_nothing_is_said_of_the_time_left_before_anything_is_known():
+    assert StepEstimate(experiments=2).remaining(progress("experiment", 0)) is None
+
+
+def test_a_slow_step_never_makes_the_time_left_negative(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("twinloop.console.time.monotonic", lambda: clock[0])
+    estimate = StepEstimate(experiments=1)
+    estimate.remaining(progress("noise", 1))
+    clock[0] = 0.1
+    estimate.remaining(progress("actuators", 1))
+    clock[0] = 1000.0
+    assert estimate.remaining(progress("actuators", 1)) >= 0.0
+
+
+def test_the_table_on_a_terminal_names_the_step_and_the_errors():
+    watch = Watch(options_of("default"), 4, "quadrotor")
+    watch(progress("terms", 2, (0, 1), (1.5e-5, 2e-5)))
+    screen = Console(file=io.StringIO(), width=120)
+    screen.print(watch._now())
+    shown = screen.file.getvalue()
+    for words in ("quadrotor", "2 of 4", "3 of 8, selecting terms", "closed loop", "2e-05"):
+        assert words in shown

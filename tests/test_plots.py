@@ -1,0 +1,69 @@
+"""Pictures of a campaign: what was flown, what was foretold, and equal files for equal campaigns."""
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from twinloop.plots import campaign_picture
+
+QUICK = {
+    "moves": 1000,
+    "generations": 0,
+    "lags": False,
+    "libraries": ("linear", "quadratic"),
+    "evaluations": 200,
+    "passes": 1,
+    "committee_size": 3,
+    "tuning_steps": 5,
+    "candidates": 8,
+}
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    """Two flights of a noisy quadrotor, the first of them cut."""
+    system = tl.systems.Quadrotor(noise=1e-3)
+    found = tl.Campaign(
+        system.signals,
+        controller=system.controller,
+        initial_state=system.initial_state,
+        target_state=system.target_state,
+        duration=system.duration,
+        options=QUICK,
+    )
+    test = found.test(system.default_gains)
+    run = system.run(test)
+    found.tell(
+        test, tl.Trajectory(run.t[:81], run.states[:81], run.commands[:80], ended="aborted", reason="cut")
+    )
+    return found.run(system, experiments=2)
+
+
+def picture(campaign, path):
+    campaign_picture(campaign, path, "integrated absolute error (rad s)")
+    return path.read_text(encoding="utf-8")
+
+
+def test_a_flight_that_was_cut_and_one_that_was_not_are_both_drawn(campaign, tmp_path):
+    text = picture(campaign, tmp_path / "runs.svg")
+    for words in (
+        "test 0",
+        "test 1",
+        "90 % band of the twin",
+        "predicted ± spread",
+        "integrated absolute error",
+    ):
+        assert words in text
+
+
+def test_the_same_campaign_is_drawn_as_the_same_file(campaign, tmp_path):
+    assert len({picture(campaign, tmp_path / "runs.svg") for _ in range(4)}) == 1
+
+
+def test_the_share_inside_the_band_is_counted_from_the_readings(campaign, tmp_path):
+    run = campaign.experiments[1]
+    low, high = campaign.twin.simulate(run.test).band
+    rows = min(len(low), len(run.trajectory.states))
+    inside = (run.trajectory.states[1:rows] >= low[1:rows]) & (run.trajectory.states[1:rows] <= high[1:rows])
+    share = f"{100.0 * np.mean(inside):.0f} % of the readings inside the band"
+    assert share in picture(campaign, tmp_path / "runs.svg")
