@@ -20,9 +20,9 @@ campaign = tl.Campaign(
     initial_state=np.zeros(6),
     target_state=np.deg2rad([-20.0, 20.0, 0.0, 0.0, 0.0, 0.0]),
     duration=2.0,
-    options={"model_generations": 100, "control_quality": True},
+    goal="control",
 )
-campaign.run(system, experiments=3)
+campaign.run(system, experiments=2)
 
 for gain, value in zip(campaign.family.gains, campaign.best_test.genes, strict=True):
     print(f"{gain.name:10} {value:8.4f} {gain.unit}")

@@ -33,7 +33,6 @@ campaign = tl.Campaign(
     initial_state=[0.0, 0.0],
     target_state=[1.0, 0.0],
     duration=2.0,
-    options={"model_generations": 300},
 )
 campaign.test({"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3})  # flown first
 campaign.run(rig, experiments=3)

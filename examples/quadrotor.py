@@ -10,18 +10,21 @@ campaign = tl.Campaign(
     target_state=system.target_state,
     duration=system.duration,
     seed=0,
-    options={"model_generations": 200},  # leave this line out for the paper's 15 000
 )
 
-first = campaign.test(system.default_gains)  # a controller that we already trust
+first = campaign.test(system.default_gains)  # a controller that we already trust, gently excited
 campaign.tell(first, system.run(first))
 
-for _ in range(3):
-    test = campaign.ask()  # learns models, then picks the test on which they disagree
+for _ in range(2):
+    test = campaign.ask()  # learns a twin and a committee, then plans the next flight
+    print(f"predicted {test.predicted:.3g} ± {test.spread:.1g}, risk {test.risk:.2g}. {test.reason}")
     campaign.tell(test, system.run(test))
 
 print(campaign.twin.equations())
 print(campaign.twin.errors)
-best = campaign.best_test
-print(f"test {best.number}: predicted {best.predicted:.3g}, measured {best.measured:.3g}")
+best = campaign.best_test  # the controller to fly, without excitation
+print(f"test {best.number}: predicted {best.predicted:.3g}, measured {best.measured}. {best.reason}")
 print(campaign.controller.parameters)
+
+simulated = campaign.twin.simulate(best)  # with the band in which nine of ten readings are expected
+print(simulated.states[-1], simulated.band[:, -1])
