@@ -1,0 +1,326 @@
+"""Regression on whitened features beside dense matrices, and the search over subsets beside all of them."""
+
+import itertools
+from functools import cached_property
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag, expm
+from scipy.stats import multivariate_normal
+
+from oracles import same_bits
+from twinloop import _core
+
+DT = 0.05
+QUIET = (0.0, 0.0, 1.0)
+
+
+class Dense:
+    """A chain of states written as one big normal distribution: what reading after reading of a filter should give."""
+
+    def __init__(self, states, integrated, dt=DT):
+        self.states, self.integrated, self.dt = states, integrated, dt
+        self.drift = np.diag(np.ones(states - 1), -1) if integrated else np.zeros((states, states))
+        self.transition = expm(self.drift * dt)
+
+    def disturbance(self, variance):
+        """Covariance of what white noise adds in a period, by quadrature."""
+        if not self.integrated:
+            return np.diag([variance] + [0.0] * (self.states - 1))
+        places, weights = np.polynomial.legendre.leggauss(8)
+        columns = [expm(self.drift * 0.5 * self.dt * (1 + s))[:, 0] for s in places]
+        return (
+            variance * 0.5 * self.dt * sum(w * np.outer(c, c) for w, c in zip(weights, columns, strict=True))
+        )
+
+    @cached_property
+    def reach(self):
+        """What a held disturbance of 1 adds in a period, by quadrature."""
+        if not self.integrated:
+            return np.eye(self.states)[0]
+        places, weights = np.polynomial.legendre.leggauss(8)
+        columns = [expm(self.drift * 0.5 * self.dt * (1 + s))[:, 0] for s in places]
+        return 0.5 * self.dt * sum(w * c for w, c in zip(weights, columns, strict=True))
+
+    def covariance(self, steps, spread, sensors, motion):
+        """Of all readings ((steps + 1) states)², from the map of every independent disturbance to them."""
+        white, gust, memory = motion
+        d, kept = self.states, np.exp(-self.dt / memory)
+        sources = [np.diag(np.square(spread))] + [self.disturbance(white)] * steps
+        columns = []
+        for k in range(steps + 1):  # a move of the states that comes with row k
+            block = np.zeros(((steps + 1) * d, d))
+            moved = np.eye(d)
+            for row in range(k, steps + 1):
+                block[row * d : (row + 1) * d] = moved
+                moved = self.transition @ moved
+            columns.append(block)
+        ways = np.hstack(columns)
+        total = ways @ block_diag(*sources) @ ways.T + np.diag(np.tile(sensors, steps + 1))
+        if gust > 0.0:
+            place = np.arange(steps)
+            lasting = gust * kept ** np.abs(place[:, None] - place[None, :])
+            pushes = np.stack([columns[k + 1] @ self.reach for k in range(steps)], axis=1)
+            total += pushes @ lasting @ pushes.T
+        return total
+
+    def responses(self, start, middle, end):
+        """What each feature alone does to the states ((steps + 1) states, p), by Simpson's rule in each period."""
+        steps, p = start.shape
+        state, rows = np.zeros((self.states, p)), [np.zeros((self.states, p))]
+        for k in range(steps):
+            state = self.transition @ state
+            for m in range(self.states):
+                if self.integrated:
+                    kernel = [(self.dt - s) ** m / max(1, m * (m - 1)) for s in (0, self.dt / 2, self.dt)]
+                    simpson = kernel[0] * start[k] + 4 * kernel[1] * middle[k] + kernel[2] * end[k]
+                    state[m] += self.dt / 6 * simpson
+                elif m == 0:
+                    state[m] += start[k]
+            rows.append(state.copy())
+        return np.concatenate(rows)
+
+
+def drawn(dense, seed, steps=30, p=3, runs=2, sensors=1e-3, ignored=0):
+    """Records of smooth features and the readings that they and noise give, with their coefficients."""
+    stream = np.random.default_rng(seed)
+    truth = stream.normal(size=p)
+    records = []
+    for _ in range(runs):
+        waves = stream.uniform(0.5, 6.0, p), stream.uniform(0.0, 6.0, p)
+        t = dense.dt * np.arange(steps)[:, None]
+        stages = [np.sin(waves[0] * (t + h) + waves[1]) for h in (0.0, dense.dt / 2, dense.dt)]
+        measured = (dense.responses(*stages) @ truth).reshape(steps + 1, dense.states)
+        measured = measured + sensors * stream.normal(size=measured.shape) + stream.normal(size=dense.states)
+        weights = np.ones_like(measured)
+        weights.flat[stream.choice(measured.size, ignored, replace=False)] = 0.0
+        records.append((measured, weights, *stages))
+    return records, truth
+
+
+CASES = [(1, False), (1, True), (2, True), (3, True)]
+MOTIONS = [QUIET, (1e-3, 0.0, 1.0), (1e-4, 0.05, 0.2)]
+
+
+def dense_problem(dense, records, sensors, motion):
+    """Readings, responses and Cholesky factors of the covariance of each record, rows that count only."""
+    parts = []
+    for measured, weights, *stages in records:
+        spread = np.abs(measured).max(axis=0)
+        covariance = dense.covariance(len(measured) - 1, spread, sensors, motion)
+        rows = np.flatnonzero(weights.ravel())
+        parts.append((measured.ravel()[rows], dense.responses(*stages)[rows], covariance[np.ix_(rows, rows)]))
+    return parts
+
+
+@pytest.mark.parametrize("motion", MOTIONS, ids=["quiet", "white", "gusts"])
+@pytest.mark.parametrize(("states", "integrated"), CASES)
+@pytest.mark.parametrize("ignored", [0, 5])
+def test_least_squares_are_those_of_the_whole_covariance(states, integrated, motion, ignored):
+    dense = Dense(states, integrated)
+    records, _ = drawn(dense, 3, ignored=ignored)
+    sensors = np.array([1e-3, 4e-3, 2e-3])[:states]
+    regression = _core.Regression(states, DT, integrated, records)
+    gram = regression.gram(sensors, motion)
+    assert gram.features == 3 and gram.readings == sum(int(r[1].sum()) for r in records)
+    left, right = [], []
+    for z, f, covariance in dense_problem(dense, records, sensors, motion):
+        factor = np.linalg.cholesky(covariance)
+        left.append(np.linalg.solve(factor, f))
+        right.append(np.linalg.solve(factor, z))
+    matrix, target = np.concatenate(left), np.concatenate(right)
+    assert gram.total == pytest.approx(target @ target, rel=1e-6)
+    for subset in ([0], [2, 0], [0, 1, 2]):
+        expected, rest, *_ = np.linalg.lstsq(matrix[:, subset], target, rcond=None)
+        coefficients, covariance, chi = gram.solve(subset)
+        np.testing.assert_allclose(coefficients, expected, rtol=1e-5, atol=1e-7)
+        assert chi == pytest.approx(rest[0], rel=1e-5)
+        inner = matrix[:, subset].T @ matrix[:, subset]
+        np.testing.assert_allclose(covariance, np.linalg.inv(inner), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize("motion", MOTIONS, ids=["quiet", "white", "gusts"])
+@pytest.mark.parametrize(("states", "integrated"), CASES)
+@pytest.mark.parametrize("ignored", [0, 5])
+def test_the_likelihood_is_that_of_one_big_normal_distribution(states, integrated, motion, ignored):
+    dense = Dense(states, integrated)
+    records, truth = drawn(dense, 4, ignored=ignored)
+    sensors = np.array([1e-3, 4e-3, 2e-3])[:states]
+    regression = _core.Regression(states, DT, integrated, records)
+    expected = 0.0
+    for z, f, covariance in dense_problem(dense, records, sensors, motion):
+        density = multivariate_normal(cov=covariance, allow_singular=False).logpdf(z - f @ truth)
+        expected += -2.0 * density - len(z) * np.log(2.0 * np.pi)
+    assert regression.likelihood(truth, sensors, motion) == pytest.approx(expected, rel=1e-6)
+    for found, (measured, _, *stages) in zip(regression.residuals(truth), records, strict=True):
+        np.testing.assert_allclose(
+            found.ravel(), measured.ravel() - dense.responses(*stages) @ truth, atol=1e-10
+        )
+
+
+def wandering(dense, sensors, motion, steps, seed):
+    """A record without features, drawn from the noise alone."""
+    white, gust, memory = motion
+    stream = np.random.default_rng(seed)
+    moves = stream.multivariate_normal(np.zeros(dense.states), dense.disturbance(white), size=steps)
+    kept, push = np.exp(-dense.dt / memory), np.sqrt(gust) * stream.normal()
+    state, states = np.zeros(dense.states), []
+    for k in range(steps + 1):
+        states.append(state)
+        if k < steps:
+            state = dense.transition @ state + moves[k] + dense.reach * push
+            push = kept * push + np.sqrt(gust * (1.0 - kept**2)) * stream.normal()
+    measured = np.array(states) + np.sqrt(sensors) * stream.normal(size=(steps + 1, dense.states))
+    nothing = np.zeros((steps, 1))
+    return measured, np.ones_like(measured), nothing, nothing, nothing
+
+
+@pytest.mark.parametrize(
+    ("states", "integrated", "sensors", "white"),
+    [(1, False, [1e-2], 1e-3), (1, True, [1e-3], 1e-2), (2, True, [1e-2, 1e-4], 0.05)],
+)
+def test_the_noise_that_made_a_record_is_found(states, integrated, sensors, white):
+    dense = Dense(states, integrated)
+    record = wandering(dense, np.array(sensors), (white, 0.0, 1.0), 1500, 5)
+    regression = _core.Regression(states, DT, integrated, [record])
+    low, none = np.full(states, 1e-12), (1e-12, 0.0, 1.0)
+    start = (30.0 * white, 0.0, 1.0)
+    found, motion, score = regression.most_likely_noise([0.0], np.full(states, 1e-3), start, low, none)
+    np.testing.assert_allclose(found, sensors, rtol=0.25)
+    assert motion[0] == pytest.approx(white, rel=0.35)
+    assert score == pytest.approx(regression.likelihood([0.0], found, motion), rel=1e-12)
+    assert score <= regression.likelihood([0.0], sensors, (white, 0.0, 1.0)) + 1.0
+
+
+def test_sensors_that_are_known_stay_and_no_variance_falls_below_its_floor():
+    dense = Dense(1, True)
+    record = wandering(dense, np.array([1e-4]), (1e-2, 0.0, 1.0), 300, 6)
+    regression = _core.Regression(1, DT, True, [record])
+    found, motion, _ = regression.most_likely_noise(
+        [0.0], [2e-4], (1e-3, 0.0, 1.0), [1e-9], (1e-9, 0.0, 1.0), True
+    )
+    assert found[0] == 2e-4 and motion[0] > 1e-3
+    found, motion, _ = regression.most_likely_noise([0.0], [1.0], (1.0, 0.0, 1.0), [0.5], (0.25, 0.0, 1.0))
+    assert found[0] == 0.5 and motion[0] == 0.25
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda r: _core.Regression(0, DT, True, [r]),
+        lambda r: _core.Regression(5, DT, True, [r]),
+        lambda r: _core.Regression(1, 0.0, True, [r]),
+        lambda r: _core.Regression(1, DT, True, [(r[0][:-1], *r[1:])]),
+        lambda r: _core.Regression(1, DT, True, [(np.full_like(r[0], np.nan), *r[1:])]),
+        lambda r: _core.Regression(1, DT, True, [r]).gram([0.0], QUIET),
+        lambda r: _core.Regression(1, DT, True, [r]).gram([1.0, 1.0], QUIET),
+        lambda r: _core.Regression(1, DT, True, [r]).gram([1.0], (-1.0, 0.0, 1.0)),
+        lambda r: _core.Regression(1, DT, True, [r]).gram([1.0], QUIET).solve([7]),
+        lambda r: _core.Regression(1, DT, True, [r]).likelihood([1.0, 2.0], [1.0], QUIET),
+    ],
+)
+def test_what_no_regression_can_be_made_of_is_refused(wrong):
+    records, _ = drawn(Dense(1, True), 0, runs=1)
+    with pytest.raises(ValueError, match="expected"):
+        wrong(records[0])
+
+
+# Subsets
+
+
+def problem(seed, p=8, twins=False, zero=False):
+    """A Gram matrix of correlated features of which three act, and what each costs."""
+    stream = np.random.default_rng(seed)
+    steps = 60
+    features = stream.normal(size=(steps, p)) @ (np.eye(p) + 0.5 * stream.normal(size=(p, p)))
+    if twins:
+        features[:, 1] = -3.0 * features[:, 0]
+    if zero:
+        features[:, 2] = 0.0
+    measured = np.zeros((steps + 1, 1))
+    measured[1:, 0] = np.cumsum(features[:, :3] @ stream.normal(size=3) + 0.3 * stream.normal(size=steps))
+    record = (measured, np.ones_like(measured), features, features, features)
+    gram = _core.Regression(1, 1.0, False, [record]).gram([1e-3], (0.1, 0.0, 1.0))
+    return gram, stream.uniform(1.0, 12.0, p)
+
+
+def energies(gram, prices, largest):
+    """Energy of every subset that has one."""
+    found = {}
+    for k in range(largest + 1):
+        for subset in itertools.combinations(range(gram.features), k):
+            solved = gram.solve(list(subset))
+            if solved is not None and np.isfinite(prices[list(subset)]).all():
+                found[subset] = solved[2] + prices[list(subset)].sum()
+    return found
+
+
+def searched(grams, prices, threads=1, **changes):
+    settings = {"moves": 3000, "largest": 8, "starts": 2, "seed": 1, "iteration": 0, **changes}
+    scales = [1.0] * len(grams)
+    return _core.search_subsets(grams, prices, scales, workers=_core.Workers(threads=threads), **settings)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("largest", [2, 8])
+def test_the_best_subset_is_the_best_of_all(seed, largest):
+    gram, prices = problem(seed)
+    known = energies(gram, prices, largest)
+    best = min(known, key=known.get)
+    found = searched([gram], [prices], largest=largest)[0]
+    assert tuple(found[0][0]) == best
+    values = [energy for _, energy in found]
+    assert values == sorted(values)
+    assert len({tuple(subset) for subset, _ in found}) == len(found)
+    for subset, energy in found:
+        assert len(subset) <= largest and subset == sorted(subset)
+        assert energy == pytest.approx(known[tuple(subset)], rel=1e-9)
+
+
+def test_a_term_that_is_forbidden_is_never_chosen():
+    gram, prices = problem(0)
+    free = searched([gram], [prices])[0]
+    out = free[0][0][0]
+    prices[out] = np.inf
+    found = searched([gram], [prices])[0]
+    assert found and all(out not in subset and np.isfinite(energy) for subset, energy in found)
+    known = energies(gram, prices, 8)
+    assert tuple(found[0][0]) == min(known, key=known.get)
+    nothing = searched([gram], [np.full(8, np.inf)])[0]
+    assert nothing == [([], pytest.approx(gram.total))]
+
+
+def test_collinear_and_empty_columns_are_handled():
+    gram, prices = problem(1, twins=True, zero=True)
+    assert gram.solve([0, 1]) is None and gram.solve([2]) is None
+    found = searched([gram], [prices])[0]
+    assert all(not {0, 1} <= set(subset) and 2 not in subset for subset, _ in found)
+    known = energies(gram, prices, 8)
+    assert tuple(found[0][0]) == min(known, key=known.get)
+    assert found[0][1] == pytest.approx(min(known.values()))
+
+
+def test_a_search_gives_the_same_bits_for_any_number_of_threads():
+    grams, prices = zip(*(problem(seed) for seed in range(3)), strict=True)
+    one, two = (searched(grams, prices, threads=threads, moves=400, starts=3) for threads in (1, 2))
+    assert [[s for s, _ in walk] for walk in one] == [[s for s, _ in walk] for walk in two]
+    for a, b in zip(one, two, strict=True):
+        assert same_bits([e for _, e in a], [e for _, e in b])
+    grown = [problem(seed)[0] for seed in range(3)]
+    assert all(same_bits([a.total], [b.total]) for a, b in zip(grams, grown, strict=True))
+    records, _ = drawn(Dense(2, True), 1, runs=5)
+    regression = _core.Regression(2, DT, True, records)
+    parts = [
+        regression.gram([1e-3, 1e-3], (1e-3, 0.0, 1.0), _core.Workers(threads=threads)).solve([0, 1, 2])
+        for threads in (1, 2)
+    ]
+    assert same_bits(parts[0][0], parts[1][0]) and same_bits(parts[0][1], parts[1][1])
+
+
+def test_a_search_without_terms_or_with_prices_for_others_says_so():
+    gram, prices = problem(2)
+    with pytest.raises(ValueError, match="a price for each feature"):
+        searched([gram], [prices[:-1]])
+    with pytest.raises(ValueError, match="at least 1 start"):
+        searched([gram], [prices], starts=0)
+    assert searched([gram], [prices], moves=0)[0] == [([], pytest.approx(gram.total))]
