@@ -9,6 +9,8 @@ from twinloop.identification.pool import Pool
 from twinloop.signals import Signals
 
 Terms = list[int]
+FRICTION = 30.0
+"""Steepness of dry friction at rest, in units of a speed's scale."""
 
 
 def linear(pool: Pool, signals: Signals) -> Terms:
@@ -22,11 +24,15 @@ def quadratic(pool: Pool, signals: Signals) -> Terms:
 
 
 def damping(pool: Pool, signals: Signals) -> Terms:
-    """|x| x of each input that has two signs and is no angle, each speed times the length of the vector of its kind."""
+    """|x| x of inputs with two signs that are no angles; dry friction; speeds times the length of their vector."""
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
     terms = [pool.product(pool.add(("abs", i, None)), i) for i in signed]
     for group in speeds(signals):
+        for i in group:
+            # Dry friction: a step at rest, of which tuning finds the width.
+            steep = pool.add(("*", i, FRICTION / signals.states[i].scale))
+            terms.append(pool.add(("tanh", steep, None)))
         if len(group) > 1:
             total = pool.product(group[0], group[0])
             for i in group[1:]:

@@ -19,7 +19,7 @@ from twinloop.methods.calibration import factor, needed_factor
 from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
-from twinloop.planning.planner import Committee, Planner, Task
+from twinloop.planning.planner import Committee, Planner, Task, expected
 from twinloop.presets import DefaultOptions
 from twinloop.setup import Setup
 from twinloop.test import Test
@@ -165,7 +165,9 @@ class IdentifyAndPlan:
         committee, flown = self._committee(), book.best().quiet()
         tuned = self._gains(book)
         genes = np.stack([tuned, flown.genes])
-        judged = self.planner.judge(committee.members, genes, committee.sds, self.options.draws)
+        judged = self.planner.judge(
+            self.planner.lasting(committee.members, genes), genes, committee.sds, self.options.draws
+        )
         measured = book.measured(flown.number)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < old).mean())
@@ -176,9 +178,10 @@ class IdentifyAndPlan:
         means = judged.qualities[:, :, pick].mean(axis=1)
         if pick == 1:
             reason = f"The best gains flown: the twin prefers others in {100 * better:.0f} % of its predictions only."
-            test = flown.judged(float(means.mean()), measured)
+            test = flown.judged(expected(means), measured)
         else:
-            reason = f"Tuned on the twin, which prefers them to the best flown in {100 * better:.0f} % of its predictions."
+            share = f"{100 * better:.0f} %"
+            reason = f"Tuned on the twin, which prefers them to the best flown in {share} of its predictions."
             number = len(book.tests) if known is None else known.number
             number_measured = None if known is None or known.excitation is not None else book.measured(number)
             test = Test(
@@ -190,7 +193,7 @@ class IdentifyAndPlan:
                 None,
                 number=number,
                 campaign=flown.campaign,
-                predicted=float(means.mean()),
+                predicted=expected(means),
                 measured=number_measured,
             )
         answer = test.explained(float(means.std()), self._risk(judged.usages[:, :, pick]), reason)

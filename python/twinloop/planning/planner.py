@@ -98,6 +98,15 @@ class Judged:
         return worst
 
 
+def expected(means: Floats) -> float:
+    """Quality that members expect on average, each by its mean (members,); infinite where one of them diverges.
+
+    Args:
+        means: of the members.
+    """
+    return float("inf") if bool((means >= HOPELESS / 1e3).any()) else float(means.mean())
+
+
 class Planner:
     """Judges flights on a committee.
 
@@ -154,6 +163,18 @@ class Planner:
         return Judged(
             np.where(np.isfinite(values), values, HOPELESS), np.where(np.isfinite(usages), usages, HOPELESS)
         )
+
+    def lasting(
+        self,
+        members: Sequence[_core.Model],
+        genes: Floats,
+        excitation: Floats | None = None,
+        ends: Ends | None = None,
+    ) -> list[_core.Model]:
+        """Members that do not blow up on half of the flights; the best one in any case."""
+        judged = self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
+        share = (judged.qualities >= HOPELESS).any(axis=1).mean(axis=1)
+        return [member for i, member in enumerate(members) if i == 0 or share[i] < 0.5]
 
     def noise(self, sds: Floats, draws: int) -> Floats | None:
         """The same draws of sensor noise for everybody (draws, n + 1, n_x); None for a single, quiet flight."""
@@ -263,10 +284,12 @@ class Planner:
         genes, excitation = self._candidates(tuned, goal, number, exploit)
         ends = self._ends(number, len(genes))
         self.watch("candidates", 0.0)
-        judged = self.judge(committee.members, genes, committee.sds, 1, excitation, ends)
+        # A member that blows up whatever is flown is no member (E-SINDy).
+        members = self.lasting(committee.members, genes, excitation, ends)
+        judged = self.judge(members, genes, committee.sds, 1, excitation, ends)
         flights = self._flights(genes, excitation, ends)
         values, where = disagreements(
-            committee.members, flights, np.maximum(committee.sds, self._smallest()), workers=self.workers
+            members, flights, np.maximum(committee.sds, self._smallest()), workers=self.workers
         )
         self.watch("candidates", 1.0)
         per_member = judged.qualities.mean(axis=1)
@@ -290,7 +313,7 @@ class Planner:
         gain = float((best - per_member[:, keeps].min(axis=1)).mean()) if keeps.any() else 0.0
         row, state, high, low = (int(i) for i in where[chosen])
         noisy = self.judge(
-            committee.members,
+            members,
             genes[[chosen]],
             committee.sds,
             self.options.draws,
@@ -301,13 +324,12 @@ class Planner:
         left = int((noisy.usages > 1.0).sum())
         flown = noisy.usages.size
         means = noisy.qualities.mean(axis=(1, 2))
-        diverges = bool((noisy.qualities >= HOPELESS).any())
         return Proposal(
             genes=genes[chosen],
             initial_state=ends[0][chosen],
             target_state=ends[1][chosen],
             excitation=excitation[chosen] if excitation[chosen].any() else None,
-            predicted=float("inf") if diverges else float(means.mean()),
+            predicted=expected(means),
             spread=float(means.std()),
             risk=(left + 0.5) / (flown + 1.0),
             safe=safe,
@@ -398,7 +420,7 @@ class Planner:
             sentences.append("All models agree: the flight confirms what is known.")
         if not safe:
             sentences.append(
-                "No candidate keeps the envelope with its margin on every model: this is the safest one."
-                " Fly it with a hand on the switch, or not at all."
+                "No candidate keeps the envelope with its margin, or lasts at all, on every model: this is the safest"
+                " one. Fly it with a hand on the switch, or not at all."
             )
         return " ".join(sentences)
