@@ -1,0 +1,311 @@
+"""Whole campaigns of the preset `default`: same bits, interruption, cut runs, and data that nobody would wish for."""
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from conftest import PENDULUM_GAINS
+from oracles import same_bits
+
+SMALL = {
+    "moves": 1500, "starts": 1, "generations": 0, "lags": False, "evaluations": 256, "candidates": 32,
+    "committee_size": 4, "tuning_steps": 4, "draws": 2, "tuning_starts": 1,
+}  # fmt: skip
+
+
+@pytest.fixture
+def begin(new_campaign):
+    """Makes small campaigns of the preset `default` on the pendulum."""
+
+    def make(**changes):
+        campaign_options = {**SMALL, **changes.pop("options", {})}
+        arguments = {"target_state": [1.0, 0.0], **changes}
+        return default_campaign(options=campaign_options, **arguments)
+
+    return make
+
+
+def default_campaign(options, **changes):
+    signals = changes.pop("signals", SIGNALS)
+    arguments = {
+        "controller": CONTROLLER, "initial_state": [0.0, 0.0], "duration": 1.0, "threads": 1,
+        "options": options, **changes,
+    }  # fmt: skip
+    return tl.Campaign(signals, **arguments)
+
+
+SIGNALS = tl.Signals(
+    [
+        tl.State("angle", "rad", scale=np.pi),
+        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
+    ],
+    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
+    dt=0.05,
+)
+CONTROLLER = tl.controllers.PID(
+    axes=[("angle", "rate")],
+    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
+)
+
+
+def outcome(campaign):
+    """Everything that a campaign found, as one comparable value."""
+    best = campaign.best_test
+    return (
+        [run.test.genes.tobytes() for run in campaign.experiments],
+        [run.trajectory.commands.tobytes() for run in campaign.experiments],
+        campaign.history,
+        [str(member.program) for member in campaign.committee],
+        best.genes.tobytes(),
+        best.predicted,
+        best.reason,
+    )
+
+
+def told(campaign, system, change=lambda run: run):
+    test = campaign.test(PENDULUM_GAINS)
+    campaign.tell(test, change(system.run(test)))
+    return campaign
+
+
+def test_the_default_preset_is_default(begin, pendulum):
+    campaign = begin()
+    assert campaign.setup.preset == "default" and campaign.setup.goal == "both"
+    assert campaign.setup.quality.kind == "iae"
+    campaign.run(pendulum, 2)
+    assert [record.iteration for record in campaign.history][-1] >= 1
+    with pytest.raises(tl.NotAvailable, match="expected the preset 'paper'"):
+        _ = campaign.models
+    assert campaign.committee[0] is not None and len(campaign.committee) <= 4
+
+
+def test_the_same_bits_for_one_thread_and_two(begin, pendulum):
+    assert outcome(begin(threads=2).run(pendulum, 3)) == outcome(begin(threads=1).run(pendulum, 3))
+
+
+def test_another_seed_is_another_campaign(begin, pendulum):
+    one, two = (begin(seed=seed).run(pendulum, 2) for seed in (1, 2))
+    assert not same_bits(one.experiments[1].test.genes, two.experiments[1].test.genes)
+
+
+def test_nothing_depends_on_numpys_global_random_state(begin, pendulum):
+    np.random.seed(1)
+    one = outcome(begin().run(pendulum, 2))
+    np.random.seed(2)
+    assert outcome(begin().run(pendulum, 2)) == one
+
+
+class StopAt:
+    """A progress callback that is Ctrl-C at its n-th call."""
+
+    def __init__(self, call):
+        self.left = call
+
+    def __call__(self, progress):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture(scope="module")
+def whole():
+    from conftest import pendulum_step
+
+    system = tl.systems.Simulated(SIGNALS, pendulum_step, default_gains=PENDULUM_GAINS)
+    return outcome(default_campaign(SMALL, target_state=[1.0, 0.0]).run(system, 3))
+
+
+@pytest.mark.parametrize("call", [1, 2, 3, 5, 7, 9, 12, 16, 20, 24])
+def test_an_interrupted_campaign_goes_on_with_the_same_bits(begin, pendulum, whole, call):
+    campaign = begin(progress=StopAt(call)).run(pendulum, 3)
+    assert campaign.interrupted
+    campaign.run(pendulum, 3)
+    assert not campaign.interrupted
+    assert outcome(campaign) == whole
+
+
+def test_an_interrupted_campaign_still_has_the_twin_that_it_had(begin, pendulum):
+    campaign = told(begin(), pendulum)
+    before = str(campaign.twin.model.program)
+    campaign.tell(*(lambda t: (t, pendulum.run(t)))(campaign.test(PENDULUM_GAINS)))
+    campaign.progress = StopAt(1)
+    with pytest.raises(KeyboardInterrupt):
+        _ = campaign.twin
+    assert campaign.interrupted and str(campaign.twin.model.program) == before
+
+
+# Arguments
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"goal": "contrl"}, "did you mean 'control'"),
+        ({"goal": "everything"}, "expected one of both, model, control"),
+        ({"quality": "iaee"}, "did you mean 'iae'"),
+        ({"operators": ["+", "pow"]}, "operator 'pow'"),
+        ({"operators": []}, None),
+        ({"options": {"libraries": ["lineal"]}}, "did you mean 'linear'"),
+        ({"options": {"libraries": [], "generations": 0}}, "found neither"),
+        ({"options": {"quality_weights": [1.0]}}, "expected 2 numbers"),
+        ({"options": {"candidates": 1}}, "expected 2 to"),
+        ({"options": {"margin": 1.0}}, "'margin'"),
+        ({"options": {"form": "acceleraton"}}, "did you mean 'acceleration'"),
+        ({"options": {"tests": "prsb"}}, "did you mean 'prbs'"),
+        ({"options": {"model_generations": 5}}, "option of the preset 'default'"),
+        ({"preset": "paper", "options": {}, "goal": "model"}, None),
+    ],
+)
+def test_arguments_that_cannot_be_used_are_refused(begin, changes, sentence):
+    if sentence is None and "goal" not in changes:
+        assert begin(**changes).options.operators == ()
+        return
+    with pytest.raises(tl.InvalidInput, match=sentence):
+        begin(**changes)
+
+
+def test_the_paper_knows_one_goal_and_one_quality(new_campaign):
+    for changes in ({"goal": "model"}, {"quality": "iae"}):
+        with pytest.raises(tl.InvalidInput, match='choose preset="default"'):
+            new_campaign(**changes)
+    assert new_campaign(goal="both", quality="final_distance", operators=["+"]).options.operations == ("+",)
+
+
+# The first test and what is asked after it
+
+
+def test_a_test_of_ones_own_is_gently_excited_unless_asked_otherwise(begin, new_campaign):
+    campaign = begin()
+    gentle, plain = campaign.test(PENDULUM_GAINS), campaign.test(PENDULUM_GAINS, excitation=None)
+    assert 0.0 < np.abs(gentle.excitation).max() <= 0.02 * 2.0 and plain.excitation is None
+    assert np.abs(gentle.excitation[-1]).max() <= 0.02 * 2.0 / 5.0 + 1e-12
+    own = np.full((20, 1), 0.1)
+    assert same_bits(campaign.test(PENDULUM_GAINS, excitation=own).excitation, own)
+    assert new_campaign().test(PENDULUM_GAINS).excitation is None
+    with pytest.raises(tl.InvalidInput, match="found 'wild'"):
+        campaign.test(PENDULUM_GAINS, excitation="wild")
+
+
+def test_two_asks_without_tell_give_two_tests_with_reasons(begin, pendulum):
+    campaign = told(begin(), pendulum)
+    one, two = campaign.ask(), campaign.ask()
+    assert not same_bits(one.genes, two.genes) or not same_bits(one.excitation, two.excitation)
+    for test in (one, two):
+        assert 0.0 < test.risk < 1.0 and test.spread >= 0.0 and test.reason
+    assert [plan.test for plan in campaign.history[-1].asked] == [one.number, two.number]
+    campaign.tell(two, pendulum.run(two))
+    plan = campaign.history[0].asked[1]
+    assert plan.flown == campaign.experiments[1].quality and plan.predicted == two.predicted
+
+
+def test_the_quality_of_an_experiment_is_what_was_asked_for(begin, pendulum):
+    for kind in ("iae", "ise", "final_distance"):
+        run = told(begin(quality=kind), pendulum).experiments[0]
+        errors = run.trajectory.states[1:] - [1.0, 0.0]
+        expected = {
+            "iae": 0.05 * np.abs(errors[:, 0]).sum(),
+            "ise": 0.05 * (errors[:, 0] ** 2).sum(),
+            "final_distance": np.sqrt((errors[-1] ** 2).sum()),
+        }[kind]
+        assert run.quality == pytest.approx(expected, rel=1e-12)
+
+
+# Data that nobody would wish for
+
+
+def cut(run, rows):
+    return tl.Trajectory(
+        run.t[:rows], run.states[:rows], run.commands[: rows - 1], ended="aborted", reason="stop"
+    )
+
+
+def changed(run, states=None, commands=None):
+    return tl.Trajectory(
+        run.t, run.states if states is None else states, run.commands if commands is None else commands
+    )
+
+
+def outlier(run):
+    states = np.array(run.states)
+    states[9, 1] += 6.0
+    return changed(run, states)
+
+
+DATA = {
+    "a run that was cut": lambda run: cut(run, 8),
+    "a first controller that crashes at once": lambda run: cut(run, 3),
+    "a run that never moves": lambda run: changed(
+        run, np.zeros_like(run.states), np.zeros_like(run.commands)
+    ),
+    "a state that is constant": lambda run: changed(run, run.states * [1.0, 0.0]),
+    "commands at their bound": lambda run: changed(run, commands=np.full_like(run.commands, 2.0)),
+    "one outlier": outlier,
+    "nothing but noise": lambda run: changed(run, np.random.default_rng(0).normal(size=run.states.shape)),
+}
+
+
+@pytest.mark.parametrize("case", DATA)
+def test_hard_data_are_learnt_from_and_something_is_asked(begin, pendulum, case):
+    campaign = told(begin(), pendulum, DATA[case])
+    for _ in range(2):
+        twin, best, test = campaign.twin, campaign.best_test, campaign.ask()
+        assert twin.equations() and np.isfinite(twin.predict([0.1, 0.1], [0.1])).all()
+        low = [gain.low for gain in campaign.family.gains]
+        high = [gain.high for gain in campaign.family.gains]
+        for genes in (best.genes, test.genes):
+            assert (genes >= low).all() and (genes <= high).all()
+        assert test.reason and 0.0 < test.risk <= 1.0
+        assert twin.simulate(test).states.shape[1] == 2
+        campaign.tell(test, pendulum.run(test))
+    assert len(campaign.twin.errors) == 3
+
+
+def test_a_run_that_was_cut_is_data_but_no_quality(begin, pendulum):
+    campaign = told(begin(), pendulum, DATA["a run that was cut"])
+    assert campaign.experiments[0].quality is None and campaign.experiments[0].final_distance is None
+    assert campaign.history == () and campaign.twin.errors[0].test == 0
+    assert campaign.history[0].readings == 16
+    test = campaign.ask()
+    campaign.tell(test, pendulum.run(test))
+    assert campaign.experiments[1].quality is not None
+
+
+def test_the_same_test_twice_is_a_replicate(begin, pendulum):
+    campaign = told(begin(), pendulum)
+    first = campaign.experiments[0].test
+    campaign.tell(first, pendulum.run(first))
+    assert [row.test for row in campaign.twin.errors] == [0, 0]
+    assert campaign.ask().number == 1
+
+
+def test_a_system_that_does_not_listen_is_handled(begin):
+    deaf = tl.systems.Simulated(SIGNALS, lambda x, u: (0.9 * x[0] + 0.01, 0.0), default_gains=PENDULUM_GAINS)
+    campaign = begin().run(deaf, 3)
+    assert len(campaign.experiments) == 3 and campaign.best_test.reason
+
+
+@pytest.mark.parametrize("tests", ["random", "chirp", "prbs"])
+def test_tests_that_no_committee_chose_are_flown(begin, pendulum, tests):
+    campaign = begin(options={"tests": tests}).run(pendulum, 2)
+    plan = campaign.history[0].asked[0]
+    assert "No committee" in plan.reason and plan.flown == campaign.experiments[1].quality
+    assert np.abs(campaign.experiments[1].test.excitation).max() > 0.0
+
+
+def test_the_last_experiment_of_a_budget_flies_the_best_gains_as_they_are(begin, pendulum):
+    campaign = begin().run(pendulum, 2)
+    assert campaign.experiments[1].test.excitation is None
+    assert campaign.experiments[1].test.reason.startswith("The best gains")
+    explored = begin(options={"exploit_last": False}).run(pendulum, 2)
+    assert not explored.experiments[1].test.reason.startswith("The best gains")
+
+
+def test_a_pendulum_is_learnt_and_flown_better_than_at_first(begin, pendulum):
+    campaign = begin(options={"moves": 4000, "evaluations": 1000}).run(pendulum, 3)
+    assert campaign.experiments[-1].quality <= campaign.experiments[0].quality
+    assert max(row.normalised for row in campaign.twin.errors) < 1e-3
+    assert "sin(angle)" in campaign.twin.equations()
+    first, best = campaign.experiments[0], campaign.best_test
+    assert best.predicted <= 1.05 * first.quality and best.excitation is None
+    band = campaign.twin.simulate(first.test).band
+    assert band.shape == (2, 21, 2) and (band[0] <= band[1]).all()

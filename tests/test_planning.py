@@ -1,0 +1,227 @@
+"""The choice of tests: excitation that fades, gains in their box, quality as flown, proposals inside the envelope."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import twinloop as tl
+from oracles import same_bits
+from strategies import program_text
+from twinloop import _core
+from twinloop.flights import candidates, qualities
+from twinloop.planning.excitation import binary, chirps
+from twinloop.planning.gains import from_unit, to_unit, tune_gains
+from twinloop.planning.planner import Committee, Planner, Task
+from twinloop.planning.quality import KINDS, quality_of
+from twinloop.presets import options_of
+
+STEPS = 40
+TASK = Task(np.array([0.5, 0.0]), np.array([0.0, 0.0]), STEPS)
+
+
+def signals(envelope=(-1.2, 1.2)):
+    return tl.Signals(
+        [
+            tl.State("angle", "rad", 1.0, envelope=envelope),
+            tl.State("rate", "rad/s", 3.0, derivative_of="angle"),
+        ],
+        [tl.Command("torque", "N m", (-2.0, 2.0), scale=1.0)],
+        0.05,
+    )
+
+
+def family_of(known):
+    return tl.controllers.PID(
+        axes=[("angle", "rate")],
+        gains={"angle.kp": (0.1, 9.0, "log"), "angle.ki": (0.0, 2.0), "angle.kd": (0.05, 3.0, "log")},
+    ).bind(known)
+
+
+def member(known, gain, damping=0.3):
+    """rate' = gain · torque − damping · rate."""
+    lines = [f"r3 = r2 * {gain!r}", f"r4 = r1 * {-damping!r}", "r3 = r3 + r4"]
+    return _core.Model(_core.Program.parse(program_text(3, 1, 5, [lines])), "acceleration", known.engine)
+
+
+def planner_of(known, **changes):
+    options = options_of("default", {"candidates": 48, "evaluations": 256, "draws": 3, **changes})
+    return Planner(
+        family_of(known), TASK, quality_of("iae", known), options,
+        divergence_factor=10.0, seed=5, workers=_core.Workers(),
+    )  # fmt: skip
+
+
+def committee_of(known):
+    members = [member(known, gain) for gain in (1.0, 0.9, 1.15)]
+    return Committee(members, np.array([1e-3, 5e-3]), True)
+
+
+TUNED = np.array([4.0, 0.1, 2.0])
+
+
+def proposed(planner, committee, tuned=TUNED, **changes):
+    arguments = {
+        "goal": "both", "number": 3, "told": 1, "first_quality": 1.0, "used": 1.0, "exploit": False, **changes,
+    }  # fmt: skip
+    return planner.propose(committee, tuned, **arguments)
+
+
+def usages(planner, committee, proposal):
+    """Usage of the envelope on each member, flown once more."""
+    flights = candidates(
+        planner.family, proposal.genes[None], proposal.initial_state[None], proposal.target_state[None], STEPS,
+        excitation=None if proposal.excitation is None else proposal.excitation[None],
+    )  # fmt: skip
+    return qualities(committee.members, flights, planner.quality.engine, planner.signals)[1][:, 0, 0]
+
+
+# Excitation
+
+
+@given(st.integers(2, 200), st.floats(0.0, 2.0), st.floats(0.0, 1.0), st.integers(0, 99))
+def test_an_excitation_keeps_its_amplitude_and_fades(steps, amplitude, fade, seed):
+    two = tl.Signals(
+        [tl.State("x", "m", 1.0)],
+        [tl.Command("u", "V", (-2.0, 2.0)), tl.Command("w", "V", (0.0, 300.0), scale=50.0)],
+        0.02,
+    )
+    for make in (chirps, binary):
+        added = make(two, steps, amplitude, fade, np.random.default_rng(seed))
+        assert added.shape == (steps, 2) and np.isfinite(added).all()
+        share = np.abs(added) / (np.array([2.0, 50.0]) * max(amplitude, 1e-300))
+        assert (share <= 1.0 + 1e-12).all()
+        left = (steps - np.arange(steps)) / steps / max(fade, 1.0 / steps)
+        assert (share <= np.minimum(1.0, left)[:, None] + 1e-9).all()
+        assert same_bits(added, make(two, steps, amplitude, fade, np.random.default_rng(seed)))
+
+
+def test_the_first_excitation_is_the_tests_own_and_none_where_it_is_switched_off():
+    planner = planner_of(signals())
+    assert not same_bits(planner.first_excitation(0), planner.first_excitation(1))
+    assert np.abs(planner.first_excitation(0)).max() <= planner.options.excitation
+    assert planner_of(signals(), excitation=0.0).first_excitation(0) is None
+
+
+# Gains
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3))
+def test_a_place_in_the_box_is_gains_within_their_bounds_and_back(places):
+    family = family_of(signals())
+    genes = from_unit(family, np.array(places))
+    for value, gain in zip(genes, family.gains, strict=True):
+        assert gain.low <= value <= gain.high
+    np.testing.assert_allclose(to_unit(family, genes), places, atol=1e-12)
+
+
+def test_gains_are_tuned_to_the_bottom_of_a_bowl_and_never_worse_than_the_start():
+    family = family_of(signals())
+    bottom = np.array([0.3, 0.7, 0.5])
+
+    def bowl(genes):
+        return ((to_unit(family, genes) - bottom) ** 2).sum(axis=1)
+
+    start = from_unit(family, np.array([0.9, 0.1, 0.9]))
+    genes, score = tune_gains(family, bowl, [start], evaluations=2000, spread=0.2, seed=1)
+    np.testing.assert_allclose(to_unit(family, genes), bottom, atol=0.02)
+    assert score == bowl(genes[None])[0]
+    genes, score = tune_gains(family, lambda g: np.ones(len(g)), [start], evaluations=64, spread=0.2, seed=1)
+    assert same_bits(genes, start) and score == 1.0
+
+
+# Quality
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("weights", [(), (2.0, 0.5)])
+def test_the_quality_of_a_flight_is_the_engines(kind, weights):
+    known = signals()
+    quality = quality_of(kind, known, weights, effort=0.3, effort_rate=0.02)
+    model, family = member(known, 1.0), family_of(known)
+    test = tl.Test(family, TUNED, TASK.initial_state, TASK.target_state, STEPS)
+    flights = candidates(family, TUNED[None], TASK.initial_state, TASK.target_state, STEPS)
+    expected = qualities([model], flights, quality.engine, known)[0][0, 0, 0]
+    assert quality.flown(tl.Twin(model, known).simulate(test), TASK.target_state) == pytest.approx(
+        expected, rel=1e-10
+    )
+
+
+def test_the_integrals_count_what_a_task_is_about():
+    assert quality_of("iae", signals()).weights.tolist() == [1.0, 0.0]
+    assert quality_of("final_distance", signals()).weights.tolist() == [1.0, 1.0]
+    mixed = tl.Signals(
+        [tl.State("x", "m", 4.0), tl.State("a", "rad", 0.5)], [tl.Command("u", "V", (-1.0, 1.0))], 0.1
+    )
+    assert quality_of("iae", mixed).weights.tolist() == [0.25, 2.0]
+    assert quality_of("ise", mixed).weights.tolist() == [0.0625, 4.0]
+
+
+# Proposals
+
+
+@pytest.mark.parametrize("goal", ["both", "model", "control"])
+@pytest.mark.parametrize("number", range(3))
+def test_a_proposal_keeps_the_margin_on_every_member(goal, number):
+    known = signals(envelope=(-0.7, 0.7))
+    planner, committee = planner_of(known), committee_of(known)
+    found = proposed(planner, committee, goal=goal, number=number)
+    assert found.safe and usages(planner, committee, found).max() <= 0.9 + 1e-9
+    assert 0.0 < found.risk < 0.5 and np.isfinite(found.predicted) and found.reason.endswith(".")
+    assert found.gain >= 0.0 and found.spread >= 0.0
+
+
+def test_where_no_candidate_keeps_the_margin_the_safest_is_offered_and_said_so():
+    known = signals(envelope=(-0.52, 0.52))  # the start alone uses 96 % of it
+    planner, committee = planner_of(known), committee_of(known)
+    found = proposed(planner, committee)
+    assert not found.safe and "safest" in found.reason
+    genes, excitation = planner._candidates(TUNED, "both", 3, False)
+    flights = candidates(
+        planner.family, genes, TASK.initial_state, TASK.target_state, STEPS, excitation=excitation
+    )
+    worst = qualities(committee.members, flights, planner.quality.engine, known)[1].max(axis=(0, 1))
+    assert usages(planner, committee, found).max() == pytest.approx(worst.min(), rel=1e-9)
+
+
+def test_another_number_is_another_proposal_and_the_same_number_the_same():
+    known = signals()
+    planner, committee = planner_of(known), committee_of(known)
+    one, two, again = (proposed(planner, committee, number=n) for n in (1, 2, 1))
+    assert not same_bits(one.genes, two.genes) or not same_bits(one.excitation, two.excitation)
+    assert same_bits(one.genes, again.genes) and one.predicted == again.predicted
+
+
+def test_exploiting_flies_the_tuned_gains_as_they_are():
+    known = signals()
+    found = proposed(planner_of(known), committee_of(known), exploit=True)
+    assert same_bits(found.genes, TUNED) and found.excitation is None
+
+
+def test_a_committee_of_one_agrees_and_a_member_that_diverges_is_no_reason_to_crash():
+    known = signals()
+    planner = planner_of(known)
+    alone = proposed(planner, Committee([member(known, 1.0)], np.array([1e-3, 5e-3]), True))
+    assert alone.safe and "agree" in alone.reason and alone.disagreement == alone.spread == 0.0
+    wild = Committee([member(known, 1.0), member(known, 1.0, damping=-400.0)], np.array([1e-3, 5e-3]), True)
+    found = proposed(planner, wild)
+    assert (
+        not found.safe and found.predicted == np.inf and found.risk > 0.4 and np.isfinite(found.genes).all()
+    )
+
+
+def test_a_sensor_without_noise_divides_nothing_by_zero():
+    known = signals()
+    found = proposed(planner_of(known), Committee(committee_of(known).members, np.zeros(2), True))
+    assert found.safe and np.isfinite(found.disagreement)
+
+
+def test_gains_tuned_on_a_committee_beat_the_start_and_keep_the_margin():
+    known = signals(envelope=(-0.7, 0.7))
+    planner, committee = planner_of(known, evaluations=1000), committee_of(known)
+    start = np.array([0.3, 1.5, 0.1])
+    genes, _ = planner.tune(committee, [start], 1)
+    judged = planner.judge(committee.members, np.stack([genes, start]), committee.sds, 3)
+    assert judged.mean[0] < judged.mean[1] and judged.worst_usage[0] <= 0.9 + 0.02
+    same, _ = planner.tune(committee, [start], 1)
+    assert same_bits(genes, same)
