@@ -35,6 +35,7 @@ test: $(VENV)/.installed-test $(NATIVE) ## all tests, and the benchmarks in smok
 	cargo test --package twinloop-core
 	$(BIN)/python -m pytest
 	$(BIN)/python benchmarks/speed.py --smoke
+	$(BIN)/twinloop bench power --smoke
 
 check: $(VENV)/.installed-check $(NATIVE) ## formatting, lints, types, layers
 	cargo fmt --all --check
