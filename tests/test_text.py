@@ -102,7 +102,7 @@ def test_a_result_of_default_says_what_a_person_must_know():
     [
         (
             {},
-            "0.5 rad s, 25 % of what is flown now.\nThat is above the scatter of one measurement, 0.1 rad s",
+            "0.5 rad s, 25 % of what it is now.\nThat is above the scatter of one measurement, 0.1 rad s",
         ),
         ({"gain": 0.01, "share": None, "stop": True}, "by 0.01 rad s.\nThat is below the scatter"),
         ({"gain": None}, "No committee was asked for a flight yet"),
