@@ -77,19 +77,19 @@ impl<V: Vector> Line<V> {
     /// Takes the commands of a period and moves on by it.
     #[inline(always)]
     pub fn pass(&mut self, command: &[V]) {
-        for i in 0..self.actuators.len() {
+        for (i, &command) in command.iter().enumerate() {
             let Actuator { delay, rest, .. } = self.actuators[i];
             if !self.started {
                 let before = match rest {
                     Some(rest) => V::splat(rest),
-                    None => command[i],
+                    None => command,
                 };
                 self.memory[i] = before;
                 for _ in 0..delay {
                     self.queues[i].push(before);
                 }
             }
-            self.queues[i].push(command[i]);
+            self.queues[i].push(command);
             let arrived = self.queues[i].remove(0);
             let start = self.memory[i];
             let middle = arrived + (start - arrived) * self.halves[i];

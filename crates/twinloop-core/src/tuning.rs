@@ -157,10 +157,10 @@ impl Tuning<'_> {
                 break;
             }
         }
-        if left.is_finite() {
-            if let Some((_, curvature)) = self.normal(&whitenings, &best, workers) {
-                covariance = inverse(&curvature, self.size()).unwrap_or_default();
-            }
+        if left.is_finite()
+            && let Some((_, curvature)) = self.normal(&whitenings, &best, workers)
+        {
+            covariance = inverse(&curvature, self.size()).unwrap_or_default();
         }
         let readings =
             self.records.iter().map(|record| record.weights.iter().filter(|&&w| w > 0.0).count()).sum();

@@ -17,6 +17,9 @@ type Motion = (f64, f64, f64);
 /// Readings, weights, and the features at the start, the middle and the end of each period.
 type RecordArrays<'py> = (Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>);
 
+/// Subsets with their energies, best first.
+type Walked = Vec<(Vec<usize>, f64)>;
+
 /// Records of one chain of states with the features that may drive it.
 #[pyclass(frozen, name = "Regression", module = "twinloop._core")]
 pub struct PyRegression {
@@ -29,7 +32,7 @@ pub struct PyRegression {
 impl PyRegression {
     #[new]
     fn new(states: usize, dt: f64, integrated: bool, records: Vec<RecordArrays<'_>>) -> Result<Self> {
-        if !(1..=4).contains(&states) || !(dt.is_finite() && dt > 0.0) {
+        if !((1..=4).contains(&states) && dt.is_finite() && dt > 0.0) {
             return Err(misuse(format!(
                 "chain: expected 1 to 4 states and a period above 0, found {states} and {dt}"
             )));
@@ -212,7 +215,7 @@ pub fn search_subsets(
     iteration: u64,
     coldest: f64,
     workers: Option<&PyWorkers>,
-) -> Result<Vec<Vec<(Vec<usize>, f64)>>> {
+) -> Result<Vec<Walked>> {
     let workers = or_default(workers)?;
     let grams: Vec<_> = grams.iter().map(|gram| gram.get().0.clone()).collect();
     if prices.len() != grams.len() || scales.len() != grams.len() || starts == 0 {
