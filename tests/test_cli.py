@@ -330,3 +330,24 @@ def test_ctrl_c_ends_with_130_and_the_best_so_far(tmp_path):
     assert len(result["experiments"]) == 1
     assert 0 < result["iterations"][-1]["generations"] < 1_000_000
     assert file.read_text(encoding="utf-8") == answer
+
+
+@pytest.mark.parametrize("finished", [0, 1])
+def test_ctrl_c_under_default_shows_the_best_so_far_if_there_is_any(monkeypatch, finished):
+    learn, calls = twinloop.methods.identification.identify_runs, []
+
+    def interrupted(*arguments, **how):
+        calls.append(1)
+        if len(calls) > finished:
+            raise KeyboardInterrupt
+        return learn(*arguments, **how)
+
+    monkeypatch.setattr("twinloop.methods.identification.identify_runs", interrupted)
+    done = invoke(*QUICK, "--json")
+    assert done.exit_code == 130
+    if not finished:
+        assert done.stdout == "" and "Interrupted before there was a result." in done.stderr
+        return
+    result = json.loads(done.stdout)
+    assert result["interrupted"] is True and len(result["experiments"]) == 2
+    assert [lesson["tests"] for lesson in result["iterations"]] == [[0]]
