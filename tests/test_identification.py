@@ -11,10 +11,10 @@ import twinloop as tl
 from oracles import UNARY, operate, same_bits
 from twinloop import _core
 from twinloop.identification.chains import chains
-from twinloop.identification.identify import guessed_noise, identify_runs
+from twinloop.identification.identify import identify_runs
 from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
-from twinloop.identification.records import Run
+from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.structure import prices
 from twinloop.presets import options_of
 

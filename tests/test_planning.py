@@ -65,7 +65,7 @@ def proposed(planner, committee, tuned=TUNED, **changes):
     arguments = {
         "goal": "both", "number": 3, "told": 1, "first_quality": 1.0, "used": 1.0, "exploit": False, **changes,
     }  # fmt: skip
-    return planner.propose(committee, tuned, **arguments)
+    return planner.propose(committee, tuned, tuned, **arguments)
 
 
 def usages(planner, committee, proposal):

@@ -252,7 +252,9 @@ def _states(form: str, signals: Signals, outputs: Sequence[str]) -> list[str]:
             f"{name}[k+1] = {name} + ({text})"
             for name, text in zip(signals.state_names, outputs, strict=True)
         ]
-    rates = {state.derivative_of: state.name for state in signals.states if state.derivative_of is not None}
+    rates: dict[str | None, str] = {
+        state.derivative_of: state.name for state in signals.states if state.derivative_of is not None
+    }
     if signals.kinematics is not None:
         rates |= _turning(signals.kinematics)
     remaining = iter(outputs)

@@ -275,7 +275,7 @@ def _controller_to_fly(result: Mapping[str, Any]) -> str:
         ["first controller", first["predicted"], None, first["measured"]],
     ]
     excited = (
-        " The first controller was excited when it was flown." if result["experiments"][0]["excited"] else ""
+        "\nThe first controller was excited when it was flown." if result["experiments"][0]["excited"] else ""
     )
     return "\n".join(
         [

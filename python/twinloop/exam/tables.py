@@ -127,7 +127,7 @@ def _controllers(results: Results, system: str, learners: Sequence[str]) -> Tabl
     if not rows and "optimum" not in learners:
         return Table("", [], [])
     judged = subject(system)
-    first = next((results.values(system, who, "quality", 0) for who in flying), {})
+    first = next((results.values(system, who, "flown_quality", 0) for who in flying), {})
     best = results.values(system, "optimum", "quality")
     notes = [
         f"Cells: {_quality_name(judged.quality)} of the true states with the controller to fly; median over"

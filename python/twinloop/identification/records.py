@@ -85,3 +85,23 @@ def stages(runs: Sequence[Run], signals: Signals, actuators: Sequence[Actuator])
 def direct(signals: Signals) -> list[Actuator]:
     """Actuators that act at once."""
     return [(0.0, 0, None)] * signals.n_u
+
+
+def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:
+    """Variance of each sensor as if all that changes faster than a parabola were noise; a first guess from above.
+
+    Args:
+        runs: recorded.
+        scales: of the states (n_x,).
+
+    Returns:
+        Variances (n_x,), never below what rounding leaves.
+    """
+    thirds = [np.diff(run.states, n=3, axis=0) for run in runs if len(run.states) > 3]
+    low = (1e-7 * scales) ** 2
+    if not thirds:
+        return low
+    squares = np.sort(np.concatenate(thirds) ** 2, axis=0)
+    # The median of a squared normal number is 0.4549; a third difference has 20 times the variance.
+    guess: Floats = np.maximum(squares[len(squares) // 2] / (0.4549 * 20.0), low)
+    return guess

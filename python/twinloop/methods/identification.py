@@ -12,14 +12,16 @@ from twinloop.controllers import lqr_gains
 from twinloop.controllers.state_feedback import FeedbackFamily
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.history import Lesson, Planned, Progress
-from twinloop.identification.identify import Identified, identify_runs
+from twinloop.identification.identified import Identified
+from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.logbook import Logbook
 from twinloop.methods.calibration import factor, needed_factor
 from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
-from twinloop.planning.planner import Committee, Planner, Task, expected
+from twinloop.planning.judging import Committee, Task, expected
+from twinloop.planning.planner import Planner
 from twinloop.presets import DefaultOptions
 from twinloop.setup import Setup
 from twinloop.test import Test
@@ -127,6 +129,7 @@ class IdentifyAndPlan:
         found = self.planner.propose(
             committee,
             tuned,
+            book.best().genes,
             self.setup.goal,
             number,
             len(book.experiments),

@@ -10,41 +10,14 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
-from twinloop.flights import candidates, disagreements, qualities
+from twinloop.flights import disagreements
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import from_unit, to_unit, tune_gains
+from twinloop.planning.judging import Committee, Ends, Judge, Task, expected
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 
 GOALS = ("both", "model", "control")
-Ends = tuple[Floats, Floats]
-"""Initial states and target states (K, n_x)."""
-HOPELESS = 1e9
-"""What a flight that diverges is worth."""
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """Start, target and length of flights."""
-
-    initial_state: Floats
-    target_state: Floats
-    steps: int
-
-
-@dataclass(frozen=True, eq=False)
-class Committee:
-    """Models that judge, the best first, and the noise of the sensors.
-
-    Args:
-        members: m of them.
-        sds: of each state's sensor (n_x,).
-        trusted: whether the best one explains the runs that it was learnt from without diverging.
-    """
-
-    members: Sequence[_core.Model]
-    sds: Floats
-    trusted: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,37 +51,8 @@ class Proposal:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """Qualities (members, draws, K) and the worst usage of the envelope (members, draws, K)."""
-
-    qualities: Floats
-    usages: Floats
-
-    @property
-    def mean(self) -> Floats:
-        """Over members and draws (K,)."""
-        mean: Floats = self.qualities.mean(axis=(0, 1))
-        return mean
-
-    @property
-    def worst_usage(self) -> Floats:
-        """Over members and draws (K,)."""
-        worst: Floats = self.usages.max(axis=(0, 1))
-        return worst
-
-
-def expected(means: Floats) -> float:
-    """Quality that members expect on average, each by its mean (members,); infinite where one of them diverges.
-
-    Args:
-        means: of the members.
-    """
-    return float("inf") if bool((means >= HOPELESS / 1e3).any()) else float(means.mean())
-
-
-class Planner:
-    """Judges flights on a committee.
+class Planner(Judge):
+    """Tunes gains on a committee, and picks flights that tell it apart.
 
     Args:
         family: of the controllers.
@@ -133,56 +77,11 @@ class Planner:
         workers: _core.Workers,
         watch: Callable[[str, float], None] = lambda step, share: None,
     ) -> None:
-        self.family = family
-        self.signals = family.signals
-        self.task = task
-        self.quality = quality
-        self.options = options
-        self.divergence_factor = divergence_factor
-        self.seed = seed
-        self.workers = workers
-        self.watch = watch
-
-    # Judging
-
-    def judge(
-        self,
-        members: Sequence[_core.Model],
-        genes: Floats,
-        sds: Floats,
-        draws: int,
-        excitation: Floats | None = None,
-        ends: Ends | None = None,
-    ) -> Judged:
-        """Flies candidates on members under noise; what diverges is worth `HOPELESS`."""
-        noise = self.noise(sds, draws)
-        values, usages = qualities(
-            members, self._flights(genes, excitation, ends), self.quality.engine, self.signals,
-            noise=noise, workers=self.workers,
-        )  # fmt: skip
-        return Judged(
-            np.where(np.isfinite(values), values, HOPELESS), np.where(np.isfinite(usages), usages, HOPELESS)
+        super().__init__(
+            family, task, quality, divergence_factor=divergence_factor, seed=seed, workers=workers
         )
-
-    def lasting(
-        self,
-        members: Sequence[_core.Model],
-        genes: Floats,
-        excitation: Floats | None = None,
-        ends: Ends | None = None,
-    ) -> list[_core.Model]:
-        """Members that do not blow up on half of the flights; the best one in any case."""
-        judged = self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
-        share = (judged.qualities >= HOPELESS).any(axis=1).mean(axis=1)
-        return [member for i, member in enumerate(members) if i == 0 or share[i] < 0.5]
-
-    def noise(self, sds: Floats, draws: int) -> Floats | None:
-        """The same draws of sensor noise for everybody (draws, n + 1, n_x); None for a single, quiet flight."""
-        if draws < 2:
-            return None
-        stream = self._stream(1, 0)
-        shape = (draws, self.task.steps + 1, self.signals.n_x)
-        return np.asarray(sds * stream.standard_normal(shape), dtype=np.float64)
+        self.options = options
+        self.watch = watch
 
     def tune(self, committee: Committee, starts: Sequence[Floats], number: int) -> tuple[Floats, float]:
         """Gains of the best quality on the committee, inside the envelope with its margin.
@@ -196,7 +95,7 @@ class Planner:
             The genes and their score, quality plus what is paid for leaving the margin.
         """
         options = self.options
-        stream = self._stream(2, number)
+        stream = self.stream(2, number)
         places = np.clip(to_unit(self.family, np.stack(starts)), 0.0, 1.0)
         all_starts = list(starts)
         while len(all_starts) < options.tuning_starts:
@@ -241,13 +140,13 @@ class Planner:
         options = self.options
         if options.excitation <= 0.0:
             return None
-        stream = self._stream(3, number)
+        stream = self.stream(3, number)
         return chirps(self.signals, self.task.steps, options.excitation, options.fade, stream)
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""
         options = self.options
-        stream = self._stream(4, number)
+        stream = self.stream(4, number)
         steps, most, fade = self.task.steps, options.excitation_most, options.fade
         if options.tests == "random":
             genes = from_unit(self.family, stream.random(self.family.size))
@@ -259,6 +158,7 @@ class Planner:
         self,
         committee: Committee,
         tuned: Floats,
+        flown: Floats,
         goal: str,
         number: int,
         told: int,
@@ -271,6 +171,7 @@ class Planner:
         Args:
             committee: that judges.
             tuned: gains that are best on it.
+            flown: the best gains flown.
             goal: "both", "model" or "control".
             number: of the test, for its stream.
             told: experiments so far.
@@ -281,13 +182,13 @@ class Planner:
         Returns:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
-        genes, excitation = self._candidates(tuned, goal, number, exploit)
+        genes, excitation = self._candidates(tuned, flown, goal, number)
         ends = self._ends(number, len(genes))
         self.watch("candidates", 0.0)
         # A member that blows up whatever is flown is no member (E-SINDy).
         members = self.lasting(committee.members, genes, excitation, ends)
         judged = self.judge(members, genes, committee.sds, 1, excitation, ends)
-        flights = self._flights(genes, excitation, ends)
+        flights = self.flights(genes, excitation, ends)
         values, where = disagreements(
             members, flights, np.maximum(committee.sds, self._smallest()), workers=self.workers
         )
@@ -308,7 +209,9 @@ class Planner:
         elif keeps.any():
             chosen = int(np.argmin(np.where(keeps, mean, np.inf)))
         else:
-            chosen = int(np.argmin(judged.worst_usage))
+            # What was flown has kept the envelope, whatever the members make of it.
+            first = len(genes) - self._repeats(len(genes))
+            chosen = first + int(np.argmin(judged.worst_usage[first:]))
         best = per_member[:, 0] if allowed.any() else per_member[:, chosen]
         gain = float((best - per_member[:, keeps].min(axis=1)).mean()) if keeps.any() else 0.0
         row, state, high, low = (int(i) for i in where[chosen])
@@ -348,10 +251,14 @@ class Planner:
 
     # Inside
 
-    def _candidates(self, tuned: Floats, goal: str, number: int, exploit: bool) -> tuple[Floats, Floats]:
+    def _repeats(self, count: int) -> int:
+        """Candidates, the last ones, that fly the best gains flown with another excitation."""
+        return max(1, count // 16)
+
+    def _candidates(self, tuned: Floats, flown: Floats, goal: str, number: int) -> tuple[Floats, Floats]:
         """Genes (K, size) and excitations (K, n, n_u); the first candidate is the tuned one as it is."""
         options = self.options
-        stream = self._stream(5, number)
+        stream = self.stream(5, number)
         count = max(2, options.candidates)
         place = to_unit(self.family, tuned)
         places = place + options.nearness * stream.standard_normal((count, self.family.size))
@@ -360,6 +267,7 @@ class Planner:
             places[count // 2 :] = stream.random((count - count // 2, self.family.size))
         genes = from_unit(self.family, np.clip(places, 0.0, 1.0))
         genes[0] = tuned
+        genes[count - self._repeats(count) :] = flown
         excitation = np.zeros((count, self.task.steps, self.signals.n_u))
         most = options.excitation_most * (2.0 if goal == "model" else 1.0)
         if most > 0.0 and options.excitation > 0.0:
@@ -383,7 +291,7 @@ class Planner:
 
     def _ends(self, number: int, count: int) -> Ends:
         """Start and target of each candidate (K, n_x); those of the campaign for the first one."""
-        stream = self._stream(6, number)
+        stream = self.stream(6, number)
         ends = []
         for middle, reach in (
             (self.task.initial_state, self.options.initial_range),
@@ -394,16 +302,6 @@ class Planner:
                 states[1:] += np.array(reach) * stream.uniform(-1.0, 1.0, (count - 1, len(middle)))
             ends.append(states)
         return ends[0], ends[1]
-
-    def _flights(self, genes: Floats, excitation: Floats | None, ends: Ends | None) -> _core.Flights:
-        initial, target = ends or (self.task.initial_state, self.task.target_state)
-        return candidates(
-            self.family, genes, initial, target, self.task.steps,
-            excitation=excitation, divergence_factor=self.divergence_factor,
-        )  # fmt: skip
-
-    def _stream(self, purpose: int, number: int) -> np.random.Generator:
-        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 79, purpose, number])))
 
     def _reason(
         self, goal: str, exploits: bool, safe: bool, value: float, row: int, state: int, pair: tuple[int, int]
@@ -421,6 +319,6 @@ class Planner:
         if not safe:
             sentences.append(
                 "No candidate keeps the envelope with its margin, or lasts at all, on every model: this is the safest"
-                " one. Fly it with a hand on the switch, or not at all."
+                " one, as near to the best gains flown as can be. Fly it with a hand on the switch, or not at all."
             )
         return " ".join(sentences)

@@ -47,11 +47,11 @@ class PlanningOptions:
     candidates: int = 256
     nearness: float = 0.1
     share: float = 0.25
-    draws: int = 6
+    draws: int = 16
     margin: float = 0.1
     reach_first: float = 0.5
     reach_growth: float = 1.25
-    evaluations: int = 3000
+    evaluations: int = 12_000
     tuning_starts: int = 3
     tuning_members: int = 4
     confidence: float = 0.8

@@ -1,0 +1,82 @@
+"""The committee: models that explain the runs about as well, so that their disagreement is what the runs leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.identification.chains import Chain
+from twinloop.identification.fitting import Fitting
+from twinloop.identification.structure import Problem, Sum
+
+PLAUSIBLE = 1.5
+"""Multiple of the best model's χ² up to which another structure is a member."""
+
+
+def committee(
+    problem: Problem,
+    fitting: Fitting,
+    sums: Sequence[Sum],
+    observer: Sequence[Chain],
+    best: _core.Model,
+) -> list[_core.Model]:
+    """The best model, draws from what the runs leave open of it, and other structures that are nearly as good.
+
+    Args:
+        problem: that the sums were found on.
+        fitting: that tunes members.
+        sums: of the best model, with the other subsets of their search.
+        observer: all chains, with their noise.
+        best: the best model, tuned.
+
+    Returns:
+        At most as many as the options ask for, the best first.
+    """
+    size = fitting.options.committee_size
+    stream = np.random.Generator(
+        np.random.Philox(np.random.SeedSequence([fitting.seed, 78, fitting.iteration]))
+    )
+    members = [best]
+    _, base, readings, _, draws = fitting.tune(best, observer, 0, size)
+    plausible = PLAUSIBLE * max(base, readings)
+    grams = {}
+    for attempt in range(3 * size):
+        if len(members) >= size:
+            break
+        structures = [_other(found, stream) for found in sums]
+        if all(s is None for s in structures):
+            if draws:
+                members.append(draws.pop())
+            continue
+        varied = []
+        for i, (found, subset) in enumerate(zip(sums, structures, strict=True)):
+            if subset is None:
+                varied.append(found)
+                continue
+            terms = problem.usable(subset)
+            if (i, subset) not in grams:
+                regression = problem.regression(found.chain, terms)
+                grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, fitting.workers)
+            solved = grams[i, subset].solve(list(range(len(terms))))
+            if solved is None:
+                varied.append(found)
+            else:
+                weights = dict(zip(terms, solved[0].tolist(), strict=True))
+                varied.append(replace(found, weights=weights))
+        model = fitting.model(varied, fitting.lags_of(best))
+        _, left, _, _, drawn = fitting.tune(model, observer, 4, 1, unit=attempt + 1)
+        if np.isfinite(left) and left <= plausible and drawn:
+            members.append(drawn[0])
+    while len(members) < size and draws:
+        members.append(draws.pop())
+    return members
+
+
+def _other(found: Sum, stream: np.random.Generator) -> tuple[int, ...] | None:
+    """A subset drawn by how likely it is; None for the best one."""
+    chances = np.exp(-0.5 * np.array([0.0, *(above for _, above in found.others)]))
+    pick = int(np.searchsorted(np.cumsum(chances) / chances.sum(), stream.random()))
+    return None if pick == 0 else found.others[min(pick, len(found.others)) - 1][0]

@@ -1,0 +1,215 @@
+"""Fitting: constants and lags of a model of given terms are tuned on its predictions; weak terms and outliers go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.identification.actuation import groups
+from twinloop.identification.chains import Chain
+from twinloop.identification.pool import Pool
+from twinloop.identification.records import Actuator, Run, direct
+from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.structure import Sum, Weights
+from twinloop.signals import Signals
+
+PRUNINGS = 3
+"""How often terms that tuning has shown to be nothing are dropped."""
+OUTLIER = 6.0
+"""Whitened prediction errors beyond this many standard deviations are no noise."""
+FEW = 0.02
+"""Share of readings up to which they are outliers; where more are wrong, the model is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """A model with its sums, its noise, what it leaves, and the covariance of its constants."""
+
+    model: _core.Model
+    sums: list[Sum]
+    observer: list[Chain]
+    left: float
+    readings: int
+    covariance: Floats
+
+
+class Fitting:
+    """Makes models of sums, and tunes them on runs.
+
+    Args:
+        runs: recorded; replaced by copies where readings are ignored or states smoothed.
+        pool: of all expressions.
+        signals: of the system.
+        form: what the outputs mean.
+        options: of the identification.
+        seed: of the campaign.
+        iteration: which streams of random numbers.
+        workers: how the work is carried out.
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[Run],
+        pool: Pool,
+        signals: Signals,
+        form: str,
+        options: IdentificationOptions,
+        seed: int,
+        iteration: int,
+        workers: _core.Workers,
+    ) -> None:
+        self.runs = list(runs)
+        self.pool = pool
+        self.signals = signals
+        self.form = form
+        self.options = options
+        self.seed = seed
+        self.iteration = iteration
+        self.workers = workers
+
+    def tuned(self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator]) -> Tuned:
+        """The model of the sums with its constants tuned, and without terms that tuning has shown to be nothing."""
+        tuned = self._fitted(sums, given, actuators)
+        if not np.isfinite(tuned.left) or not self.options.tuning:
+            return tuned
+        errors = self._predictions(tuned.model, tuned.observer)
+        if errors is not None and self._ignore_outliers([e for e, _ in errors]):
+            tuned = self._fitted(tuned.sums, given, self.lags_of(tuned.model))
+        for _ in range(PRUNINGS if self.form != "absolute" else 0):
+            kept, saved = self._without_weak(tuned)
+            if saved == 0.0:
+                break
+            other = self._fitted(kept, given, self.lags_of(tuned.model))
+            if not other.left - tuned.left < saved:
+                break
+            tuned = other
+        return tuned
+
+    def _fitted(self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator]) -> Tuned:
+        observer = [*(found.chain for found in sums), *given]
+        model = self.model(sums, actuators)
+        tuned, left, readings, covariance, _ = self.tune(model, observer, self.options.tuning_steps, 0)
+        constants = tuned.constants
+        written = list(sums)
+        if np.isfinite(left) and self.form != "absolute":
+            place = self._first_weight(sums)
+            for i, found in enumerate(sums):
+                values = constants[place : place + len(found.weights)].tolist()
+                written[i] = replace(found, weights=dict(zip(found.weights, values, strict=True)))
+                place += len(found.weights)
+        return Tuned(tuned, written, observer, left, readings, covariance)
+
+    def _first_weight(self, sums: Sequence[Sum]) -> int:
+        """Where the weights begin among a program's constants: those inside nodes come before them."""
+        nodes = self.pool.needed(term for found in sums for term in found.weights if term != self.pool.one)
+        inner = [node for node in map(self.pool.node, nodes) if node is not None]
+        return sum(isinstance(node[2], float) for node in inner)
+
+    def _without_weak(self, tuned: Tuned) -> tuple[list[Sum], float]:
+        """The sums without terms whose uncertain weights do not pay for them, and what those cost."""
+        place, saved = self._first_weight(tuned.sums), 0.0
+        variances = np.diag(tuned.covariance)
+        kept = []
+        for found in tuned.sums:
+            price = np.log(max(2, sum(int(run.weights[:, found.chain.states[0]].sum()) for run in self.runs)))
+            weights: Weights = {}
+            for term, weight in found.weights.items():
+                cost = price + 2.0 * self.pool.length(term)
+                if weight * weight >= cost * variances[place] or len(found.weights) == 1:
+                    weights[term] = weight
+                else:
+                    saved += cost
+                place += 1
+            kept.append(replace(found, weights=weights or dict(found.weights)))
+        return kept, float(saved)
+
+    def model(self, sums: Sequence[Sum], actuators: Sequence[Actuator]) -> _core.Model:
+        """The model whose outputs are sums, behind actuators."""
+        outputs = [dict(found.weights) for found in sums]
+        if self.form == "absolute":
+            for i, terms in enumerate(outputs):
+                terms[i] = terms.get(i, 0.0) + 1.0
+        program = self.pool.program(outputs)
+        with engine_input():
+            return _core.Model(program, self.form, self.signals.engine, list(actuators))
+
+    def tune(
+        self,
+        model: _core.Model,
+        observer: Sequence[Chain],
+        steps: int,
+        draws: int,
+        unit: int = 0,
+    ) -> tuple[_core.Model, float, int, Floats, list[_core.Model]]:
+        """Constants and lags tuned on predictions.
+
+        Args:
+            model: to begin with.
+            observer: all chains, with their noise.
+            steps: at most.
+            draws: models to be drawn from what the runs leave open.
+            unit: which stream of random numbers the draws come from.
+
+        Returns:
+            The tuned model, its χ², the readings that counted, the covariance of its constants and lags, the draws.
+        """
+        lags = [g for g in groups(self.signals) if self.lags_of(model)[g[0]][0] > 0.0]
+        with engine_input():
+            return _core.tune(
+                model,
+                [chain.engine for chain in observer],
+                [(run.states, run.weights, run.commands) for run in self.runs],
+                free=list(range(len(model.constants))) if self.options.tuning else [],
+                lags=lags if self.options.tuning else [],
+                iterations=steps,
+                draws=draws,
+                seed=self.seed,
+                iteration=self.iteration,
+                unit=unit,
+                divergence_factor=self.options.divergence_factor,
+                workers=self.workers,
+            )
+
+    def _predictions(
+        self, model: _core.Model, observer: Sequence[Chain]
+    ) -> list[tuple[Floats, Floats]] | None:
+        with engine_input():
+            return _core.predictions(
+                model,
+                [chain.engine for chain in observer],
+                [(run.states, run.weights, run.commands) for run in self.runs],
+                divergence_factor=self.options.divergence_factor,
+                workers=self.workers,
+            )
+
+    def lags_of(self, model: _core.Model) -> list[Actuator]:
+        """Actuators of a model, one a command even where all act at once."""
+        return list(model.actuators) or direct(self.signals)
+
+    def smooth(self, model: _core.Model, observer: Sequence[Chain]) -> bool:
+        """Takes the states that the model's observer believes for those that the features are made of."""
+        errors = self._predictions(model, observer)
+        if errors is None:
+            return False
+        self.runs = [
+            replace(run, smooth=np.where(np.isfinite(states), states, run.states))
+            for run, (_, states) in zip(self.runs, errors, strict=True)
+        ]
+        return True
+
+    def _ignore_outliers(self, errors: Sequence[Floats]) -> bool:
+        """Single readings that no noise explains count no more; a model that is wrong everywhere explains none."""
+        wrong = [np.abs(e) > OUTLIER for e in errors]
+        share = float(np.mean(np.concatenate([w.any(axis=1) for w in wrong])))
+        if share == 0.0 or share > FEW:
+            return False
+        self.runs = [
+            replace(run, weights=np.where(w, 0.0, run.weights))
+            for run, w in zip(self.runs, wrong, strict=True)
+        ]
+        return True

@@ -1,0 +1,77 @@
+"""What was learnt from runs: a model, a committee, the terms and the noise behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.identification.chains import Chain
+from twinloop.identification.pool import Pool
+from twinloop.identification.records import Actuator
+from twinloop.identification.structure import Sum
+from twinloop.models import Noise
+from twinloop.signals import Signals
+
+
+@dataclass(eq=False)
+class Identified:
+    """What was learnt from runs.
+
+    Args:
+        model: the best one.
+        members: of the committee, the best first.
+        pool: of all expressions.
+        sums: the terms that drive each chain.
+        chains: with the noise of sensors and motion.
+        actuators: lag, delay and rest of each command.
+        left: χ² of the whitened prediction errors of the best model.
+        readings: that counted.
+        ignored: readings that were taken for outliers.
+        energy: description length.
+        remarks: what a person should know.
+    """
+
+    model: _core.Model
+    members: list[_core.Model]
+    pool: Pool
+    sums: list[Sum]
+    chains: list[Chain]
+    actuators: list[Actuator]
+    left: float
+    readings: int
+    ignored: int
+    energy: float
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def terms(self) -> int:
+        """Number of terms of the best model."""
+        return sum(len(found.weights) for found in self.sums)
+
+    @property
+    def misfit(self) -> float:
+        """χ² for each reading; 1 where only noise is left."""
+        return self.left / max(1, self.readings)
+
+    def noise(self, signals: Signals) -> Noise:
+        """Of the sensors, and of what moves the states from one period to the next."""
+        moves = np.zeros(signals.n_x)
+        for chain in self.chains:
+            period = signals.dt if chain.integrated else 1.0
+            moves[chain.states[0]] = np.sqrt(chain.motion[0] * period)
+        gusts = [
+            (chain.states, chain.integrated, float(np.sqrt(chain.motion[1])), chain.motion[2])
+            for chain in self.chains
+            if chain.motion[1] > 0.0
+        ]
+        return Noise(self.sensors(signals.n_x), moves, tuple(gusts), signals.dt)
+
+    def sensors(self, n_x: int) -> Floats:
+        """Standard deviation of each state's sensor (n_x,)."""
+        sds = np.zeros(n_x)
+        for chain in self.chains:
+            sds[list(chain.states)] = np.sqrt(chain.sensors)
+        return sds

@@ -1,0 +1,69 @@
+"""What a person should know of a model: what is left, what never moved, which laws the runs cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.identification.pool import Pool
+from twinloop.identification.records import Run
+from twinloop.identification.structure import Sum
+from twinloop.signals import Signals
+
+TWINS = 4.0
+"""Description length within which two laws are equally good."""
+
+
+def identities(found: Sum, pool: Pool, signals: Signals) -> list[str]:
+    """The nearest other law that the runs cannot tell from this one: an identity that held on them."""
+    symbols = [*signals.state_names, *signals.command_names]
+    driven = signals.state_names[found.chain.states[0]]
+    ours = set(found.weights)
+    for subset, above in found.others:
+        out, into = ours - set(subset), set(subset) - ours
+        if above < TWINS and out and into and len(out) + len(into) <= 6:
+            gone, come = (
+                ", ".join(sorted(pool.text(node, symbols) for node in terms)) for terms in (out, into)
+            )
+            return [f"On these runs {driven} is described as well with {come} in place of {gone}."]
+    return []
+
+
+def remarks(
+    runs: Sequence[Run], pool: Pool, signals: Signals, sums: Sequence[Sum], left: float, readings: int
+) -> list[str]:
+    """Sentences about what was learnt.
+
+    Args:
+        runs: as they were learnt from.
+        pool: of all expressions.
+        signals: of the system.
+        sums: of the best model.
+        left: χ² of its predictions.
+        readings: that counted.
+
+    Returns:
+        Misfit, states that never moved, identities, outliers; none where there is nothing to say.
+    """
+    ignored = int(sum((run.weights == 0.0).sum() for run in runs))
+    said = []
+    if not np.isfinite(left):
+        said.append(
+            "The model diverges on the runs that it was learnt from; fly another test before you trust it."
+        )
+    elif left > 2.0 * readings:
+        said.append(
+            f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."
+        )
+    still = [
+        signals.state_names[i]
+        for i in range(signals.n_x)
+        if max(float(np.ptp(run.states[:, i])) for run in runs) <= 1e-9 * signals.states[i].scale
+    ]
+    if still:
+        said.append(f"{', '.join(still)} never moved: nothing could be learnt of what drives it.")
+    said += [sentence for found in sums for sentence in identities(found, pool, signals)]
+    if ignored:
+        said.append(f"{ignored} reading{'s' if ignored > 1 else ''} taken for outliers and ignored.")
+    return said

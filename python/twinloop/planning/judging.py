@@ -1,0 +1,154 @@
+"""Judging: what members of a committee make of candidate flights, under drawn noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.controllers import Family
+from twinloop.flights import candidates, qualities
+from twinloop.planning.quality import Quality
+
+Ends = tuple[Floats, Floats]
+"""Initial states and target states (K, n_x)."""
+HOPELESS = 1e9
+"""What a flight that diverges is worth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Start, target and length of flights."""
+
+    initial_state: Floats
+    target_state: Floats
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class Committee:
+    """Models that judge, the best first, and the noise of the sensors.
+
+    Args:
+        members: m of them.
+        sds: of each state's sensor (n_x,).
+        trusted: whether the best one explains the runs that it was learnt from without diverging.
+    """
+
+    members: Sequence[_core.Model]
+    sds: Floats
+    trusted: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Qualities (members, draws, K) and the worst usage of the envelope (members, draws, K)."""
+
+    qualities: Floats
+    usages: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """Over members and draws (K,)."""
+        mean: Floats = self.qualities.mean(axis=(0, 1))
+        return mean
+
+    @property
+    def worst_usage(self) -> Floats:
+        """Over members and draws (K,)."""
+        worst: Floats = self.usages.max(axis=(0, 1))
+        return worst
+
+
+def expected(means: Floats) -> float:
+    """Quality that members expect on average, each by its mean (members,); infinite where one of them diverges.
+
+    Args:
+        means: of the members.
+    """
+    return float("inf") if bool((means >= HOPELESS / 1e3).any()) else float(means.mean())
+
+
+class Judge:
+    """Flies candidates on members.
+
+    Args:
+        family: of the controllers.
+        task: of the flights.
+        quality: what is minimised.
+        divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
+        seed: of the campaign.
+        workers: how the work is carried out.
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        task: Task,
+        quality: Quality,
+        *,
+        divergence_factor: float,
+        seed: int,
+        workers: _core.Workers,
+    ) -> None:
+        self.family = family
+        self.signals = family.signals
+        self.task = task
+        self.quality = quality
+        self.divergence_factor = divergence_factor
+        self.seed = seed
+        self.workers = workers
+
+    def judge(
+        self,
+        members: Sequence[_core.Model],
+        genes: Floats,
+        sds: Floats,
+        draws: int,
+        excitation: Floats | None = None,
+        ends: Ends | None = None,
+    ) -> Judged:
+        """Flies candidates on members under noise; what diverges is worth `HOPELESS`."""
+        noise = self.noise(sds, draws)
+        values, usages = qualities(
+            members, self.flights(genes, excitation, ends), self.quality.engine, self.signals,
+            noise=noise, workers=self.workers,
+        )  # fmt: skip
+        return Judged(
+            np.where(np.isfinite(values), values, HOPELESS), np.where(np.isfinite(usages), usages, HOPELESS)
+        )
+
+    def lasting(
+        self,
+        members: Sequence[_core.Model],
+        genes: Floats,
+        excitation: Floats | None = None,
+        ends: Ends | None = None,
+    ) -> list[_core.Model]:
+        """Members that do not blow up on half of the flights; the best one in any case."""
+        judged = self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
+        share = (judged.qualities >= HOPELESS).any(axis=1).mean(axis=1)
+        return [member for i, member in enumerate(members) if i == 0 or share[i] < 0.5]
+
+    def noise(self, sds: Floats, draws: int) -> Floats | None:
+        """The same draws of sensor noise for everybody (draws, n + 1, n_x); None for a single, quiet flight."""
+        if draws < 2:
+            return None
+        stream = self.stream(1, 0)
+        shape = (draws, self.task.steps + 1, self.signals.n_x)
+        return np.asarray(sds * stream.standard_normal(shape), dtype=np.float64)
+
+    def flights(self, genes: Floats, excitation: Floats | None, ends: Ends | None) -> _core.Flights:
+        """Candidates laid out for the engine; those of the campaign's own task where no ends are given."""
+        initial, target = ends or (self.task.initial_state, self.task.target_state)
+        return candidates(
+            self.family, genes, initial, target, self.task.steps,
+            excitation=excitation, divergence_factor=self.divergence_factor,
+        )  # fmt: skip
+
+    def stream(self, purpose: int, number: int) -> np.random.Generator:
+        """Random numbers of one purpose and one test."""
+        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 79, purpose, number])))
