@@ -83,7 +83,9 @@ def result_of_default(**advice):
             "gains": [{"name": "angle.kp", "value": 2.0, "unit": "N m/rad", "low": 0.0, "high": 6.0}],
         },
         "first_controller": {"gains": {"angle.kp": 1.0}, "predicted": 2.0, "measured": None},
-        "advice": {"before_test": 1, "gain": 0.5, "share": 0.25, "scatter": 0.1, "stop": False} | advice,
+        "advice": {
+            "before_test": 1, "trusted": True, "gain": 0.5, "share": 0.25, "scatter": 0.1, "stop": False, **advice
+        },
         "run_info": {},
     }  # fmt: skip
 
@@ -105,6 +107,7 @@ def test_a_result_of_default_says_what_a_person_must_know():
             "0.5 rad s, 25 % of what it is now.\nThat is above the scatter of one measurement, 0.1 rad s",
         ),
         ({"gain": 0.01, "share": None, "stop": True}, "by 0.01 rad s.\nThat is below the scatter"),
+        ({"trusted": False}, "it cannot say. Fly another one."),
         ({"gain": None}, "No committee was asked for a flight yet"),
     ],
 )

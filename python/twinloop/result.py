@@ -12,7 +12,7 @@ import numpy as np
 
 from twinloop.campaign import Campaign
 from twinloop.flight import fly
-from twinloop.history import Experiment, Lesson, Planned
+from twinloop.history import Experiment, Lesson
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality
@@ -216,18 +216,21 @@ def _simulated_quality(campaign: Campaign, twin: Twin, test: Test) -> float | No
 
 def _advice(campaign: Campaign, twin: Twin, best: Test) -> dict[str, object]:
     """What another experiment would bring, by the committee's own estimate, beside what a repeated flight scatters."""
-    planned = [plan for lesson in campaign.history for plan in lesson.asked if isinstance(plan, Planned)]
-    judged = [plan for plan in planned if math.isfinite(plan.predicted)]
-    gain = judged[-1].gain if judged else None
+    lessons = [lesson for lesson in campaign.history if isinstance(lesson, Lesson)]
+    judged = [(plan, lesson) for lesson in lessons for plan in lesson.asked if math.isfinite(plan.predicted)]
+    gain = judged[-1][0].gain if judged else None
+    # A model that diverges on its own runs, then or now, can advise nobody.
+    trusted = bool(judged) and math.isfinite(judged[-1][1].misfit) and math.isfinite(lessons[-1].misfit)
     scatter = _scatter(campaign, twin, best)
     quality = best.predicted if best.measured is None else best.measured
     known = gain is not None and quality is not None and math.isfinite(quality) and quality > 0.0
     return {
-        "before_test": judged[-1].test if judged else None,
+        "before_test": judged[-1][0].test if judged else None,
+        "trusted": trusted,
         "gain": gain,
         "share": gain / quality if known else None,  # type: ignore[operator]
         "scatter": scatter,
-        "stop": None if gain is None or scatter is None else gain <= scatter,
+        "stop": None if gain is None or scatter is None or not trusted else gain <= scatter,
     }
 
 

@@ -294,6 +294,10 @@ def _advice(result: Mapping[str, Any]) -> str:
     scatter = advice["scatter"]
     if advice["gain"] is None:
         return title + "No committee was asked for a flight yet; ask for one to hear what it would bring."
+    if not advice["trusted"]:
+        return (
+            title + "The model diverged on flights that it was learnt from: it cannot say. Fly another one."
+        )
     share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
     words = (
         f"When test {advice['before_test']} was planned, knowing which model is right would have improved the"
