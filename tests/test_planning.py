@@ -177,12 +177,9 @@ def test_where_no_candidate_keeps_the_margin_the_safest_is_offered_and_said_so()
     planner, committee = planner_of(known), committee_of(known)
     found = proposed(planner, committee)
     assert not found.safe and "safest" in found.reason
-    genes, excitation = planner._candidates(TUNED, "both", 3, False)
-    flights = candidates(
-        planner.family, genes, TASK.initial_state, TASK.target_state, STEPS, excitation=excitation
-    )
-    worst = qualities(committee.members, flights, planner.quality.engine, known)[1].max(axis=(0, 1))
-    assert usages(planner, committee, found).max() == pytest.approx(worst.min(), rel=1e-9)
+    flights = candidates(planner.family, TUNED[None], TASK.initial_state, TASK.target_state, STEPS)
+    quiet = qualities(committee.members, flights, planner.quality.engine, known)[1].max()
+    assert 0.9 < usages(planner, committee, found).max() <= quiet
 
 
 def test_another_number_is_another_proposal_and_the_same_number_the_same():

@@ -94,6 +94,16 @@ class Fitting:
         observer = [*(found.chain for found in sums), *given]
         model = self.model(sums, actuators)
         tuned, left, readings, covariance, _ = self.tune(model, observer, self.options.tuning_steps, 0)
+        if not np.isfinite(left):
+            # Held to its readings at every step it cannot run away; from there it may be let go.
+            held = [self._held(chain) for chain in observer]
+            tuned, left, readings, covariance, _ = self.tune(model, held, self.options.tuning_steps, 0)
+            freed = self.tune(tuned, observer, self.options.tuning_steps, 0)
+            if np.isfinite(freed[1]):
+                tuned, left, readings, covariance, _ = freed
+            else:
+                observer = held
+                sums = [replace(found, chain=chain) for found, chain in zip(sums, held, strict=False)]
         constants = tuned.constants
         written = list(sums)
         if np.isfinite(left) and self.form != "absolute":
@@ -103,6 +113,12 @@ class Fitting:
                 written[i] = replace(found, weights=dict(zip(found.weights, values, strict=True)))
                 place += len(found.weights)
         return Tuned(tuned, written, observer, left, readings, covariance)
+
+    def _held(self, chain: Chain) -> Chain:
+        """The chain with so much disturbance that its observer believes every reading."""
+        period = self.signals.dt if chain.integrated else 1.0
+        white = max(chain.motion[0], float(chain.sensors[0]) / period)
+        return chain.with_noise(chain.sensors, (white, chain.motion[1], chain.motion[2]))
 
     def _first_weight(self, sums: Sequence[Sum]) -> int:
         """Where the weights begin among a program's constants: those inside nodes come before them."""

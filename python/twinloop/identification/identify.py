@@ -30,6 +30,8 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Problem, Sum, first_noise, search
 from twinloop.signals import Signals
 
+FEW_RUNS = 2
+"""Runs up to which the noise is searched from above as well: more of them tell it by themselves."""
 LAGS_AGAIN = 4
 """Runs up to which lags and delays are searched anew; from then on they are only tuned."""
 
@@ -130,6 +132,10 @@ class _Learner:
             actuators, known = self._actuators(start, driven)
             problem = self._problem(actuators)
         self.watch("terms")
+        if len(self.fitting.runs) <= FEW_RUNS:
+            rough = [self._rough(chain) for chain in driven]
+            known = self._better(problem, driven, rough, start, known)
+            driven = [c if s is None else s.chain for s, c in zip(known, driven, strict=True)]
         sums = self._climb(problem, driven, known, base)
         tuned = self.fitting.tuned(sums, given, actuators)
         for _ in range(options.passes - 1):
@@ -172,6 +178,31 @@ class _Learner:
     def _given_noise(self, chain: Chain) -> Chain:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
         return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / self.signals.dt, 0.0, 1.0))
+
+    def _rough(self, chain: Chain) -> Chain:
+        """The chain as if all its roughness were its sensors'."""
+        period = self.signals.dt if chain.integrated else 1.0
+        first = float(chain.rough[0])
+        gust = 1e-4 * first / period**2 if self.options.gusts else 0.0
+        return chain.with_noise(chain.rough, (1e-6 * first / period, gust, 10.0 * self.signals.dt))
+
+    def _better(
+        self,
+        problem: Problem,
+        fine: Sequence[Chain],
+        rough: Sequence[Chain],
+        terms: Sequence[int],
+        known: Sequence[Sum | None],
+    ) -> list[Sum | None]:
+        """The shorter of two descriptions of each chain: too little noise makes many terms of a few runs."""
+        options = self.options
+        both = [
+            self._search(
+                problem, start, terms, known if start is fine else [None] * len(fine), options.moves, 2
+            )
+            for start in (fine, rough)
+        ]
+        return [a if a.energy <= b.energy else b for a, b in zip(*both, strict=True)]
 
     def _next(self) -> int:
         self.stream += 1

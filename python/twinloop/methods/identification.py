@@ -180,7 +180,7 @@ class IdentifyAndPlan:
         known = next((t for t in book.tests if t.genes.tobytes() == tuned.tobytes()), None)
         means = judged.qualities[:, :, pick].mean(axis=1)
         if pick == 1:
-            reason = f"The best gains flown: the twin prefers others in {100 * better:.0f} % of its predictions only."
+            reason = self._refusal(committee.trusted, safe, better, tuned, flown.genes)
             test = flown.judged(expected(means), measured)
         else:
             share = f"{100 * better:.0f} %"
@@ -284,6 +284,17 @@ class IdentifyAndPlan:
             return [family.genes(lqr_gains(committee.members[0], family, self.setup.target_state))]
         except (NotAvailable, InvalidInput):
             return []
+
+    def _refusal(self, trusted: bool, safe: bool, better: float, tuned: Floats, flown: Floats) -> str:
+        """Why the best gains flown are kept."""
+        if tuned.tobytes() == flown.tobytes():
+            return "The best gains flown: the twin knows no better ones."
+        if not trusted:
+            return "The best gains flown: the twin diverges on the runs that it was learnt from."
+        if not safe:
+            return "The best gains flown: a model sees those that the twin prefers leave the envelope."
+        share = f"{100 * better:.0f} %"
+        return f"The best gains flown: the twin prefers others in {share} of its predictions only."
 
     def _first_quality(self, book: Logbook) -> float:
         first = book.measured(book.experiments[0].test.number)

@@ -202,7 +202,11 @@ class Planner(Judge):
         keeps = judged.worst_usage <= reach
         limit = self._limit(float(mean[0]), goal, told, first_quality)
         allowed = keeps & (mean <= limit)
-        if exploit and keeps[0]:
+        repeats = len(genes) - self._repeats(len(genes))
+        if not committee.trusted:
+            # Nothing is known but that these gains have flown: again, with another excitation.
+            chosen = repeats
+        elif exploit and keeps[0]:
             chosen = 0
         elif allowed.any():
             chosen = int(np.argmax(np.where(allowed, values, -np.inf)))
@@ -210,10 +214,10 @@ class Planner(Judge):
             chosen = int(np.argmin(np.where(keeps, mean, np.inf)))
         else:
             # What was flown has kept the envelope, whatever the members make of it.
-            first = len(genes) - self._repeats(len(genes))
-            chosen = first + int(np.argmin(judged.worst_usage[first:]))
-        best = per_member[:, 0] if allowed.any() else per_member[:, chosen]
-        gain = float((best - per_member[:, keeps].min(axis=1)).mean()) if keeps.any() else 0.0
+            chosen = repeats + int(np.argmin(judged.worst_usage[repeats:]))
+        # What knowing the right member would bring: each one's own best against the best for all of them.
+        choices = per_member[:, keeps]
+        gain = float(choices.mean(axis=0).min() - choices.min(axis=1).mean()) if keeps.any() else 0.0
         row, state, high, low = (int(i) for i in where[chosen])
         noisy = self.judge(
             members,
@@ -225,7 +229,7 @@ class Planner(Judge):
         )
         safe = bool(judged.worst_usage[chosen] <= 1.0 - self.options.margin)
         left = int((noisy.usages > 1.0).sum())
-        flown = noisy.usages.size
+        drawn = noisy.usages.size
         means = noisy.qualities.mean(axis=(1, 2))
         return Proposal(
             genes=genes[chosen],
@@ -234,7 +238,7 @@ class Planner(Judge):
             excitation=excitation[chosen] if excitation[chosen].any() else None,
             predicted=expected(means),
             spread=float(means.std()),
-            risk=(left + 0.5) / (flown + 1.0),
+            risk=(left + 0.5) / (drawn + 1.0),
             safe=safe,
             disagreement=float(values[chosen]),
             gain=max(0.0, gain),
@@ -272,7 +276,8 @@ class Planner(Judge):
         most = options.excitation_most * (2.0 if goal == "model" else 1.0)
         if most > 0.0 and options.excitation > 0.0:
             for i in range(1, count):
-                amplitude = most * stream.random()
+                gentle = i >= count - self._repeats(count)
+                amplitude = options.excitation if gentle else most * stream.random()
                 excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
         return genes, excitation
 
