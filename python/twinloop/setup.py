@@ -13,6 +13,8 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, number, whole
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.identification.formulas import fixed_term, parsed_term
+from twinloop.identification.pool import Pool
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS, Quality, quality_of
 from twinloop.presets import AnyOptions, DefaultOptions, Options, options_of
@@ -126,6 +128,12 @@ def checked(
     setup = Setup(signals, family, start, target, steps, preset, chosen, known_seed, purpose, measure)
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
+    if isinstance(chosen, DefaultOptions):
+        pool = Pool(signals.n_x + signals.n_u)  # formulas are refused now rather than after the first flight
+        for text in chosen.seed_terms:
+            parsed_term(text, pool, signals)
+        for text in chosen.fixed_terms:
+            fixed_term(text, pool, signals)
     if isinstance(chosen, Options):
         with engine_input():
             grammar(chosen, signals)

@@ -40,7 +40,7 @@ def committee(
         np.random.Philox(np.random.SeedSequence([fitting.seed, 78, fitting.iteration]))
     )
     members = [best]
-    _, base, readings, _, draws = fitting.tune(best, observer, 0, size)
+    _, base, readings, _, draws = fitting.tune(best, sums, observer, 0, size)
     plausible = PLAUSIBLE * max(base, readings)
     grams = {}
     for attempt in range(3 * size):
@@ -67,7 +67,7 @@ def committee(
                 weights = dict(zip(terms, solved[0].tolist(), strict=True))
                 varied.append(replace(found, weights=weights))
         model = fitting.model(varied, fitting.lags_of(best))
-        _, left, _, _, drawn = fitting.tune(model, observer, 4, 1, unit=attempt + 1)
+        _, left, _, _, drawn = fitting.tune(model, varied, observer, 4, 1, unit=attempt + 1)
         if np.isfinite(left) and left <= plausible and drawn:
             members.append(drawn[0])
     while len(members) < size and draws:

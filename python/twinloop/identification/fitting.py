@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,6 +50,7 @@ class Fitting:
         seed: of the campaign.
         iteration: which streams of random numbers.
         workers: how the work is carried out.
+        fixed: for each output, nodes that drive it and are known.
     """
 
     def __init__(
@@ -62,7 +63,9 @@ class Fitting:
         seed: int,
         iteration: int,
         workers: _core.Workers,
+        fixed: Mapping[int, Sequence[int]] | None = None,
     ) -> None:
+        self.fixed = dict(fixed or {})
         self.runs = list(runs)
         self.pool = pool
         self.signals = signals
@@ -93,25 +96,23 @@ class Fitting:
     def _fitted(self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator]) -> Tuned:
         observer = [*(found.chain for found in sums), *given]
         model = self.model(sums, actuators)
-        tuned, left, readings, covariance, _ = self.tune(model, observer, self.options.tuning_steps, 0)
+        tuned, left, readings, covariance, _ = self.tune(model, sums, observer, self.options.tuning_steps, 0)
         if not np.isfinite(left):
             # Held to its readings at every step it cannot run away; from there it may be let go.
             held = [self._held(chain) for chain in observer]
-            tuned, left, readings, covariance, _ = self.tune(model, held, self.options.tuning_steps, 0)
-            freed = self.tune(tuned, observer, self.options.tuning_steps, 0)
+            tuned, left, readings, covariance, _ = self.tune(model, sums, held, self.options.tuning_steps, 0)
+            freed = self.tune(tuned, sums, observer, self.options.tuning_steps, 0)
             if np.isfinite(freed[1]):
                 tuned, left, readings, covariance, _ = freed
             else:
                 observer = held
                 sums = [replace(found, chain=chain) for found, chain in zip(sums, held, strict=False)]
-        constants = tuned.constants
         written = list(sums)
         if np.isfinite(left) and self.form != "absolute":
-            place = self._first_weight(sums)
-            for i, found in enumerate(sums):
-                values = constants[place : place + len(found.weights)].tolist()
-                written[i] = replace(found, weights=dict(zip(found.weights, values, strict=True)))
-                place += len(found.weights)
+            values = tuned.constants.tolist()
+            for i, places in enumerate(self._layout(sums)[1]):
+                weights = (values[place] for place in places)
+                written[i] = replace(sums[i], weights=dict(zip(sums[i].weights, weights, strict=True)))
         return Tuned(tuned, written, observer, left, readings, covariance)
 
     def _held(self, chain: Chain) -> Chain:
@@ -120,33 +121,50 @@ class Fitting:
         white = max(chain.motion[0], float(chain.sensors[0]) / period)
         return chain.with_noise(chain.sensors, (white, chain.motion[1], chain.motion[2]))
 
-    def _first_weight(self, sums: Sequence[Sum]) -> int:
-        """Where the weights begin among a program's constants: those inside nodes come before them."""
-        nodes = self.pool.needed(term for found in sums for term in found.weights if term != self.pool.one)
-        inner = [node for node in map(self.pool.node, nodes) if node is not None]
-        return sum(isinstance(node[2], float) for node in inner)
+    def _layout(self, sums: Sequence[Sum]) -> tuple[list[int], list[range]]:
+        """Which of a program's constants may move, and which are the weights of each output.
+
+        Constants inside nodes come first, then, output after output, a 1 for each known node and the weights.
+        """
+        known = [node for nodes in self.fixed.values() for node in nodes]
+        used = [term for found in sums for term in found.weights if term != self.pool.one]
+        held = [node for node in self.pool.needed([*used, *known]) if self._holds_constant(node)]
+        kept = {self.pool.one, *self.pool.needed(known)}
+        free = [place for place, node in enumerate(held) if node not in kept]
+        place, weights = len(held), []
+        for output, found in enumerate(sums):
+            place += len(self.fixed.get(output, ()))
+            weights.append(range(place, place + len(found.weights)))
+            free += weights[-1]
+            place += len(found.weights)
+        return free, weights
+
+    def _holds_constant(self, number: int) -> bool:
+        if number == self.pool.one:
+            return True
+        node = self.pool.node(number)
+        return node is not None and isinstance(node[2], float)
 
     def _without_weak(self, tuned: Tuned) -> tuple[list[Sum], float]:
         """The sums without terms whose uncertain weights do not pay for them, and what those cost."""
-        place, saved = self._first_weight(tuned.sums), 0.0
-        variances = np.diag(tuned.covariance)
-        kept = []
-        for found in tuned.sums:
+        free, places = self._layout(tuned.sums)
+        variances = dict(zip(free, np.diag(tuned.covariance).tolist(), strict=False))
+        saved, kept = 0.0, []
+        for found, at in zip(tuned.sums, places, strict=True):
             price = np.log(max(2, sum(int(run.weights[:, found.chain.states[0]].sum()) for run in self.runs)))
             weights: Weights = {}
-            for term, weight in found.weights.items():
+            for place, (term, weight) in zip(at, found.weights.items(), strict=True):
                 cost = price + 2.0 * self.pool.length(term)
                 if weight * weight >= cost * variances[place] or len(found.weights) == 1:
                     weights[term] = weight
                 else:
                     saved += cost
-                place += 1
             kept.append(replace(found, weights=weights or dict(found.weights)))
         return kept, float(saved)
 
     def model(self, sums: Sequence[Sum], actuators: Sequence[Actuator]) -> _core.Model:
         """The model whose outputs are sums, behind actuators."""
-        outputs = [dict(found.weights) for found in sums]
+        outputs = [dict.fromkeys(self.fixed.get(i, ()), 1.0) | found.weights for i, found in enumerate(sums)]
         if self.form == "absolute":
             for i, terms in enumerate(outputs):
                 terms[i] = terms.get(i, 0.0) + 1.0
@@ -157,6 +175,7 @@ class Fitting:
     def tune(
         self,
         model: _core.Model,
+        sums: Sequence[Sum],
         observer: Sequence[Chain],
         steps: int,
         draws: int,
@@ -166,6 +185,7 @@ class Fitting:
 
         Args:
             model: to begin with.
+            sums: that it is made of.
             observer: all chains, with their noise.
             steps: at most.
             draws: models to be drawn from what the runs leave open.
@@ -174,13 +194,14 @@ class Fitting:
         Returns:
             The tuned model, its χ², the readings that counted, the covariance of its constants and lags, the draws.
         """
+        free = list(range(len(model.constants))) if self.form == "absolute" else self._layout(sums)[0]
         lags = [g for g in groups(self.signals) if self.lags_of(model)[g[0]][0] > 0.0]
         with engine_input():
             return _core.tune(
                 model,
                 [chain.engine for chain in observer],
                 [(run.states, run.weights, run.commands) for run in self.runs],
-                free=list(range(len(model.constants))) if self.options.tuning else [],
+                free=free if self.options.tuning else [],
                 lags=lags if self.options.tuning else [],
                 iterations=steps,
                 draws=draws,

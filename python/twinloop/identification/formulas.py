@@ -1,4 +1,4 @@
-"""Terms that a user suspects, written as formulas of states and commands: parsed, never evaluated as code."""
+"""Terms that a user suspects or knows, written as formulas of states and commands: parsed, never run as code."""
 
 from __future__ import annotations
 
@@ -32,24 +32,54 @@ def parsed_term(text: str, pool: Pool, signals: Signals) -> int:
         InvalidInput: text that is no such formula, or names what is not there.
     """
     if len(text) > LONGEST:
-        raise InvalidInput(f"Seed term: expected at most {LONGEST} characters, found {len(text)}; split it.")
+        raise InvalidInput(f"Term: expected at most {LONGEST} characters, found {len(text)}; split it.")
     try:
         tree = ast.parse(text, mode="eval").body
     except SyntaxError as reason:
-        raise InvalidInput(f"Seed term {text!r}: expected a formula such as 'rate * abs(rate)'.") from reason
+        raise InvalidInput(f"Term {text!r}: expected a formula such as 'rate * abs(rate)'.") from reason
     names = {name: i for i, name in enumerate((*signals.state_names, *signals.command_names))}
     return _node(tree, text, pool, names)
+
+
+def fixed_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int]:
+    """What is known of a law.
+
+    Args:
+        text: "state: formula", such as "rate: -9.81 * sin(angle)".
+        pool: where the formula is entered.
+        signals: whose names it may use.
+
+    Returns:
+        The state's number, and the node.
+
+    Raises:
+        InvalidInput: no such state, or no formula.
+    """
+    name, separator, formula = text.partition(":")
+    if not separator or name.strip() not in signals.state_names:
+        raise InvalidInput(
+            f"Fixed term {text!r}: expected 'state: formula' with one of the states"
+            f" {', '.join(signals.state_names)}; such as '{signals.state_names[-1]}: -9.81 * sin(angle)'."
+        )
+    # Times 1, so that it is never one of the terms that are searched.
+    known = pool.add(("*", parsed_term(formula.strip(), pool, signals), 1.0))
+    return signals.state_names.index(name.strip()), known
 
 
 def _node(tree: ast.expr, text: str, pool: Pool, names: dict[str, int]) -> int:
     def inner(part: ast.expr) -> int:
         return _node(part, text, pool, names)
 
+    constant = _constant(tree)
+    if constant is not None:
+        return pool.add(("*", pool.one, constant))
     match tree:
         case ast.Name(id=name) if name in names:
             return names[name]
-        case ast.Constant(value=value) if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return pool.add(("*", pool.one, float(value)))
+        case ast.BinOp(left=left, op=ast.Mult(), right=right) if _constant(left) is not None:
+            return pool.add(("*", inner(right), _constant(left)))
+        case ast.BinOp(left=left, op=ast.Mult(), right=right) if _constant(right) is not None:
+            return pool.add(("*", inner(left), _constant(right)))
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return pool.add(("*", inner(operand), -1.0))
         case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int(power))) if (
@@ -65,6 +95,18 @@ def _node(tree: ast.expr, text: str, pool: Pool, names: dict[str, int]) -> int:
         case _:
             known = ", ".join(names)
             raise InvalidInput(
-                f"Seed term {text!r}: expected numbers, + - * / **, abs, sqrt, sin, cos, tanh, exp, min, max and the"
+                f"Term {text!r}: expected numbers, + - * / **, abs, sqrt, sin, cos, tanh, exp, min, max and the"
                 f" names {known}, found {ast.unparse(tree)!r}; write it with those."
             )
+
+
+def _constant(tree: ast.expr) -> float | None:
+    """The value of a number as it is written, with a sign or without; None for anything else."""
+    match tree:
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            value = _constant(operand)
+            return None if value is None else -value
+        case ast.Constant(value=value) if isinstance(value, (int, float)) and not isinstance(value, bool):
+            return float(value)
+        case _:
+            return None

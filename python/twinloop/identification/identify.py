@@ -15,12 +15,13 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.errors import InvalidInput
 from twinloop.identification.actuation import search_actuators, total
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.committee import committee
 from twinloop.identification.evolution import evolve
 from twinloop.identification.fitting import Fitting
-from twinloop.identification.formulas import parsed_term
+from twinloop.identification.formulas import fixed_term, parsed_term
 from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
@@ -98,7 +99,14 @@ class _Learner:
             self.pool, self.known = copy.deepcopy(known.pool), known
         else:
             self.pool, self.known = Pool(signals.n_x + signals.n_u, len(options.operators)), None
-        self.fitting = Fitting(runs, self.pool, signals, self.form, options, seed, iteration, workers)
+        known_terms = self._known_terms()
+        driven = [
+            chain.states[0] for chain in chains(signals, self.form, self.scales) if chain.output is not None
+        ]
+        self.fixed = {driven[output]: nodes for output, nodes in known_terms.items()}
+        self.fitting = Fitting(
+            runs, self.pool, signals, self.form, options, seed, iteration, workers, known_terms
+        )
         self.stream = 0
 
     def learn(self) -> Identified:
@@ -171,9 +179,28 @@ class _Learner:
 
     # Steps
 
+    def _known_terms(self) -> dict[int, list[int]]:
+        """Nodes that are known to drive each output."""
+        outputs = {
+            chain.states[0]: chain.output
+            for chain in chains(self.signals, self.form, self.scales)
+            if chain.output is not None
+        }
+        known: dict[int, list[int]] = {}
+        for text in self.options.fixed_terms:
+            state, node = fixed_term(text, self.pool, self.signals)
+            if state not in outputs:
+                raise InvalidInput(
+                    f"Fixed term {text!r}: expected a state that an output drives, one of"
+                    f" {', '.join(self.signals.state_names[i] for i in outputs)}; write it for one of them."
+                )
+            known.setdefault(outputs[state], []).append(node)
+        return known
+
     def _problem(self, actuators: Sequence[Actuator]) -> Problem:
         inputs = stages(self.fitting.runs, self.signals, actuators)
-        return Problem(self.pool, self.fitting.runs, inputs, self.signals.dt, self.workers)
+        runs, dt = self.fitting.runs, self.signals.dt
+        return Problem(self.pool, runs, inputs, dt, self.workers, self.fixed)
 
     def _given_noise(self, chain: Chain) -> Chain:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""

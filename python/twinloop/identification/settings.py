@@ -20,6 +20,8 @@ class IdentificationOptions:
             evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
             the first rung of the ladder.
+        fixed_terms: what is known of the law, such as "rate: -9.81 * sin(angle)": a state that an output drives, and a
+            formula with its constants, which stay as they are.
         operators: that evolved programs may use.
         generations: of evolved features; 0: none.
         restarts: of the evolution.
@@ -42,6 +44,7 @@ class IdentificationOptions:
     form: str = "auto"
     libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "trigonometric", "cubic")
     seed_terms: tuple[str, ...] = ()
+    fixed_terms: tuple[str, ...] = ()
     operators: tuple[str, ...] = ("+", "-", "*", "/", "abs", "sqrt", "sin", "cos", "min", "max")
     generations: int = 6
     restarts: int = 1

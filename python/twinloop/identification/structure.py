@@ -52,11 +52,19 @@ class Problem:
         stages: their inputs within each period.
         dt: period, s.
         workers: how the work is carried out.
+        fixed: for the first state of each chain, nodes that drive it and are known.
     """
 
     def __init__(
-        self, pool: Pool, runs: Sequence[Run], stages: Stages, dt: float, workers: _core.Workers
+        self,
+        pool: Pool,
+        runs: Sequence[Run],
+        stages: Stages,
+        dt: float,
+        workers: _core.Workers,
+        fixed: Mapping[int, Sequence[int]] | None = None,
     ) -> None:
+        self.fixed = dict(fixed or {})
         self.pool = pool
         self.runs = runs
         self.stages = stages
@@ -77,7 +85,14 @@ class Problem:
         return [term for term in terms if all(np.abs(column).max() < 1e100 for column in self._values[term])]
 
     def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
-        """Of one chain on terms that were found usable."""
+        """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
+        known = self.usable(self.fixed.get(chain.states[0], ()))
+        readings = [run.states[:, list(chain.states)] for run in self.runs]
+        if known:
+            readings = self._of(chain, known, readings).residuals(np.ones(len(known)))
+        return self._of(chain, terms, readings)
+
+    def _of(self, chain: Chain, terms: Sequence[int], readings: Sequence[Floats]) -> _core.Regression:
         start, middle, end = (np.stack([self._values[term][s] for term in terms], axis=1) for s in range(3))
         states = list(chain.states)
         records = [
