@@ -11,10 +11,12 @@ import twinloop as tl
 from oracles import UNARY, operate, same_bits
 from twinloop import _core
 from twinloop.identification.chains import chains
+from twinloop.identification.fitting import Fitting
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, guessed_noise
+from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import prices
 from twinloop.presets import options_of
 
@@ -314,3 +316,25 @@ def test_what_was_learnt_before_is_not_changed_and_the_same_bits_come_again():
     for other in later[1:]:
         assert [str(m.program) for m in other.members] == [str(m.program) for m in later[0].members]
         assert other.energy == later[0].energy
+
+
+def test_a_model_that_a_small_change_makes_diverge_keeps_its_terms(monkeypatch):
+    # Then tuning knows no covariance, and nothing can be said of a weight.
+    tune = Fitting.tune
+
+    def without_covariance(self, *arguments, **named):
+        model, left, readings, covariance, draws = tune(self, *arguments, **named)
+        return model, left, readings, covariance[:0], draws
+
+    monkeypatch.setattr(Fitting, "tune", without_covariance)
+    stream = np.random.default_rng(5)
+    commands = stream.uniform(-1.0, 1.0, (40, 1))
+    states = np.zeros((41, 1))
+    for k in range(40):
+        states[k + 1] = 0.9 * states[k] + 0.3 * commands[k]
+    signals = tl.Signals(
+        states=[tl.State("level", "m", scale=1.0)], commands=[tl.Command("pump", "V", bounds=(-1, 1))], dt=0.5
+    )
+    options = IdentificationOptions(moves=1000, generations=0, committee_size=2, lags=False)
+    found = identify_runs([Run.of(states, commands)], signals, options, workers=_core.Workers(1))
+    assert found.terms == 2

@@ -147,6 +147,10 @@ class Fitting:
 
     def _without_weak(self, tuned: Tuned) -> tuple[list[Sum], float]:
         """The sums without terms whose uncertain weights do not pay for them, and what those cost."""
+        if (
+            not tuned.covariance.size
+        ):  # a small change of a constant makes it diverge: nothing is known of weights
+            return list(tuned.sums), 0.0
         free, places = self._layout(tuned.sums)
         variances = dict(zip(free, np.diag(tuned.covariance).tolist(), strict=False))
         saved, kept = 0.0, []

@@ -102,7 +102,7 @@ class IdentifyAndPlan:
         # Where hardly any can, the ones that go wrong least still show where more must be known.
         order = np.argsort((free / np.maximum(frozen, 1e-300)).max(axis=1), kind="stable")
         kept = {0, *np.flatnonzero(~wrong).tolist()}
-        kept |= set(order[: max(0, FEWEST - len(kept))].tolist())
+        kept |= set([i for i in order.tolist() if i not in kept][: max(0, FEWEST - len(kept))])
         self._believed = [identified.members[i] for i in sorted(kept)]
         self.identified, self._learnt, self.iteration = identified, told, told
         self._needed = needed

@@ -243,8 +243,8 @@ class Planner(Judge):
             disagreement=float(values[chosen]),
             gain=max(0.0, gain),
             reason=self._reason(
-                goal,
                 exploit and chosen == 0,
+                chosen >= repeats,
                 safe,
                 float(values[chosen]),
                 row,
@@ -309,9 +309,20 @@ class Planner(Judge):
         return ends[0], ends[1]
 
     def _reason(
-        self, goal: str, exploits: bool, safe: bool, value: float, row: int, state: int, pair: tuple[int, int]
+        self,
+        exploits: bool,
+        repeats: bool,
+        safe: bool,
+        value: float,
+        row: int,
+        state: int,
+        pair: tuple[int, int],
     ) -> str:
         sentences = []
+        if repeats:
+            sentences.append(
+                "The best gains flown, again, with another gentle excitation: they are known to fly."
+            )
         if exploits:
             sentences.append("The best gains that the twin knows, flown as they are.")
         elif value > 0.0 and pair[0] != pair[1]:
@@ -324,6 +335,6 @@ class Planner(Judge):
         if not safe:
             sentences.append(
                 "No candidate keeps the envelope with its margin, or lasts at all, on every model: this is the safest"
-                " one, as near to the best gains flown as can be. Fly it with a hand on the switch, or not at all."
+                " that is known. Fly it with a hand on the switch, or not at all."
             )
         return " ".join(sentences)
