@@ -224,3 +224,16 @@ def test_gains_tuned_on_a_committee_beat_the_start_and_keep_the_margin():
     assert judged.mean[0] < judged.mean[1] and judged.worst_usage[0] <= 0.9 + 0.02
     same, _ = planner.tune(committee, [start], 1)
     assert same_bits(genes, same)
+
+
+def test_without_excitation_a_flight_that_is_flown_again_is_varied():
+    known = signals()
+    unsure = Committee(committee_of(known).members, np.array([1e-3, 5e-3]), False)
+    planner = planner_of(known, excitation=0.0)
+    found = proposed(planner, unsure)
+    assert found.excitation is None and not same_bits(found.genes, TUNED)
+    places = to_unit(planner.family, np.stack([found.genes, TUNED]))
+    assert np.abs(places[0] - places[1]).max() < 0.2
+    assert "small variation" in found.reason
+    again = proposed(planner_of(known), unsure)
+    assert same_bits(again.genes, TUNED) and again.excitation is not None

@@ -271,7 +271,14 @@ class Planner(Judge):
             places[count // 2 :] = stream.random((count - count // 2, self.family.size))
         genes = from_unit(self.family, np.clip(places, 0.0, 1.0))
         genes[0] = tuned
-        genes[count - self._repeats(count) :] = flown
+        again = self._repeats(count)
+        genes[count - again :] = flown
+        if options.excitation <= 0.0:
+            # The same flight once more would tell nothing: gains close by.
+            near = to_unit(self.family, flown) + 0.3 * options.nearness * stream.standard_normal(
+                (again, self.family.size)
+            )
+            genes[count - again :] = from_unit(self.family, np.clip(near, 0.0, 1.0))
         excitation = np.zeros((count, self.task.steps, self.signals.n_u))
         most = options.excitation_most * (2.0 if goal == "model" else 1.0)
         if most > 0.0 and options.excitation > 0.0:
@@ -320,9 +327,8 @@ class Planner(Judge):
     ) -> str:
         sentences = []
         if repeats:
-            sentences.append(
-                "The best gains flown, again, with another gentle excitation: they are known to fly."
-            )
+            change = "another gentle excitation" if self.options.excitation > 0.0 else "a small variation"
+            sentences.append(f"The best gains flown, again, with {change}: they are known to fly.")
         if exploits:
             sentences.append("The best gains that the twin knows, flown as they are.")
         elif value > 0.0 and pair[0] != pair[1]:
