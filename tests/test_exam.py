@@ -21,10 +21,11 @@ from twinloop.exam.library import model_inputs, monomials, unknown_states, varia
 from twinloop.exam.plan import Scope, planned
 from twinloop.exam.results import Results, spread
 from twinloop.exam.store import Address, Row, Store
-from twinloop.exam.systems import Subject, from_unit, subject, to_unit
+from twinloop.exam.systems import Subject, subject
 from twinloop.exam.tables import as_markdown, render, tables
 from twinloop.exam.tuning import score, tuned, variants
 from twinloop.models import Twin
+from twinloop.planning.gains import from_unit, to_unit
 
 PAPER = for_smoke(LEARNERS["paper"])
 RANDOM = LEARNERS["random-gains"]

@@ -6,6 +6,7 @@ import dataclasses
 import math
 import uuid
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -15,6 +16,8 @@ from twinloop.objectives import frozen_error
 from twinloop.setup import Setup
 from twinloop.test import Test, check_signals, final_distance
 from twinloop.trajectory import Trajectory, check_recorded
+
+Asked = TypeVar("Asked", TestLoop, Planned)
 
 
 class Logbook:
@@ -172,15 +175,8 @@ class Logbook:
         Returns:
             The same, complete.
         """
-        plans = [
-            (iteration, dataclasses.replace(plan, flown=self.measured(plan.test)))
-            for iteration, plan in self.asked
-            if isinstance(plan, Planned)
-        ]
         return tuple(
-            dataclasses.replace(
-                record, asked=tuple(plan for iteration, plan in plans if iteration == record.iteration)
-            )
+            dataclasses.replace(record, asked=self._asked_after(record.iteration, Planned))
             for record in records
         )
 
@@ -193,16 +189,17 @@ class Logbook:
         Returns:
             The same, complete.
         """
-        loops = [
-            (iteration, dataclasses.replace(loop, flown=self.measured(loop.test)))
-            for iteration, loop in self.asked
-            if isinstance(loop, TestLoop)
-        ]
         return tuple(
-            dataclasses.replace(
-                record, asked=tuple(loop for iteration, loop in loops if iteration == record.iteration)
-            )
+            dataclasses.replace(record, asked=self._asked_after(record.iteration, TestLoop))
             for record in records
+        )
+
+    def _asked_after(self, iteration: int, kind: type[Asked]) -> tuple[Asked, ...]:
+        """What was asked for after an iteration, with the quality flown so far."""
+        return tuple(
+            dataclasses.replace(asked, flown=self.measured(asked.test))
+            for after, asked in self.asked
+            if after == iteration and isinstance(asked, kind)
         )
 
     def _known(self, test: object) -> Test:

@@ -15,6 +15,7 @@ from twinloop.equations import equations
 from twinloop.errors import engine_input
 from twinloop.flight import fly
 from twinloop.signals import Signals
+from twinloop.streams import stream
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
 
@@ -77,6 +78,11 @@ class Noise:
     moves: Floats
     gusts: tuple[tuple[tuple[int, ...], bool, float, float], ...] = ()
     dt: float = 1.0
+
+    def drawn(self, draws: int, steps: int, stream: np.random.Generator) -> tuple[Floats, Floats]:
+        """What sensors add to readings (draws, steps + 1, n_x), and disturbances to states (draws, steps, n_x)."""
+        noise = self.sensors * stream.standard_normal((draws, steps + 1, len(self.sensors)))
+        return np.asarray(noise, dtype=np.float64), self.disturbance(draws, steps, stream)
 
     def disturbance(self, draws: int, steps: int, stream: np.random.Generator) -> Floats:
         """Draws of what disturbances add to the states (draws, steps, n_x)."""
@@ -182,10 +188,7 @@ class Twin:
         """
         if not self.members or self.noise is None:
             return None
-        stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 80])))
-        shape = (DRAWS, test.steps + 1, self.signals.n_x)
-        noise = self.noise.sensors * stream.standard_normal(shape)
-        moves = self.noise.disturbance(DRAWS, test.steps, stream)
+        noise, moves = self.noise.drawn(DRAWS, test.steps, stream(self.seed, 80))
         excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
         runs = []
         for member in self.members:

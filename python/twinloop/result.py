@@ -17,6 +17,7 @@ from twinloop.models import TestErrors, Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality
 from twinloop.presets import DefaultOptions
+from twinloop.streams import stream
 from twinloop.test import Test
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
@@ -238,10 +239,7 @@ def _scatter(campaign: Campaign, twin: Twin, best: Test) -> float | None:
     """Standard deviation of the quality that would be measured if the same flight were repeated, on the twin."""
     if twin.noise is None:
         return None
-    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([campaign.setup.seed, 81])))
-    shape = (REPEATS, best.steps + 1, campaign.signals.n_x)
-    noise = twin.noise.sensors * stream.standard_normal(shape)
-    moves = twin.noise.disturbance(REPEATS, best.steps, stream)
+    noise, moves = twin.noise.drawn(REPEATS, best.steps, stream(campaign.setup.seed, 81))
     values = []
     for seen, moved in zip(noise, moves, strict=True):
         run = fly(twin.model, best, noise=seen, disturbance=moved, divergence_factor=twin.divergence_factor)

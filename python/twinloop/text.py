@@ -96,9 +96,9 @@ def _errors(result: Mapping[str, Any]) -> str:
     return "ERRORS OF THE TWIN, ONE ROW A TEST\n" + table(head, rows) + "\n" + note
 
 
-def _controller(result: Mapping[str, Any]) -> str:
-    best, first = result["controller"], result["first_controller"]
-    rows = [
+def _gains(best: Mapping[str, Any], first: Mapping[str, Any]) -> list[list[object]]:
+    """A row a gain: name, value, the first controller's, unit, bounds."""
+    return [
         [
             gain["name"],
             gain["value"],
@@ -108,6 +108,11 @@ def _controller(result: Mapping[str, Any]) -> str:
         ]
         for gain in best["gains"]
     ]
+
+
+def _controller(result: Mapping[str, Any]) -> str:
+    best, first = result["controller"], result["first_controller"]
+    rows = _gains(best, first)
     measured, reference = best["measured"], first["measured"]
     quality = (
         f"Final distance on the system: {cell(measured)}; first controller: {cell(reference)}; "
@@ -259,16 +264,7 @@ def _own(run: Mapping[str, Any]) -> str:
 
 def _controller_to_fly(result: Mapping[str, Any]) -> str:
     best, first = result["controller"], result["first_controller"]
-    gains = [
-        [
-            gain["name"],
-            gain["value"],
-            first["gains"][gain["name"]],
-            gain["unit"],
-            f"{gain['low']:g} to {gain['high']:g}",
-        ]
-        for gain in best["gains"]
-    ]
+    gains = _gains(best, first)
     state = f"TEST {best['test']}, FLOWN" if best["flown"] else "NOT FLOWN YET"
     qualities = [
         ["this controller", best["predicted"], best["spread"], best["measured"]],

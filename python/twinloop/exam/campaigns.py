@@ -12,8 +12,11 @@ from twinloop.exam import quality
 from twinloop.exam.held_out import PENALTY, HeldOut
 from twinloop.exam.kinds import Campaigner
 from twinloop.exam.measures import coverage, number_of_terms, quantiles, violated
-from twinloop.exam.systems import Subject, from_unit
+from twinloop.exam.systems import Subject
+from twinloop.flight import fly
 from twinloop.models import Twin
+from twinloop.planning.gains import from_unit
+from twinloop.streams import stream
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -84,12 +87,12 @@ def random_gains(subject: Subject, seed: int, experiments: int) -> Iterator[Meas
         What was measured of each flight.
     """
     rig = subject.rig(seed)
-    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 1])))
+    draw = stream(seed, 1)
     for k in range(experiments + 1):
         clock = time.monotonic()
         genes = subject.family.genes(rig.default_gains)
         if k:
-            genes = from_unit(subject.family, stream.random(subject.family.size))
+            genes = from_unit(subject.family, draw.random(subject.family.size))
         test = subject.test(genes)
         flight = rig.run(test)
         yield k, of_flight(subject, test, flight), flight, time.monotonic() - clock
@@ -105,14 +108,14 @@ def of_twin(twin: Twin, held_out: HeldOut) -> dict[str, float | None]:
     Returns:
         Measures by name.
     """
-    errors = held_out.errors(twin.simulate)
+    # Without the committee's band, which `twin.simulate` would draw for each of the controllers.
+    errors = held_out.errors(lambda test: fly(twin.model, test, divergence_factor=twin.divergence_factor))
     median, tail = quantiles(errors)
-    program = getattr(twin.model, "program", None)
     return {
         "error_median": median,
         "error_p90": tail,
         "diverged": float(np.sum(errors >= PENALTY)),
-        "terms": None if program is None else float(number_of_terms(program)),
+        "terms": float(number_of_terms(twin.model.program)),
     }
 
 
@@ -149,12 +152,12 @@ def of_flight(subject: Subject, test: Test, flight: Trajectory) -> dict[str, flo
 def _foretold(predicts: str, twin: Twin | None, test: Test, flight: Trajectory) -> dict[str, float | None]:
     """What was said of an experiment before it was flown, against what was measured."""
     found: dict[str, float | None] = {}
-    predicted = getattr(test, "predicted", None)
+    predicted = test.predicted
     if predicted is not None and np.isfinite(predicted):
         measured = quality.of_states(predicts, flight.states, test)
         found |= {"predicted": predicted, "measured": measured, "predicted_minus_flown": predicted - measured}
     if twin is not None:
-        band = getattr(twin.simulate(test), "band", None)
+        band = twin.simulate(test).band
         if band is not None:
             found["coverage"] = coverage(np.asarray(band), flight.states)
     return found

@@ -12,6 +12,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.exam.quality import difference, true_states
 from twinloop.exam.systems import Subject
+from twinloop.streams import stream
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -92,10 +93,10 @@ def controllers(subject: Subject) -> Floats:
     Returns:
         Genes (100, size), in their units.
     """
-    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence(SEED)))
+    draw = stream(SEED)
     low = np.array([gain.low for gain in subject.family.gains])
     high = np.array([gain.high for gain in subject.family.gains])
-    return np.asarray(low + (high - low) * stream.random((COUNT, subject.family.size)))
+    return np.asarray(low + (high - low) * draw.random((COUNT, subject.family.size)))
 
 
 def fly(subject: Subject) -> HeldOut:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from twinloop import systems
 from twinloop.arrays import Floats
 from twinloop.controllers import Family, UnboundFamily
-from twinloop.errors import NotAvailable, TwinloopError, unknown
+from twinloop.errors import TwinloopError, unknown
 from twinloop.exam import quality
 from twinloop.signals import Signals
 from twinloop.test import Test
@@ -156,73 +156,17 @@ class Subject:
         return quality.of_nothing(self.quality, self.test(np.array([g.low for g in self.family.gains])))
 
 
-def from_unit(family: Family, units: ArrayLike) -> Floats:
-    """Gains from the unit cube, decades evenly where a gain is logarithmic.
-
-    Args:
-        family: of the controllers.
-        units: (..., size), 0 to 1.
-
-    Returns:
-        Genes (..., size), in their units.
-    """
-    low = np.array([gain.low for gain in family.gains])
-    high = np.array([gain.high for gain in family.gains])
-    decades = np.array([gain.logarithmic for gain in family.gains])
-    ratio = np.where(decades, high / np.where(decades, low, 1.0), 1.0)
-    share = np.clip(np.asarray(units, dtype=np.float64), 0.0, 1.0)
-    genes = np.where(decades, low * ratio**share, low + (high - low) * share)
-    return np.clip(genes, low, high)
-
-
-def to_unit(family: Family, genes: ArrayLike) -> Floats:
-    """The inverse of `from_unit`.
-
-    Args:
-        family: of the controllers.
-        genes: (..., size), in their units.
-
-    Returns:
-        (..., size), 0 to 1.
-    """
-    low = np.array([gain.low for gain in family.gains])
-    high = np.array([gain.high for gain in family.gains])
-    decades = np.array([gain.logarithmic for gain in family.gains])
-    values = np.asarray(genes, dtype=np.float64)
-    safe = np.where(decades, values, 1.0)
-    base, top = np.where(decades, low, 1.0), np.where(decades, high, np.e)
-    logarithmic = np.log(safe / base) / np.log(top / base)
-    return np.asarray(np.where(decades, logarithmic, (values - low) / (high - low)))
-
-
 def _quadrotor(noise: float) -> Callable[[int], Any]:
     return lambda seed: systems.Quadrotor(noise=noise, seed=seed)
 
 
 def _harsh(seed: int) -> Any:
-    make = getattr(systems.Quadrotor, "harsh", None)
-    if make is None:
-        raise NotAvailable(
-            "System 'quadrotor-harsh': expected twinloop.systems.Quadrotor.harsh, found none in this version;"
-            " leave the system out."
-        )
-    return make(noise=NOISE, seed=seed)
+    return systems.Quadrotor.harsh(noise=NOISE, seed=seed)
 
 
 def _harsh_in_calm_air() -> Any:
     harsh = _harsh(0)
-    make: Any = systems.Quadrotor
-    return make(drag=harsh.drag, motor_lag=harsh.motor_lag)
-
-
-def _rotorpy(**arguments: object) -> Any:
-    make = getattr(systems, "RotorPy", None)
-    if make is None:
-        raise NotAvailable(
-            "System 'rotorpy': expected twinloop.systems.RotorPy, found none in this version; leave the"
-            " system out."
-        )
-    return make(**arguments)
+    return systems.Quadrotor(drag=harsh.drag, motor_lag=harsh.motor_lag)
 
 
 SUBJECTS: dict[str, Subject] = {
@@ -231,13 +175,8 @@ SUBJECTS: dict[str, Subject] = {
         Subject("quadrotor-0", "final_distance", _quadrotor(0.0), systems.Quadrotor),
         Subject("quadrotor", "final_distance", _quadrotor(NOISE), systems.Quadrotor, NOISY_RUNS),
         Subject("quadrotor-noisy", "final_distance", _quadrotor(10.0 * NOISE), systems.Quadrotor, NOISY_RUNS),
-        Subject(
-            "quadrotor-harsh",
-            "iae",
-            _harsh,
-            _harsh_in_calm_air,
-        ),
-        Subject("rotorpy", "iae", lambda seed: _rotorpy(noise=NOISE, seed=seed), _rotorpy),
+        Subject("quadrotor-harsh", "iae", _harsh, _harsh_in_calm_air),
+        Subject("rotorpy", "iae", lambda seed: systems.RotorPy(noise=NOISE, seed=seed), systems.RotorPy),
     )
 }
 """Systems of the exam by name."""

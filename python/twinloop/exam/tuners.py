@@ -14,7 +14,9 @@ from twinloop.arrays import Floats
 from twinloop.exam import quality
 from twinloop.exam.campaigns import Measured, of_flight
 from twinloop.exam.kinds import Optimum, Tuner
-from twinloop.exam.systems import Subject, from_unit, to_unit
+from twinloop.exam.systems import Subject
+from twinloop.planning.gains import from_unit, to_unit
+from twinloop.streams import stream
 
 Evaluate = Callable[[Floats], float]
 """Quality of gains given in the unit cube (size,), to be minimised."""
@@ -83,7 +85,7 @@ def optimum(who: Optimum, subject: Subject) -> Iterator[Measured]:
     def evaluate(units: Floats) -> float:
         return subject.true_quality(from_unit(family, units), runs=draws, seed=1)
 
-    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([20, 26])))
+    draw = stream(20, 26)
     first = to_unit(family, family.genes(subject.true_rig.default_gains))
     bests = []
     for number in range(who.starts):
@@ -99,7 +101,7 @@ def optimum(who: Optimum, subject: Subject) -> Iterator[Measured]:
                 best[:] = [value, np.array(units)]
             return value
 
-        start = first if number == 0 else stream.random(family.size)
+        start = first if number == 0 else draw.random(family.size)
         with suppress(_OutOfFlightsError):
             cma_es(fly, start, {"step": 0.2}, number, flights)
         bests.append((best[0], best[1]))
@@ -142,12 +144,12 @@ def gaussian_process(
         verbose=0,
         allow_duplicate_points=True,
     )
-    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 2])))
+    draw = stream(seed, 2)
     for number in range(flights):
         if number == 0:
             units = start
         elif number <= int(str(settings["random"])):
-            units = stream.random(len(start))
+            units = draw.random(len(start))
         else:
             suggested = optimiser.suggest()
             units = np.array([float(suggested[name]) for name in names])

@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.identification.chains import Chain
 from twinloop.identification.fitting import Fitting
 from twinloop.identification.structure import Problem, Sum
+from twinloop.streams import stream
 
 PLAUSIBLE = 1.5
 """Multiple of the best model's χ² up to which another structure is a member."""
@@ -36,9 +37,7 @@ def committee(
         At most as many as the options ask for, the best first.
     """
     size = fitting.options.committee_size
-    stream = np.random.Generator(
-        np.random.Philox(np.random.SeedSequence([fitting.seed, 78, fitting.iteration]))
-    )
+    draw = stream(fitting.seed, 78, fitting.iteration)
     members = [best]
     _, base, readings, _, draws = fitting.tune(best, sums, observer, 0, size)
     plausible = PLAUSIBLE * max(base, readings)
@@ -46,7 +45,7 @@ def committee(
     for attempt in range(3 * size):
         if len(members) >= size:
             break
-        structures = [_other(found, stream) for found in sums]
+        structures = [_other(found, draw) for found in sums]
         if all(s is None for s in structures):
             if draws:
                 members.append(draws.pop())
@@ -75,8 +74,8 @@ def committee(
     return members
 
 
-def _other(found: Sum, stream: np.random.Generator) -> tuple[int, ...] | None:
+def _other(found: Sum, draw: np.random.Generator) -> tuple[int, ...] | None:
     """A subset drawn by how likely it is; None for the best one."""
     chances = np.exp(-0.5 * np.array([0.0, *(above for _, above in found.others)]))
-    pick = int(np.searchsorted(np.cumsum(chances) / chances.sum(), stream.random()))
+    pick = int(np.searchsorted(np.cumsum(chances) / chances.sum(), draw.random()))
     return None if pick == 0 else found.others[min(pick, len(found.others)) - 1][0]

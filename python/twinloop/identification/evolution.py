@@ -15,6 +15,7 @@ from twinloop.arrays import Floats
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import UNARY, Pool
 from twinloop.identification.structure import Problem, Sum, search
+from twinloop.streams import stream
 
 PRODUCTS = 0.5
 """Share of new nodes that are products: most laws of machines are made of them."""
@@ -59,7 +60,7 @@ def evolve(
         The best sum of each chain, never worse than the known one.
     """
     pool = problem.pool
-    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 77, iteration])))
+    draw = stream(seed, 77, iteration)
     best: list[Sum | None] = list(known)
     survivors: dict[int, int] = dict.fromkeys(terms, 0)
     taken: set[int] = set()
@@ -69,7 +70,7 @@ def evolve(
         tries = 0
         while len(candidates) < population and tries < 20 * population:
             tries += 1
-            node = _drawn(pool, parents, operators, stream)
+            node = _drawn(pool, parents, operators, draw)
             if node is not None and pool.length(node) <= longest:
                 candidates.setdefault(node)
         wholes = [_whole(pool, found, taken) if found is not None else {} for found in best]
@@ -101,22 +102,22 @@ def evolve(
 
 
 def _drawn(
-    pool: Pool, parents: Sequence[int], operators: Sequence[str], stream: np.random.Generator
+    pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: np.random.Generator
 ) -> int | None:
     """A new node of inputs and parents; None where it makes no sense."""
 
     def pick() -> int:
-        if stream.random() < 0.5:
-            return int(stream.integers(pool.inputs))
-        return parents[int(stream.integers(len(parents)))]
+        if draw.random() < 0.5:
+            return int(draw.integers(pool.inputs))
+        return parents[int(draw.integers(len(parents)))]
 
     a, b = pick(), pick()
-    if "*" in operators and stream.random() < PRODUCTS:
+    if "*" in operators and draw.random() < PRODUCTS:
         return None if pool.one in (a, b) else pool.product(a, b)
-    operation = operators[int(stream.integers(len(operators)))]
-    if stream.random() < CONSTANTS:
-        size = float(np.exp(stream.uniform(np.log(0.1), np.log(10.0))))
-        a = pool.add(("+" if stream.random() < 0.5 else "*", a, size if stream.random() < 0.5 else -size))
+    operation = operators[int(draw.integers(len(operators)))]
+    if draw.random() < CONSTANTS:
+        size = float(np.exp(draw.uniform(np.log(0.1), np.log(10.0))))
+        a = pool.add(("+" if draw.random() < 0.5 else "*", a, size if draw.random() < 0.5 else -size))
     if a == pool.one:
         return None
     if operation in UNARY:

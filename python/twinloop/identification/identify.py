@@ -99,13 +99,13 @@ class _Learner:
             self.pool, self.known = copy.deepcopy(known.pool), known
         else:
             self.pool, self.known = Pool(signals.n_x + signals.n_u, len(options.operators)), None
-        known_terms = self._known_terms()
-        driven = [
-            chain.states[0] for chain in chains(signals, self.form, self.scales) if chain.output is not None
-        ]
-        self.fixed = {driven[output]: nodes for output, nodes in known_terms.items()}
+        every = chains(signals, self.form, guessed_noise(runs, self.scales))
+        self.driven = [chain for chain in every if chain.output is not None]
+        self.given = [self._given_noise(chain) for chain in every if chain.output is None]
+        self.fixed = self._known_terms()
+        outputs = {i: self.fixed.get(chain.states[0], []) for i, chain in enumerate(self.driven)}
         self.fitting = Fitting(
-            runs, self.pool, signals, self.form, options, seed, iteration, workers, known_terms
+            runs, self.pool, signals, self.form, options, seed, iteration, workers, outputs
         )
         self.stream = 0
 
@@ -118,10 +118,6 @@ class _Learner:
         # What was known is never out of reach, whatever rung it came from.
         found = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
         base = [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
-        guess = guessed_noise(self.fitting.runs, self.scales)
-        all_chains = chains(self.signals, self.form, guess)
-        driven = [chain for chain in all_chains if chain.output is not None]
-        given = [self._given_noise(chain) for chain in all_chains if chain.output is None]
         self.watch("noise")
         actuators = direct(self.signals)
         if self.known is not None:
@@ -130,7 +126,7 @@ class _Learner:
         start = base[0]
         driven = [
             first_noise(problem, chain, problem.usable(start), self.scales, self.options.gusts)
-            for chain in driven
+            for chain in self.driven
         ]
         known: list[Sum | None] = [None] * len(driven)
         if self.known is not None:
@@ -145,7 +141,7 @@ class _Learner:
             known = self._better(problem, driven, rough, start, known)
             driven = [c if s is None else s.chain for s, c in zip(known, driven, strict=True)]
         sums = self._climb(problem, driven, known, base)
-        tuned = self.fitting.tuned(sums, given, actuators)
+        tuned = self.fitting.tuned(sums, self.given, actuators)
         for _ in range(options.passes - 1):
             if not self.fitting.smooth(tuned.model, tuned.observer):
                 break
@@ -154,7 +150,7 @@ class _Learner:
             problem = self._problem(lags)
             known = list(tuned.sums)
             again = self._climb(problem, [s.chain for s in tuned.sums], known, base, brief=True)
-            other = self.fitting.tuned(again, given, lags)
+            other = self.fitting.tuned(again, self.given, lags)
             if not np.isfinite(other.left) and np.isfinite(tuned.left):
                 break
             tuned = other
@@ -180,12 +176,8 @@ class _Learner:
     # Steps
 
     def _known_terms(self) -> dict[int, list[int]]:
-        """Nodes that are known to drive each output."""
-        outputs = {
-            chain.states[0]: chain.output
-            for chain in chains(self.signals, self.form, self.scales)
-            if chain.output is not None
-        }
+        """Nodes that are known to drive a state, by the state."""
+        outputs = [chain.states[0] for chain in self.driven]
         known: dict[int, list[int]] = {}
         for text in self.options.fixed_terms:
             state, node = fixed_term(text, self.pool, self.signals)
@@ -194,7 +186,7 @@ class _Learner:
                     f"Fixed term {text!r}: expected a state that an output drives, one of"
                     f" {', '.join(self.signals.state_names[i] for i in outputs)}; write it for one of them."
                 )
-            known.setdefault(outputs[state], []).append(node)
+            known.setdefault(state, []).append(node)
         return known
 
     def _problem(self, actuators: Sequence[Actuator]) -> Problem:

@@ -30,7 +30,7 @@ def chirps(
     """
     duration = steps * signals.dt
     t = signals.dt * np.arange(steps)
-    fading = np.clip((duration - t) / max(fade * duration, signals.dt), 0.0, 1.0)
+    fading = _fading(signals, steps, fade)
     columns = []
     for command in signals.commands:
         first = stream.uniform(*SLOWEST) / duration
@@ -56,11 +56,16 @@ def binary(
     Returns:
         What is to be added to the commands (steps, n_u), in their units.
     """
-    duration = steps * signals.dt
-    t = signals.dt * np.arange(steps)
-    fading = np.clip((duration - t) / max(fade * duration, signals.dt), 0.0, 1.0)
     held = max(1, steps // 20)
     signs = np.where(stream.random((steps // held + 1, signals.n_u)) < 0.5, -1.0, 1.0)
     sizes = np.array([command.size for command in signals.commands])
-    added: Floats = amplitude * sizes * np.repeat(signs, held, axis=0)[:steps] * fading[:, np.newaxis]
+    fading = _fading(signals, steps, fade)[:, np.newaxis]
+    added: Floats = amplitude * sizes * np.repeat(signs, held, axis=0)[:steps] * fading
     return added
+
+
+def _fading(signals: Signals, steps: int, fade: float) -> Floats:
+    """1, and towards the end of a flight down to 0 over a share of it (steps,)."""
+    duration = steps * signals.dt
+    left = duration - signals.dt * np.arange(steps)
+    return np.clip(left / max(fade * duration, signals.dt), 0.0, 1.0)

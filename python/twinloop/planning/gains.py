@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
@@ -14,9 +15,10 @@ Score = Callable[[Floats], Floats]
 """Scores (K,), to be minimised, of genes (K, size)."""
 
 
-def to_unit(family: Family, genes: Floats) -> Floats:
+def to_unit(family: Family, genes: ArrayLike) -> Floats:
     """Genes (…, size) as places in the box, 0 to 1, logarithmic where decades matter."""
-    places = np.empty_like(genes, dtype=np.float64)
+    genes = np.asarray(genes, dtype=np.float64)
+    places = np.empty_like(genes)
     for i, gain in enumerate(family.gains):
         if gain.logarithmic:
             low, high = np.log(gain.low), np.log(gain.high)
@@ -26,8 +28,9 @@ def to_unit(family: Family, genes: Floats) -> Floats:
     return places
 
 
-def from_unit(family: Family, places: Floats) -> Floats:
+def from_unit(family: Family, places: ArrayLike) -> Floats:
     """The genes at places in the box; the inverse of `to_unit`, clipped to the bounds."""
+    places = np.asarray(places, dtype=np.float64)
     genes = np.empty_like(places)
     for i, gain in enumerate(family.gains):
         place = np.clip(places[..., i], 0.0, 1.0)

@@ -12,6 +12,7 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.flights import candidates, qualities
 from twinloop.planning.quality import Quality
+from twinloop.streams import stream
 
 Ends = tuple[Floats, Floats]
 """Initial states and target states (K, n_x)."""
@@ -151,4 +152,4 @@ class Judge:
 
     def stream(self, purpose: int, number: int) -> np.random.Generator:
         """Random numbers of one purpose and one test."""
-        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, 79, purpose, number])))
+        return stream(self.seed, 79, purpose, number)
