@@ -397,7 +397,6 @@ class Regression:
         motion: _Motion,
         smallest_sensors: ArrayLike,
         smallest_motion: _Motion,
-        fixed_sensors: bool = False,
     ) -> tuple[_Floats, _Motion, float]:
         """Sensors' variances and motion under which residuals are most likely, and −2 log of that."""
     def gram(self, sensors: ArrayLike, motion: _Motion, workers: Workers | None = None) -> Gram:
@@ -420,7 +419,6 @@ class Gram:
 def search_subsets(
     grams: Sequence[Gram],
     prices: Sequence[ArrayLike],
-    scales: Sequence[float],
     *,
     moves: int,
     largest: int,
@@ -430,7 +428,7 @@ def search_subsets(
     coldest: float = 2.0,
     workers: Workers | None = None,
 ) -> list[list[tuple[list[int], float]]]:
-    """For each problem, subsets with their energies χ² / scale + prices, best first."""
+    """For each problem, subsets with their energies χ² + prices, best first."""
 
 def tune(
     model: Model,
@@ -441,7 +439,6 @@ def tune(
     lags: Sequence[Sequence[int]],
     iterations: int,
     draws: int = 0,
-    spread: float = 1.0,
     seed: int = 0,
     iteration: int = 0,
     unit: int = 0,

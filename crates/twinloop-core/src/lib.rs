@@ -43,7 +43,7 @@ pub use model_loop::{Learnt, ModelSearch};
 pub use objective::{closed_loops, discrimination, final_distances, instability, of_model, open_loops};
 pub use plants::{Gyroscopic, Quadrotor};
 pub use regression::{
-    Annealing, Chain, Cholesky, Found, Gram, Noise, Prices, Record, Solution, likelihood, most_likely_noise,
+    Annealing, Chain, Choices, Cholesky, Found, Gram, Noise, Record, Solution, likelihood, most_likely_noise,
     search,
 };
 pub use rng::{Purpose, Stream};

@@ -69,8 +69,8 @@ pub struct Tuned {
 }
 
 impl Tuned {
-    /// The same model with its free values drawn from what the runs leave open; `spread` widens the covariance.
-    pub fn drawn(&self, tuning: &Tuning<'_>, spread: f64, stream: &mut Stream) -> (Vec<f64>, Vec<f64>) {
+    /// The same model with its free values drawn from what the runs leave open.
+    pub fn drawn(&self, tuning: &Tuning<'_>, stream: &mut Stream) -> (Vec<f64>, Vec<f64>) {
         let start = Variant { constants: self.constants.clone(), lags: self.lags.clone() };
         let size = tuning.size();
         let Some(factor) =
@@ -78,7 +78,7 @@ impl Tuned {
         else {
             return (start.constants, start.lags);
         };
-        let normal: Vec<f64> = (0..size).map(|_| spread * stream.gaussian()).collect();
+        let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
         let drawn = tuning.moved(&start, &factor.times(&normal));
         (drawn.constants, drawn.lags)
     }

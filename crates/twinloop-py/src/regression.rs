@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Annealing, Chain, Gram, Noise, Prices, Purpose, Record, Stream, likelihood, most_likely_noise, search,
+    Annealing, Chain, Choices, Gram, Noise, Purpose, Record, Stream, likelihood, most_likely_noise, search,
 };
 
 use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector};
@@ -87,11 +87,7 @@ impl PyRegression {
         Ok(likelihood(&self.chain, &self.records, &residuals, &self.noise(&sensors, motion)?))
     }
 
-    #[pyo3(signature = (coefficients, sensors, motion, smallest_sensors, smallest_motion, fixed_sensors = false))]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "a start and a floor of each variance, by keyword in Python"
-    )]
+    #[pyo3(signature = (coefficients, sensors, motion, smallest_sensors, smallest_motion))]
     fn most_likely_noise<'py>(
         &self,
         py: Python<'py>,
@@ -100,14 +96,12 @@ impl PyRegression {
         motion: Motion,
         smallest_sensors: Vector<'py>,
         smallest_motion: Motion,
-        fixed_sensors: bool,
     ) -> Result<(Bound<'py, PyArray1<f64>>, Motion, f64)> {
         let residuals = self.leftovers(&coefficients)?;
         let start = self.noise(&sensors, motion)?;
         let smallest = self.noise(&smallest_sensors, smallest_motion)?;
-        let (noise, score) = py.detach(|| {
-            most_likely_noise(&self.chain, &self.records, &residuals, &start, &smallest, fixed_sensors)
-        });
+        let (noise, score) =
+            py.detach(|| most_likely_noise(&self.chain, &self.records, &residuals, &start, &smallest));
         Ok((to_vector(py, noise.sensors), (noise.process, noise.gust, noise.memory), score))
     }
 
@@ -201,13 +195,12 @@ impl PyGram {
 
 /// For each of the problems, subsets with their energies, best first: annealed `starts` times from different streams.
 #[pyfunction]
-#[pyo3(signature = (grams, prices, scales, *, moves, largest, starts, seed, iteration, coldest = 2.0, workers = None))]
+#[pyo3(signature = (grams, prices, *, moves, largest, starts, seed, iteration, coldest = 2.0, workers = None))]
 #[expect(clippy::too_many_arguments, reason = "the settings of a search, named by keyword in Python")]
 pub fn search_subsets(
     py: Python<'_>,
     grams: Vec<Bound<'_, PyGram>>,
     prices: Vec<Vector<'_>>,
-    scales: Vec<f64>,
     moves: usize,
     largest: usize,
     starts: usize,
@@ -218,26 +211,21 @@ pub fn search_subsets(
 ) -> Result<Vec<Walked>> {
     let workers = or_default(workers)?;
     let grams: Vec<_> = grams.iter().map(|gram| gram.get().0.clone()).collect();
-    if prices.len() != grams.len() || scales.len() != grams.len() || starts == 0 {
-        return Err(misuse(
-            "search_subsets: expected prices and a scale for each problem and at least 1 start".into(),
-        ));
+    if prices.len() != grams.len() || starts == 0 {
+        return Err(misuse("search_subsets: expected prices for each problem and at least 1 start".into()));
     }
-    let prices: Vec<_> = prices
-        .iter()
-        .zip(&scales)
-        .map(|(prices, &scale)| Prices { features: vector(prices), scale, fixed: vec![] })
-        .collect();
-    if prices.iter().zip(&grams).any(|(prices, gram)| prices.features.len() != gram.features) {
+    let prices: Vec<_> = prices.iter().map(vector).collect();
+    if prices.iter().zip(&grams).any(|(prices, gram)| prices.len() != gram.features) {
         return Err(misuse("search_subsets: expected a price for each feature".into()));
     }
     let annealing = Annealing { moves, largest, coldest };
     let walks = py.detach(|| {
+        let choices = workers.map(grams.len(), |i| Choices::new(&grams[i], &prices[i]));
         workers.map(grams.len() * starts, |unit| {
             let problem = unit / starts;
             let mut stream =
                 Stream::new(seed, Purpose::Subsets, iteration, problem as u64, (unit % starts) as u64);
-            search(&grams[problem], &prices[problem], &annealing, &mut stream)
+            search(&choices[problem], &annealing, &mut stream)
         })
     });
     let merged = walks.chunks(starts).map(|walks| {

@@ -53,7 +53,7 @@ fn recorded(records: &Records<'_>, n_x: usize, n_u: usize) -> Result<Vec<Recorde
 /// free values, and members drawn from it.
 #[pyfunction]
 #[pyo3(signature = (
-    model, chains, records, *, free, lags, iterations, draws = 0, spread = 1.0, seed = 0, iteration = 0, unit = 0,
+    model, chains, records, *, free, lags, iterations, draws = 0, seed = 0, iteration = 0, unit = 0,
     divergence_factor = 10.0, workers = None,
 ))]
 #[expect(clippy::too_many_arguments, reason = "what tuning needs, named by keyword in Python")]
@@ -67,7 +67,6 @@ pub fn tune<'py>(
     lags: Vec<Vec<usize>>,
     iterations: usize,
     draws: usize,
-    spread: f64,
     seed: u64,
     iteration: u64,
     unit: u64,
@@ -97,7 +96,7 @@ pub fn tune<'py>(
     let mut members = Vec::with_capacity(draws);
     for draw in 0..draws {
         let mut stream = Stream::new(seed, Purpose::Members, iteration, unit, draw as u64);
-        let (constants, lags) = tuned.drawn(&tuning, spread, &mut stream);
+        let (constants, lags) = tuned.drawn(&tuning, &mut stream);
         members.push(model.varied(&constants, &lags)?);
     }
     Ok((finished, left, readings, covariance, members))

@@ -230,7 +230,6 @@ def search(
             walks = _core.search_subsets(
                 grams,
                 costs,
-                [1.0] * len(grams),
                 moves=moves if round_ == 0 else moves // 2,
                 largest=largest,
                 starts=starts if round_ == 0 else max(1, starts // 2),

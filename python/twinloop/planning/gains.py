@@ -13,6 +13,10 @@ from twinloop.controllers import Family
 
 Score = Callable[[Floats], Floats]
 """Scores (K,), to be minimised, of genes (K, size)."""
+OFFSPRING = 32
+"""Genes of a generation."""
+FLAT = 1e-12
+"""What a place outside the box costs where all scores are zero."""
 
 
 def to_unit(family: Family, genes: ArrayLike) -> Floats:
@@ -69,24 +73,24 @@ def tune_gains(
     """
     from cmaes import CMA  # imported here: it takes a while
 
-    size = family.size
-    bounds = np.tile([0.0, 1.0], (size, 1))
     best_genes, best = np.asarray(starts[0], dtype=np.float64), float(score(np.atleast_2d(starts[0]))[0])
     for number, start in enumerate(starts):
         mean = np.clip(to_unit(family, np.asarray(start, dtype=np.float64)), 0.02, 0.98)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            search = CMA(
-                mean=mean, sigma=spread, bounds=bounds, seed=(seed + number) % 2**32, population_size=32
-            )
-        for _ in range(max(1, evaluations // (len(starts) * 32))):
-            places = np.stack([search.ask() for _ in range(search.population_size)])
+            search = CMA(mean=mean, sigma=spread, seed=(seed + number) % 2**32, population_size=OFFSPRING)
+        for _ in range(max(1, evaluations // (len(starts) * OFFSPRING))):
+            places = np.stack([search.ask() for _ in range(OFFSPRING)])
             genes = from_unit(family, places)
             scores = score(genes)
             i = int(np.argmin(scores))
             if scores[i] < best:
                 best_genes, best = genes[i], float(scores[i])
-            search.tell(list(zip(places, scores.tolist(), strict=True)))
+            # What lies outside is judged at the edge, and dearer the further out: sampling anew until a place is inside
+            # takes seconds where the best one is a corner.
+            outside = np.square(places - np.clip(places, 0.0, 1.0)).sum(axis=1)
+            judged = scores + (np.abs(scores) + FLAT) * outside
+            search.tell(list(zip(places, judged.tolist(), strict=True)))
             watch()
             if search.should_stop():
                 break

@@ -10,22 +10,28 @@ pub struct Cholesky {
 impl Cholesky {
     /// The factor of a symmetric matrix (order × order); none if a pivot falls below `smallest` times its diagonal.
     pub fn new(matrix: &[f64], order: usize, smallest: f64) -> Option<Self> {
+        // Row j of the transposed factor is subtracted from all rows below at once: sums in the same order as
+        // entry by entry, along memory.
+        let mut upper = matrix[..order * order].to_vec();
+        for j in 0..order {
+            let (row, below) = upper[j * order..].split_at_mut(order);
+            let pivot = row[j];
+            if !(pivot > smallest * matrix[j * order + j].abs() && pivot > 0.0) {
+                return None;
+            }
+            let root = pivot.sqrt();
+            row[j] = root;
+            row[j + 1..].iter_mut().for_each(|value| *value /= root);
+            for (i, other) in below.chunks_exact_mut(order).enumerate() {
+                let i = i + j + 1;
+                let factor = row[i];
+                other[i..].iter_mut().zip(&row[i..]).for_each(|(o, r)| *o -= factor * r);
+            }
+        }
         let mut lower = vec![0.0; order * order];
         for i in 0..order {
             for j in 0..=i {
-                let mut sum = matrix[i * order + j];
-                for k in 0..j {
-                    sum -= lower[i * order + k] * lower[j * order + k];
-                }
-                if i == j {
-                    let diagonal = matrix[i * order + i];
-                    if !(sum > smallest * diagonal.abs() && sum > 0.0) {
-                        return None;
-                    }
-                    lower[i * order + i] = sum.sqrt();
-                } else {
-                    lower[i * order + j] = sum / lower[j * order + j];
-                }
+                lower[i * order + j] = upper[j * order + i];
             }
         }
         Some(Self { lower, order })
@@ -69,13 +75,22 @@ impl Cholesky {
     /// A⁻¹ (order × order).
     pub fn inverse(&self) -> Vec<f64> {
         let order = self.order;
+        // M = L⁻¹ row after row, and A⁻¹ = Mᵀ M.
+        let mut rows = vec![0.0; order * order];
         let mut inverse = vec![0.0; order * order];
-        let mut unit = vec![0.0; order];
-        for j in 0..order {
-            unit.fill(0.0);
-            unit[j] = 1.0;
-            for (i, value) in self.solve(&unit).into_iter().enumerate() {
-                inverse[i * order + j] = value;
+        for i in 0..order {
+            let (above, row) = rows.split_at_mut(i * order);
+            let row = &mut row[..=i];
+            row[i] = 1.0;
+            for (k, other) in above.chunks_exact(order).enumerate() {
+                let factor = self.lower[i * order + k];
+                row.iter_mut().zip(&other[..=k]).for_each(|(r, o)| *r -= factor * o);
+            }
+            let pivot = self.lower[i * order + i];
+            row.iter_mut().for_each(|value| *value /= pivot);
+            for (a, &factor) in row.iter().enumerate() {
+                let target = &mut inverse[a * order..][..=i];
+                target.iter_mut().zip(row.iter()).for_each(|(t, r)| *t += factor * r);
             }
         }
         inverse

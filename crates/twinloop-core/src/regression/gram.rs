@@ -1,5 +1,7 @@
 //! Whitened features and readings of all records, as inner products; and least squares on any subset of them.
 
+use std::sync::Arc;
+
 use super::chain::{Chain, LONGEST, Noise, Whitening};
 use super::cholesky::Cholesky;
 use crate::workers::Workers;
@@ -43,6 +45,23 @@ impl Record {
             self.measured.iter().skip(i).step_by(chain.states).fold(0.0_f64, |a, b| a.max(b.abs()))
         };
         (0..chain.states).map(|i| largest(i) + f64::MIN_POSITIVE.sqrt()).collect()
+    }
+
+    /// Filters of records; those that count the same readings share one, for all begin with the largest spread.
+    pub(crate) fn whitenings(chain: &Chain, records: &[Self], noise: &Noise) -> Vec<Arc<Whitening>> {
+        let mut spread = vec![0.0_f64; chain.states];
+        for record in records {
+            spread.iter_mut().zip(record.spread(chain)).for_each(|(a, b)| *a = a.max(b));
+        }
+        let mut found: Vec<Arc<Whitening>> = Vec::with_capacity(records.len());
+        for (r, record) in records.iter().enumerate() {
+            let whitening = match records[..r].iter().position(|other| other.weights == record.weights) {
+                Some(twin) => found[twin].clone(),
+                None => Arc::new(Whitening::new(chain, noise, &record.weights, &spread)),
+            };
+            found.push(whitening);
+        }
+        found
     }
 
     /// Readings less what given coefficients (features) explain of them, (n + 1) × states.
@@ -93,7 +112,9 @@ const BLOCK: usize = 8;
 impl Gram {
     /// Of all records.
     pub fn new(chain: &Chain, records: &[Record], features: usize, noise: &Noise, workers: &Workers) -> Self {
-        let parts = workers.map(records.len(), |i| Self::of_record(chain, &records[i], features, noise));
+        let whitenings = Record::whitenings(chain, records, noise);
+        let parts =
+            workers.map(records.len(), |i| Self::of_record(chain, &records[i], features, &whitenings[i]));
         let width = features + 1;
         let mut sum = Self { features, products: vec![0.0; width * width], readings: 0 };
         for part in parts {
@@ -103,10 +124,9 @@ impl Gram {
         sum
     }
 
-    fn of_record(chain: &Chain, record: &Record, features: usize, noise: &Noise) -> Self {
+    fn of_record(chain: &Chain, record: &Record, features: usize, whitening: &Whitening) -> Self {
         let (d, p) = (chain.states, features);
         let width = p + 1;
-        let whitening = Whitening::new(chain, noise, &record.weights, &record.spread(chain));
         let mut products = vec![0.0; width * width];
         let inner = whitening.inner;
         // What the filter has not explained yet, column after column; that of the readings is their prediction.

@@ -1,14 +1,13 @@
 //! How likely residuals are under given noise, and the noise under which they are most likely.
 
-use super::chain::{Chain, LONGEST, Noise, Whitening};
+use super::chain::{Chain, LONGEST, Noise};
 use super::gram::Record;
 
 /// −2 log of the likelihood, up to a constant, of the records' residuals ((n + 1) × states each) if only noise made them.
 pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noise: &Noise) -> f64 {
     let d = chain.states;
     let mut total = 0.0;
-    for (record, residual) in records.iter().zip(residuals) {
-        let whitening = Whitening::new(chain, noise, &record.weights, &record.spread(chain));
+    for (whitening, residual) in Record::whitenings(chain, records, noise).iter().zip(residuals) {
         total += whitening.log_determinant;
         let mut state = vec![0.0; whitening.inner];
         for k in 0..residual.len() / d {
@@ -42,7 +41,6 @@ pub fn most_likely_noise(
     residuals: &[Vec<f64>],
     start: &Noise,
     smallest: &Noise,
-    fixed_sensors: bool,
 ) -> (Noise, f64) {
     let d = chain.states;
     let mut best = start.clone();
@@ -53,7 +51,7 @@ pub fn most_likely_noise(
             for _ in 0..8 {
                 let mut moved = false;
                 // Sensors, process, and where there are any the size and the memory of gusts.
-                for which in (if fixed_sensors { d } else { 0 })..=d + 2 * best.hidden() {
+                for which in 0..=d + 2 * best.hidden() {
                     for factor in [step, 1.0 / step] {
                         let mut tried = best.clone();
                         if which < d {

@@ -10,6 +10,6 @@ pub use chain::{Chain, Noise};
 pub use cholesky::Cholesky;
 pub use gram::{Gram, Record, Solution};
 pub use likelihood::{likelihood, most_likely_noise};
-pub use subset::{Annealing, Found, Prices, search};
+pub use subset::{Annealing, Choices, Found, search};
 
 pub(crate) use chain::Whitening;

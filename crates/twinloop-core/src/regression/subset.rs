@@ -18,18 +18,7 @@ pub struct Annealing {
     pub coldest: f64,
 }
 
-/// What a subset costs beside its χ².
-#[derive(Clone, Debug, PartialEq)]
-pub struct Prices {
-    /// Of each feature (p), in units of χ²; infinite if it may not be used.
-    pub features: Vec<f64>,
-    /// What χ² is divided by: above 1 where even all features leave more than the noise explains.
-    pub scale: f64,
-    /// Features that are always in.
-    pub fixed: Vec<usize>,
-}
-
-/// A subset and its energy, χ² / scale + prices.
+/// A subset and its energy: χ² and the prices of its features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// Its features, ascending.
@@ -47,124 +36,146 @@ const KEPT: usize = 64;
 /// Energy above the best at which a subset is not worth keeping.
 const WORTH: f64 = 14.0;
 
+/// Inner products of columns of unit length, of those features that may be used.
+#[derive(Clone, Debug)]
+pub struct Choices {
+    /// The features, ascending.
+    features: Vec<usize>,
+    /// Of each with each (row after row).
+    products: Vec<f64>,
+    /// Of each with the readings.
+    targets: Vec<f64>,
+    /// Of each, in units of χ².
+    prices: Vec<f64>,
+    /// χ² of no feature at all.
+    total: f64,
+}
+
+impl Choices {
+    /// Of a Gram matrix, with the price of each feature in units of χ²; infinite if it may not be used.
+    pub fn new(gram: &Gram, prices: &[f64]) -> Self {
+        let lengths: Vec<f64> = (0..gram.features).map(|j| gram.product(j, j).sqrt()).collect();
+        let longest = lengths.iter().copied().filter(|l| l.is_finite()).fold(0.0, f64::max);
+        let usable = |j: &usize| {
+            lengths[*j].is_finite() && lengths[*j] > 1e-9 * longest.min(1e3) && prices[*j].is_finite()
+        };
+        let features: Vec<usize> = (0..gram.features).filter(usable).collect();
+        let row = |&i: &usize| {
+            let scale = |&j: &usize| gram.product(i, j) / (lengths[i] * lengths[j]);
+            features.iter().map(scale).collect::<Vec<_>>()
+        };
+        Self {
+            products: features.iter().flat_map(row).collect(),
+            targets: features.iter().map(|&j| gram.product(j, gram.features) / lengths[j]).collect(),
+            prices: features.iter().map(|&j| prices[j]).collect(),
+            total: gram.total(),
+            features,
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.features.len()
+    }
+
+    /// Inner products of a feature with all.
+    #[inline(always)]
+    fn row(&self, i: usize) -> &[f64] {
+        &self.products[i * self.len()..][..self.len()]
+    }
+}
+
+/// A subset on its way, with the inverse of its Gram matrix.
 struct Walk<'a> {
-    gram: &'a Gram,
-    prices: &'a Prices,
-    lengths: Vec<f64>,
-    usable: Vec<usize>,
+    choices: &'a Choices,
     members: Vec<usize>,
-    place: Vec<Option<usize>>,
+    /// Whether each feature is a member.
+    inside: Vec<bool>,
+    /// Of the members (row after row), at the start of a buffer that holds the largest.
     inverse: Vec<f64>,
     coefficients: Vec<f64>,
     left: f64,
     price: f64,
     /// Rounding that updates have let in since the last inversion from scratch, in the inverse's own terms.
     doubt: f64,
+    /// Inner products of a feature with the members, and the inverse times them.
+    products: Vec<f64>,
+    images: Vec<f64>,
+    spare: Vec<f64>,
 }
 
 impl<'a> Walk<'a> {
-    fn new(gram: &'a Gram, prices: &'a Prices) -> Self {
-        let p = gram.features;
-        let lengths: Vec<f64> = (0..p).map(|j| gram.product(j, j).sqrt()).collect();
-        let longest = lengths.iter().copied().filter(|l| l.is_finite()).fold(0.0, f64::max);
-        let usable = (0..p)
-            .filter(|&j| {
-                lengths[j].is_finite()
-                    && lengths[j] > 1e-9 * longest.min(1e3)
-                    && prices.features[j].is_finite()
-                    && !prices.fixed.contains(&j)
-            })
-            .collect();
-        let mut walk = Self {
-            gram,
-            prices,
-            lengths,
-            usable,
-            members: prices.fixed.clone(),
-            place: vec![None; p],
+    fn new(choices: &'a Choices) -> Self {
+        Self {
+            choices,
+            members: vec![],
+            inside: vec![false; choices.len()],
             inverse: vec![],
             coefficients: vec![],
-            left: gram.total(),
+            left: choices.total,
             price: 0.0,
             doubt: 0.0,
-        };
-        for (at, &j) in walk.members.iter().enumerate() {
-            walk.place[j] = Some(at);
+            products: vec![],
+            images: vec![],
+            spare: vec![],
         }
-        if !walk.refresh() {
-            walk.members.clear();
-            walk.place.fill(None);
-            walk.refresh();
-        }
-        walk
-    }
-
-    fn product(&self, i: usize, j: usize) -> f64 {
-        self.gram.product(i, j) / (self.lengths[i] * self.lengths[j])
-    }
-
-    fn target(&self, j: usize) -> f64 {
-        self.gram.product(j, self.gram.features) / self.lengths[j]
     }
 
     fn energy(&self) -> f64 {
-        self.left / self.prices.scale + self.price
+        self.left + self.price
     }
 
     /// Inverse, coefficients and χ² of the members from scratch.
     fn refresh(&mut self) -> bool {
         let k = self.members.len();
-        let mut matrix = vec![0.0; k * k];
-        for (a, &i) in self.members.iter().enumerate() {
-            for (b, &j) in self.members.iter().enumerate() {
-                matrix[a * k + b] = self.product(i, j);
-            }
+        self.spare.clear();
+        for &i in &self.members {
+            let row = self.choices.row(i);
+            self.spare.extend(self.members.iter().map(|&j| row[j]));
         }
-        let Some(factor) = Cholesky::new(&matrix, k, COLLINEAR) else { return false };
-        let right: Vec<f64> = self.members.iter().map(|&j| self.target(j)).collect();
+        let Some(factor) = Cholesky::new(&self.spare, k, COLLINEAR) else { return false };
         self.inverse = factor.inverse();
-        self.coefficients = factor.solve(&right);
+        self.products.clear();
+        self.products.extend(self.members.iter().map(|&j| self.choices.targets[j]));
+        self.coefficients.clear();
+        self.coefficients.extend((0..k).map(|a| dot(&self.inverse[a * k..][..k], &self.products)));
         self.doubt = 0.0;
-        let explained: f64 = self.coefficients.iter().zip(&right).map(|(c, r)| c * r).sum();
-        self.left = (self.gram.total() - explained).max(0.0);
-        self.price = self.members.iter().map(|&j| self.prices.features[j]).filter(|x| x.is_finite()).sum();
+        self.left = (self.choices.total - dot(&self.coefficients, &self.products)).max(0.0);
+        self.price = self.members.iter().map(|&j| self.choices.prices[j]).sum();
         true
     }
 
-    /// Inner products of a feature with the members, and the inverse times them.
-    fn against(&self, j: usize, products: &mut Vec<f64>, images: &mut Vec<f64>) {
+    /// What of a feature lies outside the members' span, and what of the rest of the readings it would explain.
+    fn against(&mut self, j: usize) -> (f64, f64) {
         let k = self.members.len();
-        products.clear();
-        products.extend(self.members.iter().map(|&i| self.product(i, j)));
-        images.clear();
-        for a in 0..k {
-            let row = &self.inverse[a * k..][..k];
-            images.push(row.iter().zip(products.iter()).map(|(m, g)| m * g).sum());
-        }
+        let row = self.choices.row(j);
+        self.products.clear();
+        self.products.extend(self.members.iter().map(|&i| row[i]));
+        self.images.clear();
+        self.images.extend((0..k).map(|a| dot(&self.inverse[a * k..][..k], &self.products)));
+        let outside = 1.0 - dot(&self.products, &self.images);
+        (outside, self.choices.targets[j] - dot(&self.products, &self.coefficients))
     }
 
-    fn insert(&mut self, j: usize, images: &[f64], outside: f64, gain: f64) {
+    /// Adds the feature that was last looked at.
+    fn insert(&mut self, j: usize, outside: f64, gain: f64) {
         let k = self.members.len();
         self.doubt += 1.0 / outside;
-        let mut inverse = vec![0.0; (k + 1) * (k + 1)];
-        for a in 0..k {
-            for b in 0..k {
-                inverse[a * (k + 1) + b] = self.inverse[a * k + b] + images[a] * images[b] / outside;
-            }
-            inverse[a * (k + 1) + k] = -images[a] / outside;
-            inverse[k * (k + 1) + a] = -images[a] / outside;
+        self.spare.clear();
+        for (row, &image) in self.inverse.chunks_exact(k.max(1)).zip(&self.images) {
+            let factor = image / outside;
+            self.spare.extend(row.iter().zip(&self.images).map(|(old, other)| old + factor * other));
+            self.spare.push(-factor);
         }
-        inverse[(k + 1) * (k + 1) - 1] = 1.0 / outside;
+        self.spare.extend(self.images.iter().map(|image| -image / outside));
+        self.spare.push(1.0 / outside);
+        std::mem::swap(&mut self.inverse, &mut self.spare);
         let new = gain / outside;
-        for (c, image) in self.coefficients.iter_mut().zip(images) {
-            *c -= image * new;
-        }
+        self.coefficients.iter_mut().zip(&self.images).for_each(|(c, image)| *c -= image * new);
         self.coefficients.push(new);
         self.left = (self.left - gain * gain / outside).max(0.0);
-        self.inverse = inverse;
-        self.place[j] = Some(k);
         self.members.push(j);
-        self.price += self.prices.features[j];
+        self.inside[j] = true;
+        self.price += self.choices.prices[j];
     }
 
     fn remove(&mut self, at: usize) {
@@ -172,111 +183,87 @@ impl<'a> Walk<'a> {
         let pivot = self.inverse[at * k + at];
         self.doubt += pivot;
         let old = self.coefficients[at];
-        let column: Vec<f64> = (0..k).map(|a| self.inverse[a * k + at]).collect();
-        let mut inverse = Vec::with_capacity((k - 1) * (k - 1));
-        for a in (0..k).filter(|&a| a != at) {
-            for b in (0..k).filter(|&b| b != at) {
-                inverse.push(self.inverse[a * k + b] - column[a] * column[b] / pivot);
+        self.images.clear();
+        self.images.extend_from_slice(&self.inverse[at * k..][..k]);
+        self.spare.clear();
+        for (a, row) in self.inverse.chunks_exact(k).enumerate() {
+            if a != at {
+                let factor = self.images[a] / pivot;
+                let less = |range: std::ops::Range<usize>| {
+                    row[range.clone()]
+                        .iter()
+                        .zip(&self.images[range])
+                        .map(|(old, other)| old - factor * other)
+                };
+                self.spare.extend(less(0..at));
+                self.spare.extend(less(at + 1..k));
             }
         }
-        for (a, c) in self.coefficients.iter_mut().enumerate() {
-            *c -= column[a] * old / pivot;
-        }
+        std::mem::swap(&mut self.inverse, &mut self.spare);
+        self.coefficients.iter_mut().zip(&self.images).for_each(|(c, image)| *c -= image * old / pivot);
         self.coefficients.remove(at);
         self.left += old * old / pivot;
-        self.inverse = inverse;
         let j = self.members.remove(at);
-        self.price -= self.prices.features[j];
-        self.place[j] = None;
-        for (a, &member) in self.members.iter().enumerate().skip(at) {
-            self.place[member] = Some(a);
-        }
+        self.price -= self.choices.prices[j];
+        self.inside[j] = false;
     }
 
     /// One move at a temperature; whether it was made.
-    fn step(
-        &mut self,
-        largest: usize,
-        heat: f64,
-        stream: &mut Stream,
-        work: &mut (Vec<f64>, Vec<f64>),
-    ) -> bool {
+    fn step(&mut self, largest: usize, heat: f64, stream: &mut Stream) -> bool {
         let k = self.members.len();
         let kind = stream.below(3);
         let accept = |change: f64, stream: &mut Stream| {
             change <= 0.0 || (heat > 0.0 && stream.uniform() < libm::exp(-change / heat))
         };
-        let fixed = self.prices.fixed.len();
-        if kind == 0 || k <= fixed {
-            if k >= largest || self.usable.is_empty() {
+        if kind == 0 || k == 0 {
+            if k >= largest || self.choices.len() == 0 {
                 return false;
             }
-            let j = self.usable[stream.below(self.usable.len())];
-            if self.place[j].is_some() {
+            let j = stream.below(self.choices.len());
+            if self.inside[j] {
                 return false;
             }
-            let (products, images) = work;
-            self.against(j, products, images);
-            let outside = 1.0 - dot(products, images);
-            if outside < COLLINEAR {
+            let (outside, gain) = self.against(j);
+            if outside < COLLINEAR || !accept(self.choices.prices[j] - gain * gain / outside, stream) {
                 return false;
             }
-            let gain = self.target(j) - dot(products, &self.coefficients);
-            let change = self.prices.features[j] - gain * gain / outside / self.prices.scale;
-            if !accept(change, stream) {
-                return false;
-            }
-            let images = std::mem::take(images);
-            self.insert(j, &images, outside, gain);
-            work.1 = images;
+            self.insert(j, outside, gain);
         } else {
             let at = stream.below(k);
-            if self.prices.fixed.contains(&self.members[at]) {
-                return false;
-            }
             let pivot = self.inverse[at * k + at];
-            let loss = self.coefficients[at] * self.coefficients[at] / pivot;
-            let old = self.prices.features[self.members[at]];
+            let loss =
+                self.coefficients[at] * self.coefficients[at] / pivot - self.choices.prices[self.members[at]];
             if kind == 1 {
-                if !accept(loss / self.prices.scale - old, stream) {
+                if !accept(loss, stream) {
                     return false;
                 }
                 self.remove(at);
             } else {
-                let j = self.usable[stream.below(self.usable.len())];
-                if self.place[j].is_some() {
+                let j = stream.below(self.choices.len());
+                if self.inside[j] {
                     return false;
                 }
-                let (products, images) = work;
-                self.against(j, products, images);
-                let shared = images[at];
-                let outside = 1.0 - dot(products, images) + shared * shared / pivot;
-                if outside < COLLINEAR {
-                    return false;
-                }
-                let gain = self.target(j) - dot(products, &self.coefficients)
-                    + shared * self.coefficients[at] / pivot;
-                let change =
-                    (loss - gain * gain / outside) / self.prices.scale + self.prices.features[j] - old;
-                if !accept(change, stream) {
+                // As if the member had gone already.
+                let (outside, gain) = self.against(j);
+                let shared = self.images[at];
+                let outside = outside + shared * shared / pivot;
+                let gain = gain + shared * self.coefficients[at] / pivot;
+                let change = loss + self.choices.prices[j] - gain * gain / outside;
+                if outside < COLLINEAR || !accept(change, stream) {
                     return false;
                 }
                 self.remove(at);
-                let (mut products, mut images) = std::mem::take(work);
-                self.against(j, &mut products, &mut images);
-                let outside = 1.0 - dot(&products, &images);
-                let gain = self.target(j) - dot(&products, &self.coefficients);
+                let (outside, gain) = self.against(j);
                 if outside >= COLLINEAR {
-                    self.insert(j, &images, outside, gain);
+                    self.insert(j, outside, gain);
                 }
-                *work = (products, images);
             }
         }
         if self.doubt > DOUBT {
             // Where rounding has let a collinear column in, the latest ones go until the rest has an inverse.
             while !self.refresh() {
                 let Some(j) = self.members.pop() else { break };
-                self.place[j] = None;
+                self.inside[j] = false;
             }
         }
         true
@@ -289,15 +276,15 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Walks from hot to cold; the best subset first, then others that are nearly as good, best first.
-pub fn search(gram: &Gram, prices: &Prices, annealing: &Annealing, stream: &mut Stream) -> Vec<Found> {
-    let mut walk = Walk::new(gram, prices);
+pub fn search(choices: &Choices, annealing: &Annealing, stream: &mut Stream) -> Vec<Found> {
+    let mut walk = Walk::new(choices);
     let mut kept: Vec<Found> = vec![];
     let keep = |walk: &Walk<'_>, kept: &mut Vec<Found>| {
         let energy = walk.energy();
         if kept.len() == KEPT && energy >= kept[KEPT - 1].energy {
             return;
         }
-        let mut subset = walk.members.clone();
+        let mut subset: Vec<usize> = walk.members.iter().map(|&i| choices.features[i]).collect();
         subset.sort_unstable();
         if kept.iter().any(|found| found.subset == subset) {
             return;
@@ -307,15 +294,14 @@ pub fn search(gram: &Gram, prices: &Prices, annealing: &Annealing, stream: &mut 
         kept.truncate(KEPT);
     };
     keep(&walk, &mut kept);
-    let hottest = (0.02 * gram.total() / prices.scale).max(100.0 * annealing.coldest);
+    let hottest = (0.02 * choices.total).max(100.0 * annealing.coldest);
     let cooling = libm::log(annealing.coldest / hottest);
-    let mut work = (vec![], vec![]);
     // The last tenth goes down only.
     let cooled = annealing.moves - annealing.moves / 10;
     for n in 0..annealing.moves {
         let heat = if n < cooled { hottest * libm::exp(cooling * n as f64 / cooled as f64) } else { 0.0 };
         // Early subsets are passed through only, but the best of a walk is often one that it never leaves again.
-        if walk.step(annealing.largest, heat, stream, &mut work)
+        if walk.step(annealing.largest, heat, stream)
             && (heat <= 20.0 * annealing.coldest || n % 16 == 0 || walk.energy() < kept[0].energy)
         {
             keep(&walk, &mut kept);
