@@ -28,11 +28,9 @@ from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, guessed_noise, stages
 from twinloop.identification.remarks import remarks
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Problem, Sum, first_noise, search
+from twinloop.identification.structure import Problem, Sum, first_noise, search, unexplained
 from twinloop.signals import Signals
 
-FEW_RUNS = 2
-"""Runs up to which the noise is searched from above as well: more of them tell it by themselves."""
 LAGS_AGAIN = 4
 """Runs up to which lags and delays are searched anew; from then on they are only tuned."""
 
@@ -124,22 +122,16 @@ class _Learner:
             actuators = self.known.actuators
         problem = self._problem(actuators)
         start = base[0]
-        driven = [
-            first_noise(problem, chain, problem.usable(start), self.scales, self.options.gusts)
-            for chain in self.driven
-        ]
-        known: list[Sum | None] = [None] * len(driven)
+        known: list[Sum | None] = [None] * len(self.driven)
         if self.known is not None:
             known = [replace(s, others=[]) for s in self.known.sums]
+        known = self._from_both_sides(problem, start, known)
         if options.lags and (self.known is None or len(self.fitting.runs) <= LAGS_AGAIN):
             self.watch("actuators")
-            actuators, known = self._actuators(start, driven)
+            actuators, known = self._actuators(start, [s.chain for s in known if s])
             problem = self._problem(actuators)
         self.watch("terms")
-        if len(self.fitting.runs) <= FEW_RUNS:
-            rough = [self._rough(chain) for chain in driven]
-            known = self._better(problem, driven, rough, start, known)
-            driven = [c if s is None else s.chain for s, c in zip(known, driven, strict=True)]
+        driven = [s.chain for s in known if s]
         sums = self._climb(problem, driven, known, base)
         tuned = self.fitting.tuned(sums, self.given, actuators)
         for _ in range(options.passes - 1):
@@ -198,30 +190,25 @@ class _Learner:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
         return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / self.signals.dt, 0.0, 1.0))
 
-    def _rough(self, chain: Chain) -> Chain:
-        """The chain as if all its roughness were its sensors'."""
-        period = self.signals.dt if chain.integrated else 1.0
-        first = float(chain.rough[0])
-        gust = 1e-4 * first / period**2 if self.options.gusts else 0.0
-        return chain.with_noise(chain.rough, (1e-6 * first / period, gust, 10.0 * self.signals.dt))
-
-    def _better(
-        self,
-        problem: Problem,
-        fine: Sequence[Chain],
-        rough: Sequence[Chain],
-        terms: Sequence[int],
-        known: Sequence[Sum | None],
+    def _from_both_sides(
+        self, problem: Problem, terms: Sequence[int], known: Sequence[Sum | None]
     ) -> list[Sum | None]:
-        """The shorter of two descriptions of each chain: too little noise makes many terms of a few runs."""
+        """The shorter of two descriptions of each chain, with the noise estimated from below and from above.
+
+        From below, little noise makes many terms of few runs and stays little; from above, the strongest terms come
+        first and the noise falls as far as they explain it.
+        """
         options = self.options
-        both = [
-            self._search(
-                problem, start, terms, known if start is fine else [None] * len(fine), options.moves, 2
-            )
-            for start in (fine, rough)
+        usable = problem.usable(terms)
+        below = [
+            first_noise(problem, chain, usable, self.scales, options.gusts)
+            for chain in self.driven
         ]
-        return [a if a.energy <= b.energy else b for a, b in zip(*both, strict=True)]
+        above = [unexplained(problem, chain, self.scales, options.gusts) for chain in self.driven]
+        none: list[Sum | None] = [None] * len(self.driven)
+        low = self._search(problem, below, terms, known, options.moves, 2)
+        high = self._search(problem, above, terms, none, options.moves, 2)
+        return [a if a.energy <= b.energy else b for a, b in zip(low, high, strict=True)]
 
     def _next(self) -> int:
         self.stream += 1

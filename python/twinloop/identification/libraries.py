@@ -24,10 +24,15 @@ def quadratic(pool: Pool, signals: Signals) -> Terms:
 
 
 def damping(pool: Pool, signals: Signals) -> Terms:
-    """|x| x of inputs with two signs that are no angles; dry friction; speeds times the length of their vector."""
+    """|x| x of inputs with two signs that are no angles: what slows a motion both ways, as its square does not."""
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
-    terms = [pool.product(pool.add(("abs", i, None)), i) for i in signed]
+    return [pool.product(pool.add(("abs", i, None)), i) for i in signed]
+
+
+def friction(pool: Pool, signals: Signals) -> Terms:
+    """Dry friction of speeds, and speeds times the length of their vector."""
+    terms: Terms = []
     for group in speeds(signals):
         for i in group:
             # Dry friction: a step at rest, of which tuning finds the width.
@@ -64,11 +69,12 @@ LIBRARIES: dict[str, Callable[[Pool, Signals], Terms]] = {
     "linear": linear,
     "quadratic": quadratic,
     "damping": damping,
+    "friction": friction,
     "trigonometric": trigonometric,
     "cubic": cubic,
 }
 """Libraries by name, in the order in which they are tried."""
-TOGETHER = {"quadratic": "linear", "trigonometric": "damping"}
+TOGETHER = {"quadratic": "linear", "damping": "quadratic", "trigonometric": "friction"}
 """Libraries that share a rung with the one before them."""
 
 
@@ -94,7 +100,7 @@ def speeds(signals: Signals) -> list[list[int]]:
 def rungs(pool: Pool, signals: Signals, names: Sequence[str], most: int) -> list[Terms]:
     """Growing sets of terms: each rung has the terms of those below it.
 
-    Linear and quadratic terms are one rung, and so are damping and trigonometric ones.
+    Linear, quadratic and damping terms are one rung, and so are friction and trigonometric ones.
 
     Args:
         pool: where the terms are entered.

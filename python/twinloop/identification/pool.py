@@ -87,22 +87,27 @@ class Pool:
                 waiting.extend(self.operands(number))
         return sorted(found)
 
-    def leaves(self, number: int) -> int:
-        """Inputs and constants that an expression is written with."""
+    def leaves(self, number: int) -> list[int | None]:
+        """Inputs that an expression is written with, one after another; None for a constant."""
         node = self.node(number)
-        if node is None or node == ONE:
-            return 1
-        return sum(self.leaves(i) for i in self.operands(number)) + isinstance(node[2], float)
+        if node is None:
+            return [number]
+        if node == ONE:
+            return [None]
+        found = [leaf for operand in self.operands(number) for leaf in self.leaves(operand)]
+        return found + [None] * isinstance(node[2], float)
 
     def length(self, number: int) -> float:
         """Description length of an expression in nats.
 
-        All expressions of up to two inputs cost the same, a choice among them: laws of machines are as often
-        quadratic as linear. Each further input or constant is a choice of its own, with its operation.
+        It is linear, made of one input twice, or of two inputs: three kinds, and a choice within the kind, for laws of
+        machines are as often quadratic as linear. Each further input or constant is a choice of its own, with its
+        operation.
         """
-        n = self.inputs
-        pairs = float(np.log(1 + n + n * (n + 1) / 2))
-        return pairs + max(0, self.leaves(number) - 2) * float(np.log(n) + np.log(self.operations))
+        n, leaves = self.inputs, self.leaves(number)
+        choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
+        further = max(0, len(leaves) - 2) * float(np.log(n) + np.log(self.operations))
+        return float(np.log(3.0 * choices)) + further
 
     def text(self, number: int, symbols: Sequence[str]) -> str:
         """An expression as it would be written, with a symbol for each input."""

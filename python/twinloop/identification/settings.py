@@ -16,7 +16,7 @@ class IdentificationOptions:
     Args:
         form: what a program's outputs mean; "auto": accelerations where the signals declare derivatives or a rigid
             body, else increments.
-        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "trigonometric", "cubic"; none:
+        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "friction", "trigonometric", "cubic"; none:
             evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
             the first rung of the ladder.
@@ -42,7 +42,7 @@ class IdentificationOptions:
     """
 
     form: str = "auto"
-    libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "trigonometric", "cubic")
+    libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "friction", "trigonometric", "cubic")
     seed_terms: tuple[str, ...] = ()
     fixed_terms: tuple[str, ...] = ()
     operators: tuple[str, ...] = ("+", "-", "*", "/", "abs", "sqrt", "sin", "cos", "min", "max")

@@ -16,7 +16,10 @@ from twinloop.identification.records import Run, Stages
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
-NOISE_ROUNDS = 3
+NOISE_ROUNDS = 5
+"""Times at most that terms are searched and the noise that they leave is estimated."""
+GUSTS = (1e-3, 1e-1, 10.0)
+"""Variances of a lasting disturbance that are tried first, in units of what the sensor's noise looks like as one."""
 BEST_SENSOR = 0.1
 """Share of its readings' roughness that a sensor's standard deviation is at least."""
 RIDGE = 1e-9
@@ -133,6 +136,32 @@ def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:
     sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR**2 * chain.rough)
     period = dt if chain.integrated else 1.0
     return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / period**2, dt)
+
+
+def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = True) -> Chain:
+    """The noise from above: what would have to disturb the motion if no term drove the chain.
+
+    Args:
+        problem: of the chain.
+        chain: with a first guess of its sensors' noise.
+        scales: of all states (n_x,).
+        gusts: whether disturbances may last.
+
+    Returns:
+        The chain with that noise.
+    """
+    regression = problem.regression(chain, problem.usable([problem.pool.one]))
+    low, slow = floor_of(chain, scales, problem.dt)
+    sensors = np.maximum(chain.sensors, low)
+    period = problem.dt if chain.integrated else 1.0
+    first = float(sensors[0])
+    found = []
+    # Where a disturbance is far too small no small change of it makes any difference: the search begins at several sizes.
+    for size in GUSTS if gusts else (0.0,):
+        motion = (max(1e-3 * first / period, slow[0]), size * first / period**2, 10.0 * problem.dt)
+        found.append(regression.most_likely_noise(np.zeros(1), sensors, motion, low, slow))
+    sensors, motion, _ = min(found, key=lambda answer: answer[2])
+    return chain.with_noise(sensors, motion)
 
 
 def first_noise(

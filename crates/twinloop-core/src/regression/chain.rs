@@ -5,8 +5,6 @@
 //! once neither is right; the innovations of a Kalman filter are white for any share of the two, and because the filter
 //! is linear it can be run over each feature's own response as well as over the readings (Harvey 1989, chapter 3).
 
-use super::cholesky::Cholesky;
-
 /// States of a chain at most: position, speed, acceleration, jerk.
 pub const LONGEST: usize = 4;
 
@@ -140,6 +138,10 @@ pub(crate) struct Whitening {
 
 /// Variance, in sensor variances, of a reading that is to be ignored.
 const IGNORED: f64 = 1e12;
+/// States of a filter at most.
+const MOST: usize = LONGEST + 1;
+/// A small matrix; only the first rows and columns of it are in use.
+type Small = [[f64; MOST]; MOST];
 
 impl Whitening {
     /// For a record of which each reading has a weight: 1, or 0 to ignore it. `spread` is the sd of each first state.
@@ -148,88 +150,76 @@ impl Whitening {
         let inner = d + noise.hidden();
         let kept = noise.kept(chain.dt);
         let disturbance = chain.disturbance(noise.process);
-        let mut covariance = vec![0.0; inner * inner];
-        for i in 0..d {
-            covariance[i * inner + i] = spread[i] * spread[i];
+        let mut transition: Small = [[0.0; MOST]; MOST];
+        for j in 0..inner {
+            let mut column = [0.0; MOST];
+            column[j] = 1.0;
+            chain.coast(&mut column[..inner], kept);
+            (0..inner).for_each(|i| transition[i][j] = column[i]);
         }
-        for i in d..inner {
-            covariance[i * inner + i] = noise.gust;
+        let mut covariance: Small = [[0.0; MOST]; MOST];
+        for i in 0..inner {
+            covariance[i][i] = if i < d { spread[i] * spread[i] } else { noise.gust };
         }
+        let readings = weights.len() / d;
         let mut whitening = Self {
             states: d,
             inner,
             kept,
-            gains: vec![],
-            roots: vec![],
+            gains: Vec::with_capacity(readings * inner * d),
+            roots: Vec::with_capacity(readings * d * d),
             log_determinant: 0.0,
             readings: weights.iter().filter(|&&w| w > 0.0).count(),
         };
         for weights in weights.chunks_exact(d) {
-            let gain = whitening.update(&covariance, &noise.sensors, weights);
-            let mut next = after(&covariance, &gain, inner, d);
-            for _ in 0..2 {
-                // Φ on the columns, then, transposed, on the rows.
-                for j in 0..inner {
-                    let mut column: Vec<f64> = (0..inner).map(|i| next[i * inner + j]).collect();
-                    chain.coast(&mut column, kept);
-                    (0..inner).for_each(|i| next[i * inner + j] = column[i]);
-                }
-                next = (0..inner * inner).map(|ij| next[(ij % inner) * inner + ij / inner]).collect();
-            }
-            for i in 0..inner {
-                for j in 0..inner {
-                    covariance[i * inner + j] = 0.5 * (next[i * inner + j] + next[j * inner + i]);
-                    if i < d && j < d {
-                        covariance[i * inner + j] += disturbance[i * d + j];
-                    }
+            whitening.update(&mut covariance, &noise.sensors, weights);
+            covariance = moved(&covariance, &transition, inner);
+            for i in 0..d {
+                for j in 0..d {
+                    covariance[i][j] += disturbance[i * d + j];
                 }
             }
-            for i in d..inner {
-                covariance[i * inner + i] += noise.gust * (1.0 - kept * kept);
+            for (i, row) in covariance.iter_mut().enumerate().take(inner).skip(d) {
+                row[i] += noise.gust * (1.0 - kept * kept);
             }
-            whitening.gains.extend(gain);
         }
         whitening
     }
 
-    /// Takes in a reading: keeps its whitening matrix, and returns its gain.
-    fn update(&mut self, covariance: &[f64], sensors: &[f64], weights: &[f64]) -> Vec<f64> {
+    /// Takes in a reading: keeps its gain and its whitening matrix, and leaves what is not known yet once it is used.
+    fn update(&mut self, covariance: &mut Small, sensors: &[f64], weights: &[f64]) {
         let (d, inner) = (self.states, self.inner);
-        let mut innovation = vec![0.0; d * d];
+        let mut innovation = *covariance;
         for i in 0..d {
-            for j in 0..d {
-                innovation[i * d + j] = covariance[i * inner + j];
-            }
-            innovation[i * d + i] += sensors[i] * if weights[i] > 0.0 { 1.0 } else { IGNORED };
+            innovation[i][i] += sensors[i] * if weights[i] > 0.0 { 1.0 } else { IGNORED };
         }
-        let factor = Cholesky::new(&innovation, d, 0.0).unwrap_or_else(|| {
-            let diagonal: Vec<f64> = (0..d * d)
-                .map(|ij| if ij / d == ij % d { innovation[ij].abs() + f64::MIN_POSITIVE } else { 0.0 })
-                .collect();
-            Cholesky::new(&diagonal, d, 0.0).expect("a positive diagonal")
-        });
-        let inverse = factor.inverse();
-        let mut gain = vec![0.0; inner * d];
+        let root = whitened(&innovation, d);
+        // W = P Hᵀ L⁻ᵀ: the gain is W L⁻¹, and W Wᵀ is what the reading tells.
+        let mut told: Small = [[0.0; MOST]; MOST];
         for i in 0..inner {
             for j in 0..d {
-                gain[i * d + j] = (0..d).map(|l| covariance[i * inner + l] * inverse[l * d + j]).sum();
+                told[i][j] = (0..=j).map(|l| covariance[i][l] * root[j][l]).sum();
             }
         }
-        let mut root = vec![0.0; d * d];
-        let mut unit = vec![0.0; d];
-        for j in 0..d {
-            unit.fill(0.0);
-            unit[j] = 1.0;
-            for (i, value) in factor.forward(&unit).into_iter().enumerate() {
+        for row in told.iter().take(inner) {
+            for j in 0..d {
+                self.gains.push((j..d).map(|l| row[l] * root[l][j]).sum());
+            }
+        }
+        for i in 0..inner {
+            for j in 0..inner {
+                covariance[i][j] -= (0..d).map(|l| told[i][l] * told[j][l]).sum::<f64>();
+            }
+        }
+        for i in 0..d {
+            for j in 0..d {
                 // A reading that is ignored adds nothing to the sum of squares.
-                root[i * d + j] = if weights[i] > 0.0 { value } else { 0.0 };
+                self.roots.push(if weights[i] > 0.0 { root[i][j] } else { 0.0 });
             }
-            if weights[j] > 0.0 {
-                self.log_determinant -= 2.0 * libm::log(root[j * d + j]);
+            if weights[i] > 0.0 {
+                self.log_determinant -= 2.0 * libm::log(root[i][i]);
             }
         }
-        self.roots.extend(root);
-        gain
     }
 
     /// Gain of a reading (inner × states).
@@ -243,14 +233,47 @@ impl Whitening {
     }
 }
 
-/// P − K P of a reading: what is not known yet once it is used (inner × inner).
-fn after(covariance: &[f64], gain: &[f64], inner: usize, d: usize) -> Vec<f64> {
-    let mut posterior = covariance.to_vec();
-    for i in 0..inner {
-        for j in 0..inner {
-            posterior[i * inner + j] -=
-                (0..d).map(|l| gain[i * d + l] * covariance[l * inner + j]).sum::<f64>();
+/// L⁻¹ with L Lᵀ the covariance of an innovation; of its diagonal alone where rounding has left no such L.
+fn whitened(innovation: &Small, d: usize) -> Small {
+    let mut root: Small = [[0.0; MOST]; MOST];
+    let mut lower: Small = [[0.0; MOST]; MOST];
+    for i in 0..d {
+        for j in 0..=i {
+            let sum = innovation[i][j] - (0..j).map(|k| lower[i][k] * lower[j][k]).sum::<f64>();
+            if i > j {
+                lower[i][j] = sum / lower[j][j];
+            } else if sum > 0.0 {
+                lower[i][i] = sum.sqrt();
+            } else {
+                for (k, row) in root.iter_mut().enumerate().take(d) {
+                    row[k] = 1.0 / (innovation[k][k].abs() + f64::MIN_POSITIVE).sqrt();
+                    row[..k].fill(0.0);
+                }
+                return root;
+            }
+        }
+        root[i][i] = 1.0 / lower[i][i];
+        for j in 0..i {
+            root[i][j] = -(j..i).map(|k| lower[i][k] * root[k][j]).sum::<f64>() * root[i][i];
         }
     }
-    posterior
+    root
+}
+
+/// Φ P Φᵀ, symmetric to the last bit.
+fn moved(covariance: &Small, transition: &Small, inner: usize) -> Small {
+    let mut half: Small = [[0.0; MOST]; MOST];
+    let mut next: Small = [[0.0; MOST]; MOST];
+    for i in 0..inner {
+        for j in 0..inner {
+            half[i][j] = (0..inner).map(|k| transition[i][k] * covariance[k][j]).sum();
+        }
+    }
+    for i in 0..inner {
+        for j in 0..=i {
+            next[i][j] = (0..inner).map(|k| half[i][k] * transition[j][k]).sum();
+            next[j][i] = next[i][j];
+        }
+    }
+    next
 }

@@ -38,7 +38,7 @@ impl Cholesky {
     }
 
     /// x with L x = b.
-    pub fn forward(&self, b: &[f64]) -> Vec<f64> {
+    fn forward(&self, b: &[f64]) -> Vec<f64> {
         let mut x = b.to_vec();
         for i in 0..self.order {
             for k in 0..i {
@@ -50,7 +50,7 @@ impl Cholesky {
     }
 
     /// x with Lᵀ x = b.
-    pub fn backward(&self, b: &[f64]) -> Vec<f64> {
+    fn backward(&self, b: &[f64]) -> Vec<f64> {
         let mut x = b.to_vec();
         for i in (0..self.order).rev() {
             for k in i + 1..self.order {
