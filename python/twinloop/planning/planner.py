@@ -13,7 +13,7 @@ from twinloop.controllers import Family
 from twinloop.flights import disagreements
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import from_unit, to_unit, tune_gains
-from twinloop.planning.judging import Committee, Ends, Judge, Task, expected
+from twinloop.planning.judging import HOPELESS, Committee, Ends, Judge, Task, expected
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 
@@ -200,7 +200,8 @@ class Planner(Judge):
             1.0 - self.options.margin, max(self.options.reach_first, self.options.reach_growth * used)
         )
         keeps = judged.worst_usage <= reach
-        limit = self._limit(float(mean[0]), goal, told, first_quality)
+        scatter = self._scatter(committee, tuned)
+        limit = self._limit(float(mean[0]), goal, told, first_quality, scatter)
         allowed = keeps & (mean <= limit)
         repeats = len(genes) - self._repeats(len(genes))
         if not committee.trusted:
@@ -288,14 +289,21 @@ class Planner(Judge):
                 excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
         return genes, excitation
 
-    def _limit(self, tuned: float, goal: str, told: int, first: float) -> float:
+    def _scatter(self, committee: Committee, tuned: Floats) -> float:
+        """How far the quality of one flight is from that of the next, by the sensors' noise alone."""
+        flights = self.judge(committee.members[:1], tuned[np.newaxis], committee.sds, self.options.draws)
+        scatter = float(flights.qualities.std())
+        return scatter if scatter < HOPELESS / 1e3 else 0.0
+
+    def _limit(self, tuned: float, goal: str, told: int, first: float, scatter: float) -> float:
         """Predicted quality that a test may have at most."""
         if goal == "model":
             return max(first, 2.0 * tuned)
         share = self.options.share ** max(1, told)
         if goal == "control":
-            share *= 0.1
-        return tuned + share * max(0.0, first - tuned)
+            return tuned + 0.1 * share * max(0.0, first - tuned)
+        # What is lost in the scatter of the flights costs nothing.
+        return tuned + max(scatter, share * (first - tuned))
 
     def _smallest(self) -> Floats:
         """Differences below this are rounding (n_x,)."""
