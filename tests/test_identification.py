@@ -91,6 +91,7 @@ def test_equal_expressions_are_one_node():
     pool = Pool(INPUTS)
     assert pool.product(0, 1) == pool.product(1, 0) and pool.add(("+", 2, 1)) == pool.add(("+", 1, 2))
     assert pool.add(("-", 2, 1)) != pool.add(("-", 1, 2))
+    assert pool.product(2, 2) != pool.add(("*", 2, 2.0))
     assert pool.node(0) is None and pool.needed([pool.product(0, 1, 2)]) == [
         pool.product(0, 1),
         pool.product(0, 1, 2),
