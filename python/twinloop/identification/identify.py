@@ -17,6 +17,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput
 from twinloop.identification.actuation import search_actuators, total
+from twinloop.identification.bounds import declared_bounds
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.committee import committee
 from twinloop.identification.evolution import evolve
@@ -26,10 +27,10 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, guessed_noise, stages
-from twinloop.identification.remarks import remarks
+from twinloop.identification.remarks import held_at_bounds, remarks
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Problem, Sum, first_noise, search
-from twinloop.signals import Signals
+from twinloop.signals import Bounds, Signals
 
 FEW_RUNS = 2
 """Runs up to which the noise is searched from above as well: more of them tell it by themselves."""
@@ -103,21 +104,18 @@ class _Learner:
         self.driven = [chain for chain in every if chain.output is not None]
         self.given = [self._given_noise(chain) for chain in every if chain.output is None]
         self.fixed = self._known_terms()
+        self.ladder = self._ladder()
+        self.bounds = self._bounded_terms()
         outputs = {i: self.fixed.get(chain.states[0], []) for i, chain in enumerate(self.driven)}
+        bounds = {i: self.bounds.get(chain.states[0], {}) for i, chain in enumerate(self.driven)}
         self.fitting = Fitting(
-            runs, self.pool, signals, self.form, options, seed, iteration, workers, outputs
+            runs, self.pool, signals, self.form, options, seed, iteration, workers, outputs, bounds
         )
         self.stream = 0
 
     def learn(self) -> Identified:
         options = self.options
-        ladder = rungs(self.pool, self.signals, options.libraries, options.most_terms)
-        base = ladder or [[self.pool.one, *range(self.pool.inputs)]]
-        seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
-        self.pool.rungs.update(dict.fromkeys(seeds, 0))
-        # What was known is never out of reach, whatever rung it came from.
-        found = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
-        base = [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
+        base = self.ladder
         self.watch("noise")
         actuators = direct(self.signals)
         if self.known is not None:
@@ -170,10 +168,44 @@ class _Learner:
             readings=readings,
             ignored=int(sum((run.weights == 0.0).sum() for run in runs)),
             energy=total(sums),
-            remarks=remarks(runs, self.pool, self.signals, sums, left, readings),
+            remarks=[
+                *remarks(runs, self.pool, self.signals, sums, left, readings),
+                *held_at_bounds(sums, self.bounds, self.pool, self.signals, self.form),
+            ],
         )
 
     # Steps
+
+    def _ladder(self) -> list[list[int]]:
+        """Candidates, rung by rung."""
+        options = self.options
+        ladder = rungs(self.pool, self.signals, options.libraries, options.most_terms)
+        base = ladder or [[self.pool.one, *range(self.pool.inputs)]]
+        seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
+        self.pool.rungs.update(dict.fromkeys(seeds, 0))
+        # What was known is never out of reach, whatever rung it came from.
+        found = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
+        return [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
+
+    def _bounded_terms(self) -> dict[int, dict[int, Bounds]]:
+        """Bounds of coefficients by state and node; a term that no rung has stands on the first one."""
+        fixed = [(state, node) for state, nodes in self.fixed.items() for node in nodes]
+        found = declared_bounds(self.options.bounded_terms, fixed, self.pool, self.signals)
+        outputs = [chain.states[0] for chain in self.driven]
+        for state, bounds in found.items():
+            if state not in outputs:
+                raise InvalidInput(
+                    f"Option 'bounded_terms': expected states that an output drives, any of"
+                    f" {', '.join(self.signals.state_names[i] for i in outputs)}, found"
+                    f" {self.signals.state_names[state]}; bound a constant in the equation of one of them."
+                )
+            strangers = [node for node in bounds if node not in self.ladder[-1]]
+            self.pool.rungs.update(dict.fromkeys(strangers, 0))
+            self.ladder = [[*terms, *strangers] for terms in self.ladder]
+            if self.form == "absolute" and state in bounds:
+                # Sums are what is added to a state.
+                bounds[state] = (bounds[state][0] - 1.0, bounds[state][1] - 1.0)
+        return found
 
     def _known_terms(self) -> dict[int, list[int]]:
         """Nodes that are known to drive a state, by the state."""
@@ -192,7 +224,7 @@ class _Learner:
     def _problem(self, actuators: Sequence[Actuator]) -> Problem:
         inputs = stages(self.fitting.runs, self.signals, actuators)
         runs, dt = self.fitting.runs, self.signals.dt
-        return Problem(self.pool, runs, inputs, dt, self.workers, self.fixed)
+        return Problem(self.pool, runs, inputs, dt, self.workers, self.fixed, self.bounds)
 
     def _given_noise(self, chain: Chain) -> Chain:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from twinloop.identification.bounds import Limits
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.structure import Sum
@@ -28,6 +29,35 @@ def identities(found: Sum, pool: Pool, signals: Signals) -> list[str]:
             )
             return [f"On these runs {driven} is described as well with {come} in place of {gone}."]
     return []
+
+
+def held_at_bounds(
+    sums: Sequence[Sum], bounds: Mapping[int, Limits], pool: Pool, signals: Signals, form: str
+) -> list[str]:
+    """Sentences about constants that the runs would have beyond their bounds.
+
+    Args:
+        sums: of the best model.
+        bounds: for each driven state, bounds of coefficients by node.
+        pool: of all expressions.
+        signals: of the system.
+        form: what the outputs mean; under "absolute" a sum is what is added to its state.
+
+    Returns:
+        One a constant that is at a bound.
+    """
+    symbols = [*signals.state_names, *signals.command_names]
+    said = []
+    for found in sums:
+        state = found.chain.states[0]
+        limits = bounds.get(state, {})
+        said += [
+            f"The constant of {pool.text(node, symbols)} in the equation of {symbols[state]} is held at its bound"
+            f" {weight + (form == 'absolute' and node == state):g}: the runs alone would put it beyond; check that bound."
+            for node, weight in found.weights.items()
+            if node in limits and weight in limits[node]
+        ]
+    return said
 
 
 def remarks(

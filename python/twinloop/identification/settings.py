@@ -22,6 +22,9 @@ class IdentificationOptions:
             the first rung of the ladder.
         fixed_terms: what is known of the law, such as "rate: -9.81 * sin(angle)": a state that an output drives, and a
             formula with its constants, which stay as they are.
+        bounded_terms: what is known of constants, such as "rate: sin(angle) in -20 .. -5": the coefficient of a term
+            in the equation of a state lies between two numbers, either of which may be left out; bounds that exclude 0
+            say that the term is in the law.
         operators: that evolved programs may use.
         generations: of evolved features; 0: none.
         restarts: of the evolution.
@@ -45,6 +48,7 @@ class IdentificationOptions:
     libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "trigonometric", "cubic")
     seed_terms: tuple[str, ...] = ()
     fixed_terms: tuple[str, ...] = ()
+    bounded_terms: tuple[str, ...] = ()
     operators: tuple[str, ...] = ("+", "-", "*", "/", "abs", "sqrt", "sin", "cos", "min", "max")
     generations: int = 6
     restarts: int = 1

@@ -10,9 +10,11 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
+from twinloop.identification.bounds import Limits, bounded_solution, excludes_zero
 from twinloop.identification.chains import Chain, Motion
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, Stages
+from twinloop.signals import Bounds
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
@@ -53,6 +55,7 @@ class Problem:
         dt: period, s.
         workers: how the work is carried out.
         fixed: for the first state of each chain, nodes that drive it and are known.
+        bounds: for the first state of each chain, bounds of coefficients by node.
     """
 
     def __init__(
@@ -63,8 +66,10 @@ class Problem:
         dt: float,
         workers: _core.Workers,
         fixed: Mapping[int, Sequence[int]] | None = None,
+        bounds: Mapping[int, Limits] | None = None,
     ) -> None:
         self.fixed = dict(fixed or {})
+        self.bounds = dict(bounds or {})
         self.pool = pool
         self.runs = runs
         self.stages = stages
@@ -101,6 +106,11 @@ class Problem:
         ]
         with engine_input():
             return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+    def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
+        """Bounds of a chain's coefficients, by place among terms."""
+        bounds = self.bounds.get(chain.states[0], {})
+        return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
 
     def readings(self, chain: Chain) -> int:
         """Readings of a chain that count."""
@@ -244,8 +254,10 @@ def search(
             subsets = [tuple(subset) for subset, _ in walk]
             if previous is not None and all(t in place for t in previous.weights):
                 subsets.append(tuple(sorted(place[t] for t in previous.weights)))
+            limits = problem.limits(chain, usable)
+            subsets = _with_what_must_be(subsets, gram, costs[i], limits)
             judged = sorted(
-                (found for found in (_judged(gram, s, costs[i]) for s in dict.fromkeys(subsets)) if found),
+                (f for f in (_judged(gram, s, costs[i], limits) for s in dict.fromkeys(subsets)) if f),
                 key=lambda found: (
                     found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]),
                     found[0],
@@ -280,11 +292,27 @@ def search(
     return best
 
 
+def _with_what_must_be(
+    subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
+) -> list[tuple[int, ...]]:
+    """Subsets that hold every term whose bounds exclude 0, wherever the runs tell of it at all."""
+    must = {
+        place
+        for place, bounds in limits.items()
+        if excludes_zero(bounds) and np.isfinite(costs[place]) and gram.solve([place]) is not None
+    }
+    return [s if must <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
+
+
 def _judged(
-    gram: _core.Gram, subset: tuple[int, ...], costs: Floats
+    gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Limits
 ) -> tuple[tuple[int, ...], float, float, Floats] | None:
-    solved = gram.solve(list(subset))
+    solved = bounded_solution(gram, subset, limits)
     if solved is None:
         return None
-    weights, _, left = solved
+    weights, left = solved
+    nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
+    if nothing and len(nothing) < len(subset):
+        # Held at 0 a term is none.
+        return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
     return subset, left + float(costs[list(subset)].sum()), left, weights
