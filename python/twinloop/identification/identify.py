@@ -27,9 +27,9 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, guessed_noise, stages
-from twinloop.identification.remarks import held_at_bounds, remarks
+from twinloop.identification.remarks import held_at_bounds, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Problem, Sum, first_noise, search
+from twinloop.identification.structure import BEST_SENSOR, Problem, Sum, first_noise, search
 from twinloop.signals import Bounds, Signals
 
 FEW_RUNS = 2
@@ -101,7 +101,7 @@ class _Learner:
         else:
             self.pool, self.known = Pool(signals.n_x + signals.n_u, len(options.operators)), None
         every = chains(signals, self.form, guessed_noise(runs, self.scales))
-        self.driven = [chain for chain in every if chain.output is not None]
+        self.driven = [self._declared_noise(chain) for chain in every if chain.output is not None]
         self.given = [self._given_noise(chain) for chain in every if chain.output is None]
         self.fixed = self._known_terms()
         self.ladder = self._ladder()
@@ -170,6 +170,7 @@ class _Learner:
             energy=total(sums),
             remarks=[
                 *remarks(runs, self.pool, self.signals, sums, left, readings),
+                *other_noise(tuned.observer, self.signals),
                 *held_at_bounds(sums, self.bounds, self.pool, self.signals, self.form),
             ],
         )
@@ -229,6 +230,15 @@ class _Learner:
     def _given_noise(self, chain: Chain) -> Chain:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
         return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / self.signals.dt, 0.0, 1.0))
+
+    def _declared_noise(self, chain: Chain) -> Chain:
+        """The chain with sensors as they are declared, as far as readings allow; the estimate begins there."""
+        sensors = chain.sensors.copy()
+        for i, state in enumerate(chain.states):
+            noise = self.signals.states[state].noise
+            if noise is not None:
+                sensors[i] = np.clip(noise * noise, BEST_SENSOR**2 * chain.rough[i], chain.rough[i])
+        return chain.with_noise(sensors, chain.motion)
 
     def _rough(self, chain: Chain) -> Chain:
         """The chain as if all its roughness were its sensors'."""

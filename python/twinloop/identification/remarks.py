@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twinloop.identification.bounds import Limits
+from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.identification.structure import Sum
+from twinloop.identification.structure import BEST_SENSOR, Sum
 from twinloop.signals import Signals
 
 TWINS = 4.0
@@ -51,12 +52,39 @@ def held_at_bounds(
     for found in sums:
         state = found.chain.states[0]
         limits = bounds.get(state, {})
-        said += [
-            f"The constant of {pool.text(node, symbols)} in the equation of {symbols[state]} is held at its bound"
-            f" {weight + (form == 'absolute' and node == state):g}: the runs alone would put it beyond; check that bound."
-            for node, weight in found.weights.items()
-            if node in limits and weight in limits[node]
-        ]
+        for node, weight in found.weights.items():
+            if node in limits and weight in limits[node]:
+                value = weight + (form == "absolute" and node == state)
+                said.append(
+                    f"The constant of {pool.text(node, symbols)} in the equation of {symbols[state]} is held at its"
+                    f" bound {value:g}: the runs alone would put it beyond; check that bound."
+                )
+    return said
+
+
+def other_noise(observer: Sequence[Chain], signals: Signals) -> list[str]:
+    """Sentences about sensors whose noise is far from what was declared.
+
+    Args:
+        observer: all chains, with their noise as it was estimated.
+        signals: of the system.
+
+    Returns:
+        One a sensor that is more than twice or less than half as noisy; none where the runs give a limit only.
+    """
+    said = []
+    for chain in observer:
+        for i, state in enumerate(signals.states[number] for number in chain.states):
+            found = float(np.sqrt(chain.sensors[i]))
+            # An angle of a rigid body, or a sensor that is as good as is ever believed: less cannot be told from this.
+            limit = chain.output is None or chain.sensors[i] <= 1.5 * BEST_SENSOR**2 * chain.rough[i]
+            if state.noise is None or (state.noise < found and limit):
+                continue
+            if not 0.5 <= found / state.noise <= 2.0:
+                said.append(
+                    f"The noise of the sensor of {state.name} was declared as {state.noise:.3g} {state.unit} and found to"
+                    f" be {found:.3g}; check the sensor and its unit, or remove the declaration."
+                )
     return said
 
 
