@@ -12,6 +12,7 @@ ABLATIONS: dict[str, Mapping[str, object]] = {
     "second-pass": {"passes": 1},
     "lags": {"lags": False},
     "gusts": {"gusts": False},
+    "offsets": {"offsets": False},
     "excitation": {"excitation": 0.0, "excitation_most": 0.0},
     "committee": {"committee_size": 1, "tuning_members": 1},
     "noise-draws": {"draws": 1},

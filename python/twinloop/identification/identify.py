@@ -1,8 +1,8 @@
 """Identification: from recorded runs to a model of readable equations and a committee of plausible ones.
 
 The steps, each of them an option: the noise is estimated; terms are selected up a ladder of libraries, then evolved;
-lags and delays of the actuators are searched by description length; constants are tuned on predictions; the whole is
-repeated on states that the model has smoothed.
+offsets of sensors, lags and delays of the actuators are searched by description length; constants are tuned on
+predictions; the whole is repeated on states that the model has smoothed.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ from twinloop.identification.fitting import Fitting
 from twinloop.identification.formulas import fixed_term, parsed_term
 from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
+from twinloop.identification.offsets import moved, search_offsets
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, guessed_noise, stages
-from twinloop.identification.remarks import held_at_bounds, other_noise, remarks
+from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import BEST_SENSOR, Problem, Sum, first_noise, search
 from twinloop.signals import Bounds, Signals
@@ -35,7 +36,7 @@ from twinloop.signals import Bounds, Signals
 FEW_RUNS = 2
 """Runs up to which the noise is searched from above as well: more of them tell it by themselves."""
 LAGS_AGAIN = 4
-"""Runs up to which lags and delays are searched anew; from then on they are only tuned."""
+"""Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
 
 
 def identify_runs(
@@ -117,6 +118,8 @@ class _Learner:
         options = self.options
         base = self.ladder
         self.watch("noise")
+        offsets = self._offsets()
+        self.fitting.runs = moved(self.fitting.runs, self.signals, offsets)
         actuators = direct(self.signals)
         if self.known is not None:
             actuators = self.known.actuators
@@ -164,12 +167,14 @@ class _Learner:
             sums=sums,
             chains=observer,
             actuators=self.fitting.lags_of(model),
+            offsets=offsets,
             left=left,
             readings=readings,
             ignored=int(sum((run.weights == 0.0).sum() for run in runs)),
             energy=total(sums),
             remarks=[
                 *remarks(runs, self.pool, self.signals, sums, left, readings),
+                *late_sensors(offsets, [chain.states[0] for chain in self.driven], self.signals),
                 *other_noise(tuned.observer, self.signals),
                 *held_at_bounds(sums, self.bounds, self.pool, self.signals, self.form),
             ],
@@ -226,6 +231,15 @@ class _Learner:
         inputs = stages(self.fitting.runs, self.signals, actuators)
         runs, dt = self.fitting.runs, self.signals.dt
         return Problem(self.pool, runs, inputs, dt, self.workers, self.fixed, self.bounds)
+
+    def _offsets(self) -> Floats:
+        """By how much later than those of the driven states each state's readings were taken from it (n_x,), s."""
+        if not self.options.offsets:
+            return np.zeros(self.signals.n_x)
+        if self.known is not None and len(self.fitting.runs) > LAGS_AGAIN:
+            return self.known.offsets
+        every = [*self.driven, *self.given]
+        return search_offsets(self.fitting.runs, self.signals, every, self.scales, self.workers)
 
     def _given_noise(self, chain: Chain) -> Chain:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from twinloop.arrays import Floats
 from twinloop.identification.bounds import Limits
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
@@ -62,6 +63,26 @@ def held_at_bounds(
     return said
 
 
+def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> list[str]:
+    """Sentences about sensors that are late or early.
+
+    Args:
+        offsets: of each state's readings (n_x,), s.
+        driven: states that outputs drive.
+        signals: of the system.
+
+    Returns:
+        One an offset.
+    """
+    names = np.array(signals.state_names)
+    others = ", ".join(names[list(driven)])
+    return [
+        f"Readings of {', '.join(names[offsets == offset])} come {1e3 * abs(offset):.3g} ms"
+        f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is learnt with that taken out."
+        for offset in dict.fromkeys(offsets[offsets != 0.0].tolist())
+    ]
+
+
 def other_noise(observer: Sequence[Chain], signals: Signals) -> list[str]:
     """Sentences about sensors whose noise is far from what was declared.
 
@@ -82,8 +103,8 @@ def other_noise(observer: Sequence[Chain], signals: Signals) -> list[str]:
                 continue
             if not 0.5 <= found / state.noise <= 2.0:
                 said.append(
-                    f"The noise of the sensor of {state.name} was declared as {state.noise:.3g} {state.unit} and found to"
-                    f" be {found:.3g}; check the sensor and its unit, or remove the declaration."
+                    f"The noise of the sensor of {state.name} was declared as {state.noise:.3g} {state.unit} and found"
+                    f" to be {found:.3g}; check the sensor and its unit, or remove the declaration."
                 )
     return said
 

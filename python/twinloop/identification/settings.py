@@ -37,6 +37,7 @@ class IdentificationOptions:
         gusts: whether disturbances may last, as gusts do, rather than be white.
         lags: whether lags and delays of the actuators are searched.
         longest_delay: of an actuator, periods.
+        offsets: whether sensors may be late or early against those of the driven states.
         tuning: whether constants are tuned on predictions.
         tuning_steps: at most.
         passes: how often terms are selected; from the second on with states that the model has smoothed.
@@ -61,6 +62,7 @@ class IdentificationOptions:
     gusts: bool = True
     lags: bool = True
     longest_delay: int = 2
+    offsets: bool = True
     tuning: bool = True
     tuning_steps: int = 20
     passes: int = 2
