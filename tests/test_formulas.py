@@ -218,6 +218,17 @@ def test_a_bounded_term_that_no_library_has_is_a_candidate():
     assert terms(found)["sin(angle)"] == pytest.approx(-9.81, rel=0.01)
 
 
+def test_bounds_on_terms_that_runs_cannot_tell_apart_are_no_obstacle():
+    still = Run.of(np.zeros((41, 2)), np.zeros((40, 1)))
+    settings = IdentificationOptions(
+        moves=500, generations=0, committee_size=2, lags=False,
+        bounded_terms=("rate: sin(angle) in .. -5", "rate: angle in 1 ..", "rate: 2 * angle - angle in 1 ..")
+    )  # fmt: skip
+    for run in (still, flown()):
+        found = identify_runs([run], SIGNALS, settings, workers=_core.Workers(1))
+        assert np.isfinite(found.model.step([[0.1, 0.0]], [[0.0]])).all()
+
+
 def test_bounds_hold_in_every_form():
     for form, low, high in (("increment", 0.9, 1.1), ("absolute", 0.9, 0.93)):
         found = learnt(form=form, libraries=("linear",), bounded_terms=(f"rate: rate in {low} .. {high}",))

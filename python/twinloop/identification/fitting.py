@@ -222,7 +222,9 @@ class Fitting:
         free = list(range(len(model.constants))) if self.form == "absolute" else self._layout(sums)[0]
         lags = [g for g in groups(self.signals) if self.lags_of(model)[g[0]][0] > 0.0]
         limits = self._limits(sums) if self.options.tuning else {}
-        held: set[int] = set()
+        # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
+        start = model.constants.tolist()
+        held = {place for place, bounds in limits.items() if steps == 0 and start[place] in bounds}
         while True:
             with engine_input():
                 tuned, left, readings, covariance, drawn = _core.tune(

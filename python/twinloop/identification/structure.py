@@ -295,13 +295,17 @@ def search(
 def _with_what_must_be(
     subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
 ) -> list[tuple[int, ...]]:
-    """Subsets that hold every term whose bounds exclude 0, wherever the runs tell of it at all."""
-    must = {
-        place
-        for place, bounds in limits.items()
-        if excludes_zero(bounds) and np.isfinite(costs[place]) and gram.solve([place]) is not None
-    }
-    return [s if must <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
+    """Subsets that hold every term whose bounds exclude 0, as far as the runs can tell those terms apart."""
+    must: list[int] = []
+    for place, bounds in limits.items():
+        if excludes_zero(bounds) and np.isfinite(costs[place]) and gram.solve([*must, place]) is not None:
+            must.append(place)
+    if not must:
+        return subsets
+    forced = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
+    if all(gram.solve(list(subset)) is None for subset in forced):
+        forced.append(tuple(sorted(must)))
+    return forced
 
 
 def _judged(
