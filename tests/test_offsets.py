@@ -148,6 +148,27 @@ def test_what_was_found_is_kept_once_there_are_many_runs():
     assert same_bits(later.offsets, first.offsets)
 
 
+@pytest.mark.parametrize("late", [(0.0, 0.01), (0.02, 0.0), (-0.03, 0.02), (0.02, -0.03), (-0.02, -0.02)])
+def test_in_a_longer_chain_each_state_is_moved_along_the_one_that_drives_it(late):
+    signals = tl.Signals(
+        [tl.State("y", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="y"),
+         tl.State("a", "m/s2", 1.0, derivative_of="v")],
+        [tl.Command("u", "V", (-1.0, 1.0))],
+        DT,
+    )  # fmt: skip
+    t = DT * np.arange(50)
+
+    def motion(y, v, a):
+        return np.stack([np.sin(2.0 * y), 2.0 * np.cos(2.0 * v), -4.0 * np.sin(2.0 * a)], axis=1)
+
+    run = Run.of(motion(t - late[0], t - late[1], t), np.zeros((49, 1)))
+    found = moved([run], signals, np.array([*late, 0.0]))[0]
+    errors = [np.abs(r.states - motion(t, t, t)).max(axis=0)[:2] for r in (found, run)]
+    for after, before, offset in zip(*errors, late, strict=True):
+        assert after < 1e-15 if offset == 0.0 else after < 0.03 * before
+    assert same_bits(found.smooth, found.states) and same_bits(run.states[:, 2], found.states[:, 2])
+
+
 def test_states_share_an_offset_by_unit_and_driven_ones_have_none():
     signals = tl.Signals(
         [tl.State("y", "m", 1.0), tl.State("a", "rad", 1.0), tl.State("b", "rad", 1.0)]

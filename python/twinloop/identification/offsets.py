@@ -60,20 +60,25 @@ def moved(runs: Sequence[Run], signals: Signals, offsets: Floats) -> list[Run]:
 def _moved(run: Run, signals: Signals, offsets: Floats) -> Run:
     states = run.states.copy()
     orders = np.array([_order(signals, i) for i in range(signals.n_x)])
+    # Derivatives that are driven are taken from the middle of the time to cover, others from where it begins.
+    shares = np.array([1.0 if signals.is_given(i) else 0.5 for i in range(signals.n_x)])
     # Derivatives first: what they are derivatives of is moved along them.
     nearest = np.argsort(-orders, kind="stable")
     for size in (offset for offset in dict.fromkeys(offsets[nearest].tolist()) if offset != 0.0):
-        # From when the reading was taken to when it counts, by the midpoint rule. Back in time derivatives of odd order
-        # have the other sign.
-        signs = np.where(orders % 2 == 1, np.sign(size), 1.0)
-        middle = states.copy()
+        late = offsets == size
+        begun = states.copy()
         if len(states) > 1:
             # A command is held for a period: what it does to a derivative is the slope of the same period.
             slopes = np.diff(states, axis=0) / signals.dt
             slopes = np.vstack([slopes[:1], slopes] if size > 0.0 else [slopes, slopes[-1:]])
-            middle[:, orders > 0] -= 0.5 * size * slopes[:, orders > 0]
-        later = _coasting(signals, abs(size)).step(signs * middle, np.zeros((len(states), signals.n_u)))
-        states[:, offsets == size] = later[:, offsets == size]
+            others = (orders > 0) & ~late
+            begun[:, others] -= size * shares[others] * slopes[:, others]
+        # Back in time, derivatives of odd order have the other sign.
+        signs = np.where(orders % 2 == 1, np.sign(size), 1.0)
+        ended = signs * _coasting(signals, abs(size)).step(
+            signs * begun, np.zeros((len(states), signals.n_u))
+        )
+        states[:, late] = ended[:, late]
     return replace(run, states=states, smooth=states)
 
 
