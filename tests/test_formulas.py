@@ -5,7 +5,7 @@ import pytest
 
 import twinloop as tl
 from twinloop import _core
-from twinloop.identification.formulas import fixed_term, parsed_term
+from twinloop.identification.formulas import bounded_term, fixed_term, parsed_term
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
@@ -75,7 +75,8 @@ def terms(identified):
 
 
 def learnt(**options):
-    settings = IdentificationOptions(moves=3000, generations=0, committee_size=2, lags=False, **options)
+    few = {"moves": 3000, "generations": 0, "committee_size": 2, "lags": False}
+    settings = IdentificationOptions(**{**few, **options})
     return identify_runs([flown(1e-4)], SIGNALS, settings, workers=_core.Workers(1))
 
 
@@ -108,7 +109,11 @@ def test_a_campaign_refuses_formulas_before_anything_is_flown():
     family = tl.controllers.PID(
         axes=[("angle", "rate")], gains={"angle.kp": (0, 10), "angle.ki": (0, 2), "angle.kd": (0, 3)}
     )
-    for options in ({"seed_terms": ("sin(angel)",)}, {"fixed_terms": ("rate = 3",)}):
+    for options in (
+        {"seed_terms": ("sin(angel)",)},
+        {"fixed_terms": ("rate = 3",)},
+        {"bounded_terms": ("rate: sin(angle) in 3 .. 2",)},
+    ):
         with pytest.raises(tl.InvalidInput, match=r"[Tt]erm"):
             tl.Campaign(
                 SIGNALS,
@@ -124,3 +129,112 @@ def test_known_terms_of_a_state_may_be_several():
     pool = Pool(3)
     state, node = fixed_term("rate: 2 * torque", pool, SIGNALS)
     assert state == 1 and pool.text(node, ["a", "r", "u"]) == "u * 2 * 1"
+
+
+# Bounds
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "low", "high"),
+    [
+        ("rate: sin(angle) in -20 .. -5", "sin(angle)", -20.0, -5.0),
+        ("rate: -sin(angle) in 5..20", "sin(angle)", -20.0, -5.0),
+        ("rate: 2 * torque in .. 6e0", "torque", -np.inf, 12.0),
+        ("rate:torque in 0 .. inf", "torque", 0.0, np.inf),
+        ("rate: 1 in -1 .. -1", "1", -1.0, -1.0),
+    ],
+)
+def test_bounds_are_those_that_are_written(text, expected, low, high):
+    pool = Pool(3)
+    state, node, bounds = bounded_term(text, pool, SIGNALS)
+    assert (state, pool.text(node, ["angle", "rate", "torque"]), bounds) == (1, expected, (low, high))
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"bounded_terms": ("rate: sin(angle) in 3 .. 2",)}, "expected low <= high, found 3 and 2"),
+        ({"bounded_terms": ("rate: sin(angle) in inf ..",)}, "expected low <= high"),
+        ({"bounded_terms": ("speed: sin(angle) in 2 .. 3",)}, "one of the states angle, rate"),
+        ({"bounded_terms": ("angle: rate in 0 .. 3",)}, "any of rate, found angle"),
+        ({"bounded_terms": ("rate: sin(angle) in 2",)}, "expected 'state: formula in low .. high'"),
+        ({"bounded_terms": ("rate: sin(angle) in nan .. 3",)}, "expected numbers"),
+        ({"bounded_terms": ("rate: sin(angle) in 1 .. x",)}, "found 'x'"),
+        ({"bounded_terms": ("rate: 0.0 * angle in 1 .. 2",)}, "found 0 times one"),
+        ({"bounded_terms": ("rate: import os in 1 .. 2",)}, "expected a formula"),
+        ({"bounded_terms": ("rate: angle in 1 ..", "rate: -angle in .. 9")}, "found a second one"),
+        (
+            {"bounded_terms": ("rate: sin(angle) in 1 ..",), "fixed_terms": ("rate: -9.81 * sin(angle)",)},
+            "found one that is fixed",
+        ),
+    ],
+)
+def test_bounds_that_make_no_sense_are_refused(options, sentence):
+    with pytest.raises(tl.InvalidInput, match=sentence):
+        learnt(**options)
+
+
+def of_sine(found):
+    """The coefficients of sin(angle) in each member of a committee, read from its program."""
+    said = []
+    for member in found.members:
+        instructions = member.program.instructions
+        sines = [target for operation, target, a, _ in instructions if operation == "sin" and a == 0]
+        said.append([b for op, _, a, b in instructions if op == "*" and a in sines and isinstance(b, float)])
+    return said
+
+
+def same(one, other):
+    return [str(m.program) for m in one.members] == [str(m.program) for m in other.members]
+
+
+def test_a_bound_that_does_not_bind_changes_no_bit():
+    free = learnt(committee_size=6)
+    for text in ("rate: sin(angle) in -20 .. -5", "rate: sin(angle) in .. 0", "rate: torque in 0 .. 100"):
+        bound = learnt(committee_size=6, bounded_terms=(text,))
+        assert same(bound, free) and bound.energy == free.energy and bound.remarks == free.remarks
+
+
+def test_a_bound_that_excludes_the_truth_holds_every_member_and_is_told():
+    found = learnt(committee_size=6, bounded_terms=("rate: sin(angle) in -20 .. -12",))
+    assert terms(found)["sin(angle)"] == -12.0
+    assert any("sin(angle) in the equation of rate is held at its bound -12" in r for r in found.remarks)
+    assert all(len(one) == 1 and -20.0 <= one[0] <= -12.0 for one in of_sine(found))
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(-9.8, -5.0), (-9.815, -9.805), (-20.0, -9.8), (-3.0, np.inf), (2.0, 9.0)]
+)
+def test_every_member_keeps_within_bounds(low, high):
+    found = learnt(committee_size=8, bounded_terms=(f"rate: sin(angle) in {low} .. {high}",))
+    assert len(found.members) > 1
+    must = not low <= 0.0 <= high
+    for coefficients in of_sine(found):
+        assert len(coefficients) >= must and all(low <= c <= high for c in coefficients)
+
+
+def test_a_bounded_term_that_no_library_has_is_a_candidate():
+    found = learnt(libraries=("linear",), bounded_terms=("rate: sin(angle) in -20 .. -5",))
+    assert terms(found)["sin(angle)"] == pytest.approx(-9.81, rel=0.01)
+
+
+def test_bounds_on_terms_that_runs_cannot_tell_apart_are_no_obstacle():
+    still = Run.of(np.zeros((41, 2)), np.zeros((40, 1)))
+    settings = IdentificationOptions(
+        moves=500, generations=0, committee_size=2, lags=False,
+        bounded_terms=("rate: sin(angle) in .. -5", "rate: angle in 1 ..", "rate: 2 * angle - angle in 1 ..")
+    )  # fmt: skip
+    for run in (still, flown()):
+        found = identify_runs([run], SIGNALS, settings, workers=_core.Workers(1))
+        assert np.isfinite(found.model.step([[0.1, 0.0]], [[0.0]])).all()
+
+
+def test_bounds_hold_in_every_form():
+    for form, low, high in (("increment", 0.9, 1.1), ("absolute", 0.9, 0.93)):
+        found = learnt(form=form, libraries=("linear",), bounded_terms=(f"rate: rate in {low} .. {high}",))
+        # What a state adds to its own next value: all of it in "absolute", what is beyond 1 of it in "increment".
+        x = np.array([[0.0, 0.5], [0.0, 0.0]])
+        change = np.diff(found.model.step(x, np.zeros((2, 1)))[::-1, 1])[0] / 0.5
+        coefficient = change - (form == "increment")
+        assert low - 1e-9 <= coefficient <= high + 1e-9
+        assert any("rate in the equation of rate is held at its bound" in r for r in found.remarks)

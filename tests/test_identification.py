@@ -1,5 +1,6 @@
 """Pools of expressions, ladders of libraries, and whether the law of a small plant is found from its runs."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -91,6 +92,7 @@ def test_equal_expressions_are_one_node():
     pool = Pool(INPUTS)
     assert pool.product(0, 1) == pool.product(1, 0) and pool.add(("+", 2, 1)) == pool.add(("+", 1, 2))
     assert pool.add(("-", 2, 1)) != pool.add(("-", 1, 2))
+    assert pool.product(2, 2) != pool.add(("*", 2, 2.0))
     assert pool.node(0) is None and pool.needed([pool.product(0, 1, 2)]) == [
         pool.product(0, 1),
         pool.product(0, 1, 2),
@@ -338,3 +340,34 @@ def test_a_model_that_a_small_change_makes_diverge_keeps_its_terms(monkeypatch):
     options = IdentificationOptions(moves=1000, generations=0, committee_size=2, lags=False)
     found = identify_runs([Run.of(states, commands)], signals, options, workers=_core.Workers(1))
     assert found.terms == 2
+
+
+# Declared noise
+
+
+def declared(*noise, kind=pendulum_like):
+    """The pendulum's signals with a declared noise of each sensor."""
+    signals = kind()
+    states = [replace(state, noise=sd) for state, sd in zip(signals.states, noise, strict=True)]
+    return replace(signals, states=states)
+
+
+@pytest.mark.parametrize("factor", [1e-200, 1e-3, 1.0, 1e3, 1e200])
+def test_a_declared_noise_is_where_the_estimate_begins_and_no_more(factor):
+    runs = [swung(gravity, seed, noise=2e-3) for seed in range(2)]
+    plain = identified(runs, pendulum_like())
+    told = identified(runs, declared(2e-3 * factor, 2e-3))
+    assert law(told).keys() == law(plain).keys()
+    for term, weight in law(plain).items():
+        assert law(told)[term] == pytest.approx(weight, rel=2e-3)
+    np.testing.assert_allclose(told.sensors(2), plain.sensors(2), rtol=0.1)
+    said = [remark for remark in told.remarks if "declared" in remark]
+    if factor == 1.0:
+        assert said == []
+    else:
+        assert len(said) == 1 and "sensor of angle" in said[0] and f"{2e-3 * factor:.3g} rad" in said[0]
+        assert float(said[0].split("found to be ")[1].split(";")[0]) == pytest.approx(2e-3, rel=0.3)
+
+
+def test_nothing_is_said_of_a_noise_that_runs_cannot_tell():
+    assert not any("declared" in r for r in identified([swung(gravity, 1)], declared(1e-9, 1e-9)).remarks)

@@ -103,6 +103,7 @@ class Lesson:
         sensors: standard deviation of each state's sensor, estimated, in its unit.
         lags: time constant of each command's actuator, s.
         delays: of each command's actuator, periods.
+        offsets: by how much later than those of the driven states each state's readings were taken from it, s.
         closed_loop: of the best model, one for each selected test, SI units squared.
         normalised: closed_loop over that of the model that never moves.
         remarks: what a person should know.
@@ -119,6 +120,7 @@ class Lesson:
     sensors: tuple[float, ...]
     lags: tuple[float, ...]
     delays: tuple[int, ...]
+    offsets: tuple[float, ...]
     closed_loop: tuple[float, ...]
     normalised: tuple[float, ...]
     remarks: tuple[str, ...]

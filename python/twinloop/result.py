@@ -157,9 +157,13 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
         "ignored": lesson.ignored,
         "committee": len(campaign.committee),
         "states": [
-            {"name": state.name, "unit": state.unit, "error": error, "sensor": sensor}
-            for state, error, sensor in zip(
-                campaign.signals.states, _errors_by_state(campaign, twin), lesson.sensors, strict=True
+            {"name": state.name, "unit": state.unit, "error": error, "sensor": sensor, "offset": offset}
+            for state, error, sensor, offset in zip(
+                campaign.signals.states,
+                _errors_by_state(campaign, twin),
+                lesson.sensors,
+                lesson.offsets,
+                strict=True,
             )
         ],
         "actuators": [

@@ -23,9 +23,11 @@ class State:
         scale: its usual size, in its unit; a run that leaves ten times this counts as diverged.
         derivative_of: the state whose derivative in time this one is, where that is known.
         envelope: smallest and largest value that the system may safely take, in its unit.
+        noise: standard deviation of its sensor, in its unit, where that is known; the preset `default` begins its own
+            estimate there and says where the two are far apart.
 
     Raises:
-        InvalidInput: a name, scale or envelope that cannot be used.
+        InvalidInput: a name, scale, envelope or noise that cannot be used.
     """
 
     name: str
@@ -33,12 +35,15 @@ class State:
     scale: float
     derivative_of: str | None = None
     envelope: Bounds | None = None
+    noise: float | None = None
 
     def __post_init__(self) -> None:
         _check_name("State", self.name)
         object.__setattr__(self, "scale", number(f"State {self.name!r}, scale", self.scale, above=0.0))
         if self.envelope is not None:
             object.__setattr__(self, "envelope", ordered(f"State {self.name!r}, envelope", self.envelope))
+        if self.noise is not None:
+            object.__setattr__(self, "noise", number(f"State {self.name!r}, noise", self.noise, above=0.0))
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 
 ABLATIONS: dict[str, Mapping[str, object]] = {
     "annealing": {"moves": 100, "starts": 1},
-    "ladder": {"libraries": ("linear", "quadratic")},
+    "ladder": {"libraries": ("linear", "quadratic", "damping")},
     "evolution": {"generations": 0},
     "tuning": {"tuning": False},
     "second-pass": {"passes": 1},
     "lags": {"lags": False},
+    "noise-from-above": {"noise_from_above": False},
     "gusts": {"gusts": False},
+    "offsets": {"offsets": False},
     "excitation": {"excitation": 0.0, "excitation_most": 0.0},
     "committee": {"committee_size": 1, "tuning_members": 1},
     "noise-draws": {"draws": 1},

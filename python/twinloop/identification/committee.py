@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
+from twinloop.identification.bounds import bounded_solution
 from twinloop.identification.chains import Chain
 from twinloop.identification.fitting import Fitting
 from twinloop.identification.structure import Problem, Sum
@@ -59,7 +60,8 @@ def committee(
             if (i, subset) not in grams:
                 regression = problem.regression(found.chain, terms)
                 grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, fitting.workers)
-            solved = grams[i, subset].solve(list(range(len(terms))))
+            limits = problem.limits(found.chain, terms)
+            solved = bounded_solution(grams[i, subset], range(len(terms)), limits)
             if solved is None:
                 varied.append(found)
             else:

@@ -11,12 +11,13 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.actuation import groups
+from twinloop.identification.bounds import Limits, bounded_model, excludes_zero
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Sum, Weights
-from twinloop.signals import Signals
+from twinloop.signals import Bounds, Signals
 
 PRUNINGS = 3
 """How often terms that tuning has shown to be nothing are dropped."""
@@ -51,6 +52,7 @@ class Fitting:
         iteration: which streams of random numbers.
         workers: how the work is carried out.
         fixed: for each output, nodes that drive it and are known.
+        bounds: for each output, bounds of coefficients by node.
     """
 
     def __init__(
@@ -64,8 +66,10 @@ class Fitting:
         iteration: int,
         workers: _core.Workers,
         fixed: Mapping[int, Sequence[int]] | None = None,
+        bounds: Mapping[int, Limits] | None = None,
     ) -> None:
         self.fixed = dict(fixed or {})
+        self.bounds = dict(bounds or {})
         self.runs = list(runs)
         self.pool = pool
         self.signals = signals
@@ -137,7 +141,21 @@ class Fitting:
             weights.append(range(place, place + len(found.weights)))
             free += weights[-1]
             place += len(found.weights)
+            # The state itself, where the output is the next one.
+            place += self.form == "absolute" and output not in found.weights
         return free, weights
+
+    def _limits(self, sums: Sequence[Sum]) -> dict[int, Bounds]:
+        """Bounds by place among a program's constants."""
+        limits: dict[int, Bounds] = {}
+        for output, (found, places) in enumerate(zip(sums, self._layout(sums)[1], strict=True)):
+            bounds = self.bounds.get(output, {})
+            for place, term in zip(places, found.weights, strict=True):
+                if term in bounds:
+                    itself = float(self.form == "absolute" and term == output)
+                    low, high = bounds[term]
+                    limits[place] = (low + itself, high + itself)
+        return limits
 
     def _holds_constant(self, number: int) -> bool:
         if number == self.pool.one:
@@ -154,12 +172,15 @@ class Fitting:
         free, places = self._layout(tuned.sums)
         variances = dict(zip(free, np.diag(tuned.covariance).tolist(), strict=False))
         saved, kept = 0.0, []
-        for found, at in zip(tuned.sums, places, strict=True):
+        for output, (found, at) in enumerate(zip(tuned.sums, places, strict=True)):
+            must = {t for t, bounds in self.bounds.get(output, {}).items() if excludes_zero(bounds)}
             price = np.log(max(2, sum(int(run.weights[:, found.chain.states[0]].sum()) for run in self.runs)))
             weights: Weights = {}
             for place, (term, weight) in zip(at, found.weights.items(), strict=True):
                 cost = price + 2.0 * self.pool.length(term)
-                if weight * weight >= cost * variances[place] or len(found.weights) == 1:
+                # A constant at its bound has no variance, but is no term if that bound is 0.
+                pays = weight != 0.0 and weight * weight >= cost * variances[place]
+                if pays or term in must or len(found.weights) == 1:
                     weights[term] = weight
                 else:
                     saved += cost
@@ -185,7 +206,7 @@ class Fitting:
         draws: int,
         unit: int = 0,
     ) -> tuple[_core.Model, float, int, Floats, list[_core.Model]]:
-        """Constants and lags tuned on predictions.
+        """Constants and lags tuned on predictions; a constant that leaves its bounds is held at the nearer one.
 
         Args:
             model: to begin with.
@@ -200,21 +221,34 @@ class Fitting:
         """
         free = list(range(len(model.constants))) if self.form == "absolute" else self._layout(sums)[0]
         lags = [g for g in groups(self.signals) if self.lags_of(model)[g[0]][0] > 0.0]
-        with engine_input():
-            return _core.tune(
-                model,
-                [chain.engine for chain in observer],
-                [(run.states, run.weights, run.commands) for run in self.runs],
-                free=free if self.options.tuning else [],
-                lags=lags if self.options.tuning else [],
-                iterations=steps,
-                draws=draws,
-                seed=self.seed,
-                iteration=self.iteration,
-                unit=unit,
-                divergence_factor=self.options.divergence_factor,
-                workers=self.workers,
-            )
+        limits = self._limits(sums) if self.options.tuning else {}
+        # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
+        start = model.constants.tolist()
+        held = {place for place, bounds in limits.items() if steps == 0 and start[place] in bounds}
+        while True:
+            with engine_input():
+                tuned, left, readings, covariance, drawn = _core.tune(
+                    model,
+                    [chain.engine for chain in observer],
+                    [(run.states, run.weights, run.commands) for run in self.runs],
+                    free=[place for place in free if place not in held] if self.options.tuning else [],
+                    lags=lags if self.options.tuning else [],
+                    iterations=steps,
+                    draws=draws,
+                    seed=self.seed,
+                    iteration=self.iteration,
+                    unit=unit,
+                    divergence_factor=self.options.divergence_factor,
+                    workers=self.workers,
+                )
+            model, beyond = bounded_model(tuned, limits)
+            if not beyond:
+                break
+            held |= beyond
+        if covariance.size:
+            for place in (place for place, number in enumerate(free) if number in held):
+                covariance = np.insert(np.insert(covariance, place, 0.0, axis=0), place, 0.0, axis=1)
+        return tuned, left, readings, covariance, [bounded_model(one, limits)[0] for one in drawn]
 
     def _predictions(
         self, model: _core.Model, observer: Sequence[Chain]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+import math
 
 from twinloop.errors import InvalidInput
 from twinloop.identification.pool import UNARY, Pool
-from twinloop.signals import Signals
+from twinloop.signals import Bounds, Signals
 
 BINARY: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 LONGEST = 500
@@ -64,6 +65,64 @@ def fixed_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int]:
     # Times 1, so that it is never one of the terms that are searched.
     known = pool.add(("*", parsed_term(formula.strip(), pool, signals), 1.0))
     return signals.state_names.index(name.strip()), known
+
+
+def bounded_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int, Bounds]:
+    """What is known of a constant of the law.
+
+    Args:
+        text: "state: formula in low .. high", such as "rate: sin(angle) in -20 .. -5"; either number may be left out.
+        pool: where the formula is entered.
+        signals: whose names it may use.
+
+    Returns:
+        The state's number, the node without its numerical factors, and bounds of its coefficient.
+
+    Raises:
+        InvalidInput: no such state, no formula, or bounds that nothing is between.
+    """
+    name, separator, rest = text.partition(":")
+    formula, inside, interval = rest.rpartition(" in ")
+    first, dots, last = interval.partition("..")
+    if not (separator and inside and dots) or name.strip() not in signals.state_names:
+        raise InvalidInput(
+            f"Bounded term {text!r}: expected 'state: formula in low .. high' with one of the states"
+            f" {', '.join(signals.state_names)}; such as '{signals.state_names[-1]}: sin(angle) in -20 .. -5'."
+        )
+    node, factor = bare_term(parsed_term(formula.strip(), pool, signals), pool)
+    low, high = _bound(first, text, -math.inf), _bound(last, text, math.inf)
+    if not low <= high or (math.isinf(low) and low == high):
+        raise InvalidInput(
+            f"Bounded term {text!r}: expected low <= high, found {low:g} and {high:g}; exchange or widen them."
+        )
+    if factor == 0.0:
+        raise InvalidInput(f"Bounded term {text!r}: expected a term, found 0 times one; remove the 0.")
+    bounds = (low * factor, high * factor) if factor > 0.0 else (high * factor, low * factor)
+    return signals.state_names.index(name.strip()), node, bounds
+
+
+def bare_term(node: int, pool: Pool) -> tuple[int, float]:
+    """A term without the numbers that it is multiplied by, and their product."""
+    factor = 1.0
+    while (parts := pool.node(node)) is not None and parts[0] == "*" and isinstance(parts[2], float):
+        node, factor = parts[1], factor * parts[2]
+    return node, factor
+
+
+def _bound(written: str, text: str, without: float) -> float:
+    """A number; where none is written the bound that is none."""
+    if not written.strip():
+        return without
+    try:
+        value = float(written)
+    except ValueError:
+        value = math.nan
+    if math.isnan(value):
+        raise InvalidInput(
+            f"Bounded term {text!r}: expected numbers on either side of '..', found {written.strip()!r};"
+            " write one, or leave it out."
+        )
+    return value
 
 
 def _node(tree: ast.expr, text: str, pool: Pool, names: dict[str, int]) -> int:

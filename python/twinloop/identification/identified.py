@@ -27,6 +27,7 @@ class Identified:
         sums: the terms that drive each chain.
         chains: with the noise of sensors and motion.
         actuators: lag, delay and rest of each command.
+        offsets: by how much later than those of the driven states each state's readings were taken from it (n_x,), s.
         left: χ² of the whitened prediction errors of the best model.
         readings: that counted.
         ignored: readings that were taken for outliers.
@@ -40,6 +41,7 @@ class Identified:
     sums: list[Sum]
     chains: list[Chain]
     actuators: list[Actuator]
+    offsets: Floats
     left: float
     readings: int
     ignored: int

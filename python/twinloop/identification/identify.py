@@ -1,8 +1,8 @@
 """Identification: from recorded runs to a model of readable equations and a committee of plausible ones.
 
 The steps, each of them an option: the noise is estimated; terms are selected up a ladder of libraries, then evolved;
-lags and delays of the actuators are searched by description length; constants are tuned on predictions; the whole is
-repeated on states that the model has smoothed.
+offsets of sensors, lags and delays of the actuators are searched by description length; constants are tuned on
+predictions; the whole is repeated on states that the model has smoothed.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput
 from twinloop.identification.actuation import search_actuators, total
+from twinloop.identification.bounds import declared_bounds
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.committee import committee
 from twinloop.identification.evolution import evolve
@@ -24,15 +25,23 @@ from twinloop.identification.fitting import Fitting
 from twinloop.identification.formulas import fixed_term, parsed_term
 from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
+from twinloop.identification.offsets import moved, search_offsets
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct, guessed_noise, stages
-from twinloop.identification.remarks import remarks
+from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Problem, Sum, first_noise, search, unexplained
-from twinloop.signals import Signals
+from twinloop.identification.structure import (
+    BEST_SENSOR,
+    Problem,
+    Sum,
+    first_noise,
+    search,
+    unexplained,
+)
+from twinloop.signals import Bounds, Signals
 
 LAGS_AGAIN = 4
-"""Runs up to which lags and delays are searched anew; from then on they are only tuned."""
+"""Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
 
 
 def identify_runs(
@@ -98,25 +107,24 @@ class _Learner:
         else:
             self.pool, self.known = Pool(signals.n_x + signals.n_u, len(options.operators)), None
         every = chains(signals, self.form, guessed_noise(runs, self.scales))
-        self.driven = [chain for chain in every if chain.output is not None]
+        self.driven = [self._declared_noise(chain) for chain in every if chain.output is not None]
         self.given = [self._given_noise(chain) for chain in every if chain.output is None]
         self.fixed = self._known_terms()
+        self.ladder = self._ladder()
+        self.bounds = self._bounded_terms()
         outputs = {i: self.fixed.get(chain.states[0], []) for i, chain in enumerate(self.driven)}
+        bounds = {i: self.bounds.get(chain.states[0], {}) for i, chain in enumerate(self.driven)}
         self.fitting = Fitting(
-            runs, self.pool, signals, self.form, options, seed, iteration, workers, outputs
+            runs, self.pool, signals, self.form, options, seed, iteration, workers, outputs, bounds
         )
         self.stream = 0
 
     def learn(self) -> Identified:
         options = self.options
-        ladder = rungs(self.pool, self.signals, options.libraries, options.most_terms)
-        base = ladder or [[self.pool.one, *range(self.pool.inputs)]]
-        seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
-        self.pool.rungs.update(dict.fromkeys(seeds, 0))
-        # What was known is never out of reach, whatever rung it came from.
-        found = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
-        base = [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
+        base = self.ladder
         self.watch("noise")
+        offsets = self._offsets()
+        self.fitting.runs = moved(self.fitting.runs, self.signals, offsets)
         actuators = direct(self.signals)
         if self.known is not None:
             actuators = self.known.actuators
@@ -158,14 +166,51 @@ class _Learner:
             sums=sums,
             chains=observer,
             actuators=self.fitting.lags_of(model),
+            offsets=offsets,
             left=left,
             readings=readings,
             ignored=int(sum((run.weights == 0.0).sum() for run in runs)),
             energy=total(sums),
-            remarks=remarks(runs, self.pool, self.signals, sums, left, readings),
+            remarks=[
+                *remarks(runs, self.pool, self.signals, sums, left, readings),
+                *late_sensors(offsets, [chain.states[0] for chain in self.driven], self.signals),
+                *other_noise(tuned.observer, self.signals),
+                *held_at_bounds(sums, self.bounds, self.pool, self.signals, self.form),
+            ],
         )
 
     # Steps
+
+    def _ladder(self) -> list[list[int]]:
+        """Candidates, rung by rung."""
+        options = self.options
+        ladder = rungs(self.pool, self.signals, options.libraries, options.most_terms)
+        base = ladder or [[self.pool.one, *range(self.pool.inputs)]]
+        seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
+        self.pool.rungs.update(dict.fromkeys(seeds, 0))
+        # What was known is never out of reach, whatever rung it came from.
+        found = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
+        return [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
+
+    def _bounded_terms(self) -> dict[int, dict[int, Bounds]]:
+        """Bounds of coefficients by state and node; a term that no rung has stands on the first one."""
+        fixed = [(state, node) for state, nodes in self.fixed.items() for node in nodes]
+        found = declared_bounds(self.options.bounded_terms, fixed, self.pool, self.signals)
+        outputs = [chain.states[0] for chain in self.driven]
+        for state, bounds in found.items():
+            if state not in outputs:
+                raise InvalidInput(
+                    f"Option 'bounded_terms': expected states that an output drives, any of"
+                    f" {', '.join(self.signals.state_names[i] for i in outputs)}, found"
+                    f" {self.signals.state_names[state]}; bound a constant in the equation of one of them."
+                )
+            strangers = [node for node in bounds if node not in self.ladder[-1]]
+            self.pool.rungs.update(dict.fromkeys(strangers, 0))
+            self.ladder = [[*terms, *strangers] for terms in self.ladder]
+            if self.form == "absolute" and state in bounds:
+                # Sums are what is added to a state.
+                bounds[state] = (bounds[state][0] - 1.0, bounds[state][1] - 1.0)
+        return found
 
     def _known_terms(self) -> dict[int, list[int]]:
         """Nodes that are known to drive a state, by the state."""
@@ -184,11 +229,29 @@ class _Learner:
     def _problem(self, actuators: Sequence[Actuator]) -> Problem:
         inputs = stages(self.fitting.runs, self.signals, actuators)
         runs, dt = self.fitting.runs, self.signals.dt
-        return Problem(self.pool, runs, inputs, dt, self.workers, self.fixed)
+        return Problem(self.pool, runs, inputs, dt, self.workers, self.fixed, self.bounds)
+
+    def _offsets(self) -> Floats:
+        """By how much later than those of the driven states each state's readings were taken from it (n_x,), s."""
+        if not self.options.offsets:
+            return np.zeros(self.signals.n_x)
+        if self.known is not None and len(self.fitting.runs) > LAGS_AGAIN:
+            return self.known.offsets
+        every = [*self.driven, *self.given]
+        return search_offsets(self.fitting.runs, self.signals, every, self.scales, self.workers)
 
     def _given_noise(self, chain: Chain) -> Chain:
         """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
         return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / self.signals.dt, 0.0, 1.0))
+
+    def _declared_noise(self, chain: Chain) -> Chain:
+        """The chain with sensors as they are declared, as far as readings allow; the estimate begins there."""
+        sensors = chain.sensors.copy()
+        for i, state in enumerate(chain.states):
+            noise = self.signals.states[state].noise
+            if noise is not None:
+                sensors[i] = np.clip(noise * noise, BEST_SENSOR**2 * chain.rough[i], chain.rough[i])
+        return chain.with_noise(sensors, chain.motion)
 
     def _from_both_sides(
         self, problem: Problem, terms: Sequence[int], known: Sequence[Sum | None]
@@ -200,13 +263,12 @@ class _Learner:
         """
         options = self.options
         usable = problem.usable(terms)
-        below = [
-            first_noise(problem, chain, usable, self.scales, options.gusts)
-            for chain in self.driven
-        ]
+        below = [first_noise(problem, chain, usable, self.scales, options.gusts) for chain in self.driven]
+        low = self._search(problem, below, terms, known, options.moves, 2)
+        if not options.noise_from_above:
+            return list(low)
         above = [unexplained(problem, chain, self.scales, options.gusts) for chain in self.driven]
         none: list[Sum | None] = [None] * len(self.driven)
-        low = self._search(problem, below, terms, known, options.moves, 2)
         high = self._search(problem, above, terms, none, options.moves, 2)
         return [a if a.energy <= b.energy else b for a, b in zip(low, high, strict=True)]
 

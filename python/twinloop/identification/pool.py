@@ -29,7 +29,8 @@ class Pool:
         self.inputs = inputs
         self.operations = max(2, operations)
         self.nodes: list[Node] = []
-        self._numbers: dict[Node, int] = {}
+        # 2 the node and 2.0 the constant are equal to Python.
+        self._numbers: dict[tuple[Node, bool], int] = {}
         self.rungs: dict[int, int] = {}
         self.one = self.add(ONE)
 
@@ -48,10 +49,11 @@ class Pool:
         operation, a, b = node
         if operation in "+*" and isinstance(b, int) and b < a:
             node = (operation, b, a)
-        if node not in self._numbers:
-            self._numbers[node] = self.inputs + len(self.nodes)
+        key = (node, isinstance(b, float))
+        if key not in self._numbers:
+            self._numbers[key] = self.inputs + len(self.nodes)
             self.nodes.append(node)
-        return self._numbers[node]
+        return self._numbers[key]
 
     def node(self, number: int) -> Node | None:
         """A node by its number; None for an input."""

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from twinloop.arrays import Floats
+from twinloop.identification.bounds import Limits
+from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.identification.structure import Sum
+from twinloop.identification.structure import BEST_SENSOR, Sum
 from twinloop.signals import Signals
 
 TWINS = 4.0
@@ -28,6 +31,82 @@ def identities(found: Sum, pool: Pool, signals: Signals) -> list[str]:
             )
             return [f"On these runs {driven} is described as well with {come} in place of {gone}."]
     return []
+
+
+def held_at_bounds(
+    sums: Sequence[Sum], bounds: Mapping[int, Limits], pool: Pool, signals: Signals, form: str
+) -> list[str]:
+    """Sentences about constants that the runs would have beyond their bounds.
+
+    Args:
+        sums: of the best model.
+        bounds: for each driven state, bounds of coefficients by node.
+        pool: of all expressions.
+        signals: of the system.
+        form: what the outputs mean; under "absolute" a sum is what is added to its state.
+
+    Returns:
+        One a constant that is at a bound.
+    """
+    symbols = [*signals.state_names, *signals.command_names]
+    said = []
+    for found in sums:
+        state = found.chain.states[0]
+        limits = bounds.get(state, {})
+        for node, weight in found.weights.items():
+            if node in limits and weight in limits[node]:
+                value = weight + (form == "absolute" and node == state)
+                said.append(
+                    f"The constant of {pool.text(node, symbols)} in the equation of {symbols[state]} is held at its"
+                    f" bound {value:g}: the runs alone would put it beyond; check that bound."
+                )
+    return said
+
+
+def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> list[str]:
+    """Sentences about sensors that are late or early.
+
+    Args:
+        offsets: of each state's readings (n_x,), s.
+        driven: states that outputs drive.
+        signals: of the system.
+
+    Returns:
+        One an offset.
+    """
+    names = np.array(signals.state_names)
+    others = ", ".join(names[list(driven)])
+    return [
+        f"Readings of {', '.join(names[offsets == offset])} come {1e3 * abs(offset):.3g} ms"
+        f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is learnt with that taken out."
+        for offset in dict.fromkeys(offsets[offsets != 0.0].tolist())
+    ]
+
+
+def other_noise(observer: Sequence[Chain], signals: Signals) -> list[str]:
+    """Sentences about sensors whose noise is far from what was declared.
+
+    Args:
+        observer: all chains, with their noise as it was estimated.
+        signals: of the system.
+
+    Returns:
+        One a sensor that is more than twice or less than half as noisy; none where the runs give a limit only.
+    """
+    said = []
+    for chain in observer:
+        for i, state in enumerate(signals.states[number] for number in chain.states):
+            found = float(np.sqrt(chain.sensors[i]))
+            # An angle of a rigid body, or a sensor that is as good as is ever believed: less cannot be told from this.
+            limit = chain.output is None or chain.sensors[i] <= 1.5 * BEST_SENSOR**2 * chain.rough[i]
+            if state.noise is None or (state.noise < found and limit):
+                continue
+            if not 0.5 <= found / state.noise <= 2.0:
+                said.append(
+                    f"The noise of the sensor of {state.name} was declared as {state.noise:.3g} {state.unit} and found"
+                    f" to be {found:.3g}; check the sensor and its unit, or remove the declaration."
+                )
+    return said
 
 
 def remarks(

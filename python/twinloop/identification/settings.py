@@ -16,12 +16,15 @@ class IdentificationOptions:
     Args:
         form: what a program's outputs mean; "auto": accelerations where the signals declare derivatives or a rigid
             body, else increments.
-        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "friction", "trigonometric", "cubic"; none:
-            evolved programs only.
+        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "friction", "trigonometric",
+            "cubic"; none: evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
             the first rung of the ladder.
         fixed_terms: what is known of the law, such as "rate: -9.81 * sin(angle)": a state that an output drives, and a
             formula with its constants, which stay as they are.
+        bounded_terms: what is known of constants, such as "rate: sin(angle) in -20 .. -5": the coefficient of a term
+            in the equation of a state lies between two numbers, either of which may be left out; bounds that exclude 0
+            say that the term is in the law.
         operators: that evolved programs may use.
         generations: of evolved features; 0: none.
         restarts: of the evolution.
@@ -31,9 +34,12 @@ class IdentificationOptions:
         starts: walks for each output.
         largest: terms of an output at most.
         most_terms: of a library at most; a larger one is left out.
+        noise_from_above: whether the noise is also searched from the largest that could be, so that the strongest terms
+            come first, rather than only from what all terms together leave.
         gusts: whether disturbances may last, as gusts do, rather than be white.
         lags: whether lags and delays of the actuators are searched.
         longest_delay: of an actuator, periods.
+        offsets: whether sensors may be late or early against those of the driven states.
         tuning: whether constants are tuned on predictions.
         tuning_steps: at most.
         passes: how often terms are selected; from the second on with states that the model has smoothed.
@@ -45,6 +51,7 @@ class IdentificationOptions:
     libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "friction", "trigonometric", "cubic")
     seed_terms: tuple[str, ...] = ()
     fixed_terms: tuple[str, ...] = ()
+    bounded_terms: tuple[str, ...] = ()
     operators: tuple[str, ...] = ("+", "-", "*", "/", "abs", "sqrt", "sin", "cos", "min", "max")
     generations: int = 6
     restarts: int = 1
@@ -54,9 +61,11 @@ class IdentificationOptions:
     starts: int = 4
     largest: int = 16
     most_terms: int = 450
+    noise_from_above: bool = True
     gusts: bool = True
     lags: bool = True
     longest_delay: int = 2
+    offsets: bool = True
     tuning: bool = True
     tuning_steps: int = 20
     passes: int = 2

@@ -10,9 +10,11 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
+from twinloop.identification.bounds import Limits, bounded_solution, excludes_zero
 from twinloop.identification.chains import Chain, Motion
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, Stages
+from twinloop.signals import Bounds
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
@@ -56,6 +58,7 @@ class Problem:
         dt: period, s.
         workers: how the work is carried out.
         fixed: for the first state of each chain, nodes that drive it and are known.
+        bounds: for the first state of each chain, bounds of coefficients by node.
     """
 
     def __init__(
@@ -66,8 +69,10 @@ class Problem:
         dt: float,
         workers: _core.Workers,
         fixed: Mapping[int, Sequence[int]] | None = None,
+        bounds: Mapping[int, Limits] | None = None,
     ) -> None:
         self.fixed = dict(fixed or {})
+        self.bounds = dict(bounds or {})
         self.pool = pool
         self.runs = runs
         self.stages = stages
@@ -104,6 +109,11 @@ class Problem:
         ]
         with engine_input():
             return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+    def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
+        """Bounds of a chain's coefficients, by place among terms."""
+        bounds = self.bounds.get(chain.states[0], {})
+        return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
 
     def readings(self, chain: Chain) -> int:
         """Readings of a chain that count."""
@@ -156,7 +166,7 @@ def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = Tr
     period = problem.dt if chain.integrated else 1.0
     first = float(sensors[0])
     found = []
-    # Where a disturbance is far too small no small change of it makes any difference: the search begins at several sizes.
+    # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
     for size in GUSTS if gusts else (0.0,):
         motion = (max(1e-3 * first / period, slow[0]), size * first / period**2, 10.0 * problem.dt)
         found.append(regression.most_likely_noise(np.zeros(1), sensors, motion, low, slow))
@@ -273,8 +283,10 @@ def search(
             subsets = [tuple(subset) for subset, _ in walk]
             if previous is not None and all(t in place for t in previous.weights):
                 subsets.append(tuple(sorted(place[t] for t in previous.weights)))
+            limits = problem.limits(chain, usable)
+            subsets = _with_what_must_be(subsets, gram, costs[i], limits)
             judged = sorted(
-                (found for found in (_judged(gram, s, costs[i]) for s in dict.fromkeys(subsets)) if found),
+                (f for f in (_judged(gram, s, costs[i], limits) for s in dict.fromkeys(subsets)) if f),
                 key=lambda found: (
                     found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]),
                     found[0],
@@ -309,11 +321,31 @@ def search(
     return best
 
 
+def _with_what_must_be(
+    subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
+) -> list[tuple[int, ...]]:
+    """Subsets that hold every term whose bounds exclude 0, as far as the runs can tell those terms apart."""
+    must: list[int] = []
+    for place, bounds in limits.items():
+        if excludes_zero(bounds) and np.isfinite(costs[place]) and gram.solve([*must, place]) is not None:
+            must.append(place)
+    if not must:
+        return subsets
+    forced = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
+    if all(gram.solve(list(subset)) is None for subset in forced):
+        forced.append(tuple(sorted(must)))
+    return forced
+
+
 def _judged(
-    gram: _core.Gram, subset: tuple[int, ...], costs: Floats
+    gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Limits
 ) -> tuple[tuple[int, ...], float, float, Floats] | None:
-    solved = gram.solve(list(subset))
+    solved = bounded_solution(gram, subset, limits)
     if solved is None:
         return None
-    weights, _, left = solved
+    weights, left = solved
+    nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
+    if nothing and len(nothing) < len(subset):
+        # Held at 0 a term is none.
+        return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
     return subset, left + float(costs[list(subset)].sum()), left, weights

@@ -336,6 +336,7 @@ class IdentifyAndPlan:
             sensors=tuple(known.sensors(self.setup.signals.n_x).tolist()),
             lags=tuple(lag for lag, _, _ in known.actuators),
             delays=tuple(delay for _, delay, _ in known.actuators),
+            offsets=tuple(known.offsets.tolist()),
             closed_loop=tuple(free),
             normalised=tuple(
                 normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)

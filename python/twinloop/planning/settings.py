@@ -44,12 +44,12 @@ class PlanningOptions:
     fade: float = 0.25
     initial_range: tuple[float, ...] = ()
     target_range: tuple[float, ...] = ()
-    candidates: int = 256
+    candidates: int = 1024
     nearness: float = 0.1
-    share: float = 0.25
+    share: float = 0.15
     draws: int = 16
     margin: float = 0.1
-    reach_first: float = 0.5
+    reach_first: float = 0.7
     reach_growth: float = 1.25
     evaluations: int = 12_000
     tuning_starts: int = 3

@@ -1,0 +1,124 @@
+"""Bounds on constants of a law: whose they are, and least squares and draws that keep within them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import InvalidInput
+from twinloop.identification.formulas import bare_term, bounded_term
+from twinloop.identification.pool import Pool
+from twinloop.signals import Bounds, Signals
+
+Limits = Mapping[int, Bounds]
+"""Bounds by the number of what they bound."""
+SWEEPS = 200
+"""Rounds over all bounds at most, until none moves a weight any more."""
+STILL = 1e-9
+"""Standard deviations; weights that move by less have stopped."""
+
+
+def declared_bounds(
+    texts: Sequence[str], fixed: Iterable[tuple[int, int]], pool: Pool, signals: Signals
+) -> dict[int, dict[int, Bounds]]:
+    """Bounds that a user has written.
+
+    Args:
+        texts: each "state: formula in low .. high".
+        fixed: (state, node) of terms whose constants are known.
+        pool: where the formulas are entered.
+        signals: whose names they may use.
+
+    Returns:
+        For each state, bounds of coefficients by node.
+
+    Raises:
+        InvalidInput: text that is no such bound, a term that is bounded twice, or one that is fixed.
+    """
+    known = {(state, bare_term(node, pool)[0]) for state, node in fixed}
+    found: dict[int, dict[int, Bounds]] = {}
+    for text in texts:
+        state, node, bounds = bounded_term(text, pool, signals)
+        if (state, node) in known:
+            raise InvalidInput(
+                f"Bounded term {text!r}: expected a term whose constant is to be found, found one that is fixed;"
+                " remove it from fixed_terms or from bounded_terms."
+            )
+        if node in found.setdefault(state, {}):
+            raise InvalidInput(
+                f"Bounded term {text!r}: expected one pair of bounds a term, found a second one; join them."
+            )
+        found[state][node] = bounds
+    return found
+
+
+def excludes_zero(bounds: Bounds) -> bool:
+    """Whether a term with these bounds must be in the law."""
+    return not bounds[0] <= 0.0 <= bounds[1]
+
+
+def within(value: float, bounds: Bounds) -> float:
+    """The nearest value that bounds allow."""
+    return min(max(value, bounds[0]), bounds[1])
+
+
+def bounded_solution(gram: _core.Gram, subset: Sequence[int], limits: Limits) -> tuple[Floats, float] | None:
+    """Least squares on a subset of features, with some of the coefficients kept within bounds.
+
+    Where a coefficient is moved to its bound, the others follow it along their covariance. The forces that hold
+    coefficients there are the dual of a small quadratic program, found one after another (Hildreth 1957).
+
+    Args:
+        gram: inner products.
+        subset: features.
+        limits: bounds of coefficients, by feature.
+
+    Returns:
+        Coefficients and χ²; None where the features are collinear.
+    """
+    solved = gram.solve(list(subset))
+    if solved is None:
+        return None
+    weights, covariance, left = solved
+    boxed = [(i, limits[j]) for i, j in enumerate(subset) if j in limits]
+    if all(low <= weights[i] <= high for i, (low, high) in boxed):
+        return weights, left
+    forces = np.zeros(len(weights))
+    for _ in range(SWEEPS):
+        moved = 0.0
+        for i, bounds in boxed:
+            variance = covariance[i, i]
+            free = weights[i] + variance * forces[i]
+            change = (free - within(free, bounds)) / variance - forces[i]
+            weights = weights - change * covariance[:, i]
+            forces[i] += change
+            moved = max(moved, abs(change) * float(np.sqrt(variance)))
+        if moved < STILL:
+            break
+    for i, bounds in boxed:
+        weights[i] = within(weights[i], bounds)
+    return weights, left + float((covariance * np.outer(forces, forces)).sum())
+
+
+def bounded_model(model: _core.Model, limits: Limits) -> tuple[_core.Model, set[int]]:
+    """A model whose constants are within bounds, and which of them were not.
+
+    Args:
+        model: any.
+        limits: bounds by place among its constants.
+
+    Returns:
+        The model itself where nothing is beyond.
+    """
+    constants = model.constants.tolist()
+    beyond = {
+        place for place, bounds in limits.items() if constants[place] != within(constants[place], bounds)
+    }
+    if not beyond:
+        return model, beyond
+    for place in beyond:
+        constants[place] = within(constants[place], limits[place])
+    return model.with_constants(constants, None), beyond

@@ -1,0 +1,183 @@
+"""Sensors that are late or early: whether the offset is found, is taken out, and is 0 where there is none."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import twinloop as tl
+from oracles import same_bits
+from twinloop import _core
+from twinloop.identification.chains import chains
+from twinloop.identification.identify import identify_runs
+from twinloop.identification.offsets import late_groups, moved, search_offsets
+from twinloop.identification.records import Run, guessed_noise
+from twinloop.presets import options_of
+
+WORKERS = _core.Workers()
+DT = 0.04
+FAST = {"moves": 2000, "starts": 2, "generations": 0, "lags": False, "committee_size": 3, "tuning_steps": 8}
+PENDULUM = tl.Signals(
+    [tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 6.0, derivative_of="angle")],
+    [tl.Command("torque", "N m", (-2.0, 2.0), scale=1.0)],
+    DT,
+)
+BODY = tl.Signals(
+    [tl.State(name, "rad", 3.0) for name in "abc"] + [tl.State(name, "rad/s", 6.0) for name in "pqr"],
+    [tl.Command(name, "N m", (-2.0, 2.0), scale=1.0) for name in "uvw"],
+    DT,
+    kinematics=tl.RigidBody(("a", "b", "c"), ("p", "q", "r")),
+)
+
+
+def swinging(state, command):
+    return np.array([state[1], -9.0 * np.sin(state[0]) - 0.4 * state[1] + 5.0 * command[0]])
+
+
+def turning(state, command):
+    roll, pitch, _, p, q, r = state
+    across = q * np.sin(roll) + r * np.cos(roll)
+    return np.array(
+        [p + np.tan(pitch) * across, q * np.cos(roll) - r * np.sin(roll), across / np.cos(pitch),
+         3.0 * command[0] - p, 2.0 * command[1] - q - 3.0 * pitch, 2.0 * command[2] - r + 0.5 * p * q]
+    )  # fmt: skip
+
+
+def read(law, signals, seed, late=0.0, noise=1e-3, steps=100):
+    """A run of which the angles are read `late` seconds after the rates; before it, everything rests."""
+    stream = np.random.default_rng(seed)
+    commands = np.repeat(stream.uniform(-1.5, 1.5, (steps // 5, signals.n_u)), 5, axis=0)
+    driven = [not signals.is_given(i) for i in range(signals.n_x)]
+    # The readings begin a period after the start, so that an early sensor, too, has something to read.
+    commands = np.vstack([np.zeros((1, signals.n_u)), commands, commands[-1:]])
+    x, states = np.zeros(signals.n_x), []
+    for command in commands:
+        path = solve_ivp(
+            lambda _, y, u=command: law(y, u),
+            (0.0, DT),
+            x,
+            "DOP853",
+            dense_output=True,
+            rtol=1e-10,
+            atol=1e-12,
+        ).sol
+        path = path([0.0, -late if late <= 0.0 else DT - late, DT]).T
+        states.append(path)
+        x = path[-1]
+    paths = np.array(states)
+    now = paths[1:, 0]
+    other = paths[:-1, 1] if late > 0.0 else paths[1:, 1]
+    readings = np.where(driven, now, other)
+    return Run.of(readings + noise * stream.normal(size=readings.shape), commands[1:-1])
+
+
+def offsets_of(runs, signals):
+    scales = np.array([state.scale for state in signals.states])
+    every = chains(signals, "acceleration", guessed_noise(runs, scales))
+    return search_offsets(runs, signals, every, scales, WORKERS)
+
+
+def learnt(runs, signals, **changes):
+    return identify_runs(runs, signals, options_of("default", {**FAST, **changes}), workers=WORKERS)
+
+
+SYSTEMS = [(swinging, PENDULUM, [0]), (turning, BODY, [0, 1, 2])]
+
+
+@pytest.mark.parametrize(("law", "signals", "angles"), SYSTEMS)
+@pytest.mark.parametrize("late", [0.3 * DT, -0.2 * DT, 0.7 * DT])
+def test_the_offset_of_a_group_is_found_and_taken_out(law, signals, angles, late):
+    run, true = (read(law, signals, 1, offset, noise) for offset, noise in ((late, 1e-3), (0.0, 0.0)))
+    found = offsets_of([run], signals)
+    expected = np.where(np.isin(range(signals.n_x), angles), late, 0.0)
+    np.testing.assert_allclose(found, expected, atol=0.04 * DT)
+    again = moved([read(law, signals, 1, late, 0.0)], signals, expected)[0]
+    n = len(true.states)
+    error = np.abs(again.states - true.states)[1 : n - 1]
+    assert error.max() < 0.03 * np.abs(read(law, signals, 1, late, 0.0).states - true.states).max()
+
+
+@pytest.mark.parametrize(("law", "signals", "angles"), SYSTEMS)
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3, 1e-2])
+def test_no_offset_is_found_where_there_is_none(law, signals, angles, noise):
+    for seed in range(4):
+        assert not offsets_of([read(law, signals, seed, 0.0, noise)], signals).any()
+
+
+def test_an_outlier_is_no_offset():
+    for place, size in ((40, 4.0), (70, -2.0)):
+        for state in range(2):
+            run = read(swinging, PENDULUM, 2)
+            run.states[place, state] += size
+            assert not offsets_of([run], PENDULUM).any()
+
+
+def constants(found):
+    return dict(zip(found.sums[0].weights, found.model.constants.tolist(), strict=True))
+
+
+def test_the_law_is_learnt_as_if_all_sensors_were_read_at_once():
+    runs = [read(swinging, PENDULUM, seed, 0.3 * DT) for seed in range(2)]
+    on, off = (learnt(runs, PENDULUM, offsets=offsets) for offsets in (True, False))
+    assert on.offsets == pytest.approx([0.3 * DT, 0.0], abs=0.02 * DT)
+    assert any("Readings of angle come 1" in r and "later than those of rate;" in r for r in on.remarks)
+    rows = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 2)) * [1.0, 4.0]
+    commands = np.random.default_rng(1).uniform(-1.0, 1.0, (50, 1))
+    expected = [
+        solve_ivp(lambda _, y, u=u: swinging(y, u), (0.0, DT), x, rtol=1e-10, atol=1e-12).y[:, -1]
+        for x, u in zip(rows, commands, strict=True)
+    ]
+    errors = [np.abs(found.model.step(rows, commands) - expected).max() for found in (on, off)]
+    assert errors[0] < 0.01 and errors[1] > 3.0 * errors[0]
+    assert on.misfit < 1.3 and on.energy < off.energy - 50.0
+    assert on.sensors(2)[0] == pytest.approx(1e-3, rel=0.3)
+    assert not off.offsets.any()
+
+
+def test_where_none_is_found_no_bit_changes():
+    runs = [read(swinging, PENDULUM, 3)]
+    on, off = (learnt(runs, PENDULUM, offsets=offsets) for offsets in (True, False))
+    assert same_bits(on.model.constants, off.model.constants) and on.energy == off.energy
+    assert [str(m.program) for m in on.members] == [str(m.program) for m in off.members]
+
+
+def test_what_was_found_is_kept_once_there_are_many_runs():
+    runs = [read(swinging, PENDULUM, seed, 0.3 * DT) for seed in range(5)]
+    first = learnt(runs[:2], PENDULUM)
+    options = options_of("default", FAST)
+    later = identify_runs(runs, PENDULUM, options, workers=WORKERS, iteration=2, known=first)
+    assert same_bits(later.offsets, first.offsets)
+
+
+@pytest.mark.parametrize("late", [(0.0, 0.01), (0.02, 0.0), (-0.03, 0.02), (0.02, -0.03), (-0.02, -0.02)])
+def test_in_a_longer_chain_each_state_is_moved_along_the_one_that_drives_it(late):
+    signals = tl.Signals(
+        [tl.State("y", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="y"),
+         tl.State("a", "m/s2", 1.0, derivative_of="v")],
+        [tl.Command("u", "V", (-1.0, 1.0))],
+        DT,
+    )  # fmt: skip
+    t = DT * np.arange(50)
+
+    def motion(y, v, a):
+        return np.stack([np.sin(2.0 * y), 2.0 * np.cos(2.0 * v), -4.0 * np.sin(2.0 * a)], axis=1)
+
+    run = Run.of(motion(t - late[0], t - late[1], t), np.zeros((49, 1)))
+    found = moved([run], signals, np.array([*late, 0.0]))[0]
+    errors = [np.abs(r.states - motion(t, t, t)).max(axis=0)[:2] for r in (found, run)]
+    for after, before, offset in zip(*errors, late, strict=True):
+        assert after < 1e-15 if offset == 0.0 else after < 0.03 * before
+    assert same_bits(found.smooth, found.states) and same_bits(run.states[:, 2], found.states[:, 2])
+
+
+def test_states_share_an_offset_by_unit_and_driven_ones_have_none():
+    signals = tl.Signals(
+        [tl.State("y", "m", 1.0), tl.State("a", "rad", 1.0), tl.State("b", "rad", 1.0)]
+        + [tl.State(f"d{of}", "1/s", 1.0, derivative_of=of) for of in "yab"]
+        + [tl.State("load", "kg", 1.0)],
+        [tl.Command("u", "V", (-1.0, 1.0))],
+        0.1,
+    )
+    every = chains(signals, "acceleration", np.ones(7))
+    assert late_groups(signals, every) == [[0], [1, 2]]
+    assert late_groups(signals, chains(signals, "increment", np.ones(7))) == []
+    assert late_groups(BODY, chains(BODY, "acceleration", np.ones(6))) == [[0, 1, 2]]
