@@ -57,7 +57,7 @@ class IdentificationOptions:
     restarts: int = 1
     population: int = 120
     longest: float = 20.0
-    moves: int = 20_000
+    moves: int = 50_000
     starts: int = 4
     largest: int = 16
     most_terms: int = 450
