@@ -136,8 +136,12 @@ class _Learner:
         known = self._from_both_sides(problem, start, known)
         if options.lags and (self.known is None or len(self.fitting.runs) <= LAGS_AGAIN):
             self.watch("actuators")
+            before = actuators
             actuators, known = self._actuators(start, [s.chain for s in known if s])
             problem = self._problem(actuators)
+            if actuators != before:
+                # The noise was that of other actuators, and a disturbance may still stand in for terms.
+                known = self._from_both_sides(problem, start, known)
         self.watch("terms")
         driven = [s.chain for s in known if s]
         sums = self._climb(problem, driven, known, base)
