@@ -88,6 +88,12 @@ def test_a_fixed_term_stays_as_it_is_and_the_rest_is_found():
     assert 1.0 in found.model.constants.tolist()
 
 
+def test_a_fixed_term_is_taken_out_of_the_readings_before_terms_are_selected():
+    found = learnt(fixed_terms=("rate: -9.81 * sin(angle)",), tuning=False, passes=1)
+    assert set(terms(found)) == {"rate", "torque"}
+    assert terms(found)["torque"] == pytest.approx(6.0, rel=0.01)
+
+
 def test_a_wrong_fixed_term_is_made_up_for():
     found = learnt(fixed_terms=("rate: -5 * sin(angle)",))
     assert terms(found)["sin(angle)"] == pytest.approx(-4.81, rel=0.02)

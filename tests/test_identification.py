@@ -106,13 +106,18 @@ def test_an_empty_sum_is_zero_and_one_is_one():
 
 
 def test_longer_expressions_cost_more_and_what_is_known_elsewhere_its_own_price():
-    pool = Pool(INPUTS)
-    terms = [0, pool.product(0, 1), pool.product(0, 1, 2), pool.product(0, 1, 2, 2), pool.add(("+", 0, 0.5))]
+    pool = Pool(8)
+    square = pool.product(0, 0)
+    terms = [0, square, pool.product(0, 1), pool.product(0, 1, 2), pool.product(0, 1, 2, 2)]
     lengths = [pool.length(term) for term in terms]
-    assert lengths[0] == lengths[1] < lengths[2] < lengths[3]
-    assert lengths[4] == lengths[1]
-    found = prices(pool, terms, 1000, {terms[3]: 1.25})
-    expected = np.log(1000.0) + 2.0 * np.array([*lengths[:3], 1.25, lengths[4]])
+    # One of 9 linear terms or of 9 kinds of one input, one of 28 pairs.
+    assert lengths[0] == lengths[1] == pytest.approx(np.log(27.0))
+    assert lengths[2] == pytest.approx(np.log(84.0))
+    assert lengths[2] < lengths[3] < lengths[4]
+    assert pool.length(pool.add(("+", 0, 0.5))) == lengths[2]
+    assert pool.length(pool.product(pool.add(("abs", 0, None)), 0)) == lengths[1]
+    found = prices(pool, terms, 1000, {terms[4]: 1.25})
+    expected = np.log(1000.0) + 2.0 * np.array([*lengths[:4], 1.25])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert (prices(pool, terms, 0, {}) > 0.0).all()
 
@@ -127,7 +132,11 @@ def pendulum_like():
 
 def test_each_rung_has_the_terms_of_those_below_and_a_stranger_stands_above_all():
     pool = Pool(INPUTS)
-    ladder = rungs(pool, pendulum_like(), ("linear", "quadratic", "trigonometric", "cubic"), 450)
+    libraries = ("linear", "quadratic", "damping", "friction", "trigonometric", "cubic")
+    ladder = rungs(pool, pendulum_like(), libraries, 450)
+    assert len(ladder) == 3
+    drag = pool.product(pool.add(("abs", 1, None)), 1)
+    assert drag in ladder[0] and pool.rung([drag]) == 0
     assert all(set(low) < set(high) for low, high in pairwise(ladder))
     assert all(len(set(terms)) == len(terms) for terms in ladder)
     sine = pool.add(("sin", 0, None))
@@ -209,6 +218,36 @@ def test_the_law_of_a_pendulum_is_found():
     assert terms[1] == pytest.approx(-0.4, rel=0.01) and terms[2] == pytest.approx(5.0, rel=0.01)
     assert len(found.members) == 3 and found.ignored == 0 and found.readings == 404
     assert found.members[0] is found.model
+
+
+def flown_in_gusts(seed):
+    """Two excited flights of a quadrotor with drag and lagging motors in gusts of 0.5 rad/s²."""
+    rig = tl.systems.Quadrotor.harsh(noise=1e-3, seed=seed)
+    task = {"initial_state": rig.initial_state, "target_state": rig.target_state, "duration": rig.duration}
+    campaign = tl.Campaign(rig.signals, controller=rig.controller, seed=seed, **task)
+    flights = [rig.run(campaign.test(rig.default_gains)) for _ in range(2)]
+    return rig.signals, [Run.of(flight.states, flight.commands) for flight in flights]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_from_above_gusts_are_told_from_terms_where_from_below_they_are_not(seed):
+    signals, runs = flown_in_gusts(seed)
+    changes = {"libraries": ("linear", "quadratic", "damping"), "moves": 5000}
+    both, below = (identified(runs, signals, noise_from_above=above, **changes) for above in (True, False))
+    assert both.energy < below.energy - 100.0
+    assert both.terms < 12 < below.terms
+    gusts = np.sqrt([found.chain.motion[1] for found in both.sums])
+    assert ((0.2 < gusts) & (gusts < 2.0)).all()
+
+
+def test_where_nothing_drives_a_state_but_noise_no_term_does():
+    stream = np.random.default_rng(1)
+    walk = np.cumsum(0.1 * stream.normal(size=(200, 1)), axis=0)
+    signals = tl.Signals([tl.State("level", "m", 1.0)], [tl.Command("u", "V", (-1.0, 1.0))], 0.1)
+    run = Run.of(walk + 1e-3 * stream.normal(size=walk.shape), stream.uniform(-1.0, 1.0, (199, 1)))
+    found = identified([run], signals)
+    assert found.terms == 0 and len(found.members) == 3
+    assert np.isfinite(found.left)
 
 
 def test_a_lag_of_the_actuator_is_found():

@@ -101,11 +101,14 @@ class Problem:
         return self._of(chain, terms, readings)
 
     def _of(self, chain: Chain, terms: Sequence[int], readings: Sequence[Floats]) -> _core.Regression:
-        start, middle, end = (np.stack([self._values[term][s] for term in terms], axis=1) for s in range(3))
+        none = np.empty((len(self.stages.start), 0))
+        start, middle, end = (
+            np.stack([self._values[term][s] for term in terms], axis=1) if terms else none for s in range(3)
+        )
         states = list(chain.states)
         records = [
-            (run.states[:, states], run.weights[:, states], start[rows], middle[rows], end[rows])
-            for run, rows in zip(self.runs, self.stages.runs, strict=True)
+            (measured, run.weights[:, states], start[rows], middle[rows], end[rows])
+            for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
         ]
         with engine_input():
             return _core.Regression(len(states), self.dt, chain.integrated, records)
