@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-import types
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from twinloop.exam.expressions import program
 from twinloop.exam.integrals import regression
 from twinloop.exam.kinds import Campaigner, Fitter, Flyer, Optimum
 from twinloop.exam.learners import LEARNERS, for_smoke, key
-from twinloop.exam.library import model_inputs, monomials, unknown_states, variables_of
+from twinloop.exam.library import model_inputs, monomials, variables_of
 from twinloop.exam.plan import Scope, planned
 from twinloop.exam.results import Results, spread
 from twinloop.exam.store import Address, Row, Store
@@ -57,7 +56,7 @@ def excited(rig):
     x, u = stream.standard_normal((400, 6)), 300.0 * stream.random((400, 4))
     slopes = np.array([system.dynamics.derivative(a, b) for a, b in zip(x, u, strict=True)])
     features = library.values(model_inputs(x, u, rig.signals))
-    true = np.linalg.lstsq(features, slopes[:, unknown_states(rig.signals)], rcond=None)[0]
+    true = np.linalg.lstsq(features, slopes[:, list(rig.signals.driven)], rcond=None)[0]
     return runs, library, true
 
 
@@ -160,14 +159,6 @@ def test_qualities_are_the_distance_at_the_end_and_the_integrated_error_of_angle
         quality.of_states("iea", states, test)
 
 
-def test_an_angle_that_wraps_is_compared_the_short_way():
-    signals = types.SimpleNamespace(
-        states=[types.SimpleNamespace(periodic=True), types.SimpleNamespace(periodic=False)]
-    )
-    gaps = quality.difference(np.array([3.1, 3.1]), np.array([-3.1, -3.1]), signals)
-    np.testing.assert_allclose(gaps, [6.2 - 2.0 * math.pi, 6.2])
-
-
 def test_the_true_quality_is_the_mean_over_runs_with_noise():
     noisy = subject("quadrotor-noisy")
     genes = noisy.family.genes(noisy.true_rig.default_gains)
@@ -256,14 +247,6 @@ def test_the_integral_form_does_not_care_where_a_run_starts(excited, rig):
         strict=True,
     ):
         np.testing.assert_allclose(a.features.T @ a.target, b.features.T @ b.target, rtol=1e-4, atol=1e-9)
-
-
-def test_declared_kinematics_leave_nothing_to_learn_of_the_angles():
-    names = ("roll", "pitch", "p", "q")
-    states = [types.SimpleNamespace(name=name, derivative_of=None) for name in names]
-    assert unknown_states(types.SimpleNamespace(states=states)) == [0, 1, 2, 3]
-    kinematics = types.SimpleNamespace(angles=("roll", "pitch"))
-    assert unknown_states(types.SimpleNamespace(states=states, kinematics=kinematics)) == [2, 3]
 
 
 def test_a_library_becomes_a_program_that_computes_it(rig):

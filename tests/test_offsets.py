@@ -46,7 +46,7 @@ def read(law, signals, seed, late=0.0, noise=1e-3, steps=100):
     """A run of which the angles are read `late` seconds after the rates; before it, everything rests."""
     stream = np.random.default_rng(seed)
     commands = np.repeat(stream.uniform(-1.5, 1.5, (steps // 5, signals.n_u)), 5, axis=0)
-    driven = [not signals.is_given(i) for i in range(signals.n_x)]
+    driven = [i in signals.driven for i in range(signals.n_x)]
     # The readings begin a period after the start, so that an early sensor, too, has something to read.
     commands = np.vstack([np.zeros((1, signals.n_u)), commands, commands[-1:]])
     x, states = np.zeros(signals.n_x), []

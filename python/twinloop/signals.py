@@ -186,11 +186,13 @@ class Signals:
         """Names of the commands, in order."""
         return tuple(command.name for command in self.commands)
 
-    def is_given(self, state: int) -> bool:
-        """Whether other states alone say how a state moves: it is the integral of one, or an angle of the body."""
-        name = self.state_names[state]
-        turned = self.kinematics is not None and name in self.kinematics.angles
-        return turned or any(other.derivative_of == name for other in self.states)
+    @cached_property
+    def driven(self) -> tuple[int, ...]:
+        """States that no other states say the motion of: all but integrals of another and angles of a rigid body."""
+        given = {state.derivative_of for state in self.states}
+        if self.kinematics is not None:
+            given |= set(self.kinematics.angles)
+        return tuple(i for i, name in enumerate(self.state_names) if name not in given)
 
     @cached_property
     def engine(self) -> _core.Signals:

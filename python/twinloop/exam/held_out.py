@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.exam.quality import difference, true_states
+from twinloop.exam.quality import true_states
 from twinloop.exam.systems import Subject
 from twinloop.streams import stream
 from twinloop.test import Test
@@ -46,7 +46,7 @@ class HeldOut:
         """
         return np.array(
             [
-                normalised_error(simulate(test), states, test)
+                normalised_error(simulate(test), states)
                 for test, states in zip(self.tests, self.states, strict=True)
             ]
         )
@@ -59,24 +59,23 @@ class HeldOut:
         return buffer.getvalue()
 
 
-def normalised_error(simulated: Trajectory, truth: Floats, test: Test) -> float:
+def normalised_error(simulated: Trajectory, truth: Floats) -> float:
     """Error of one simulated run over that of the model that never moves.
 
     Args:
         simulated: run of the twin, cut where it diverges.
         truth: true states (n + 1, n_x).
-        test: that both flew.
 
     Returns:
         A finite number of at least 0.
     """
-    signals, steps = test.family.signals, len(truth) - 1
+    steps = len(truth) - 1
     if steps == 0:
         return 1.0  # a truth that was cut at once tells no twin from one that never moves
     if simulated.steps < steps:
         return PENALTY * (2.0 - simulated.steps / steps)
-    wrong = difference(simulated.states[1 : steps + 1], truth[1:], signals)
-    moved = difference(truth[1:], truth[0], signals)
+    wrong = simulated.states[1 : steps + 1] - truth[1:]
+    moved = truth[1:] - truth[0]
     frozen = float(np.mean(moved**2))
     error = float(np.mean(wrong**2))
     if frozen == 0.0:

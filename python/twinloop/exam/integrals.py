@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.exam.library import Library, model_inputs, unknown_states
+from twinloop.exam.library import Library, model_inputs
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 
@@ -44,7 +44,7 @@ def regression(
         A problem for each output of a model in the form "acceleration".
     """
     means = [_means(run, signals, library) for run in trajectories]
-    states = unknown_states(signals)
+    states = list(signals.driven)
     if form == "increment":
         features = np.vstack(means)
         return [

@@ -99,22 +99,6 @@ def monomials(variables: Sequence[int], degree: int = 2) -> Library:
     return Library(tuple(terms))
 
 
-def unknown_states(signals: Signals) -> list[int]:
-    """States whose derivative no other state is declared to be: what has to be learnt.
-
-    Args:
-        signals: of the system.
-
-    Returns:
-        Their indices, in the order of a model's outputs in the form "acceleration".
-    """
-    known = {state.derivative_of for state in signals.states}
-    kinematics = getattr(signals, "kinematics", None)
-    if kinematics is not None:  # body rates turn into attitude: declared, so nothing has to be learnt
-        known |= set(kinematics.angles)
-    return [i for i, state in enumerate(signals.states) if state.name not in known]
-
-
 def variables_of(kind: str, signals: Signals) -> list[int]:
     """Inputs of the model that a library is made of.
 
@@ -126,8 +110,8 @@ def variables_of(kind: str, signals: Signals) -> list[int]:
     Returns:
         Their indices.
     """
-    states = unknown_states(signals) if kind == "rates" else list(range(signals.n_x))
-    return states + list(range(signals.n_x, signals.n_x + signals.n_u))
+    states = signals.driven if kind == "rates" else range(signals.n_x)
+    return [*states, *range(signals.n_x, signals.n_x + signals.n_u)]
 
 
 def model_inputs(states: Floats, commands: Floats, signals: Signals) -> Floats:

@@ -11,7 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.exam.expressions import program
-from twinloop.exam.library import model_inputs, unknown_states, variables_of
+from twinloop.exam.library import model_inputs, variables_of
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 
@@ -69,7 +69,7 @@ def samples(
         kernel = np.full(window, 1.0 / window)
         columns = [np.convolve(middles[:, i], kernel, mode="valid") for i in variables]
         inputs.append(np.stack(columns, axis=1))
-        learnt = run.states[:, unknown_states(signals)]
+        learnt = run.states[:(signals)]
         targets.append((learnt[window:] - learnt[:-window]) / (window * signals.dt))
     return np.vstack(inputs), np.vstack(targets)
 

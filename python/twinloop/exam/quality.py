@@ -15,24 +15,6 @@ CUT_FACTOR = 10.0
 """A flight that was cut counts as this many times doing nothing: finite, for optimisers, and clearly bad."""
 
 
-def difference(states: Floats, others: Floats, signals: Signals) -> Floats:
-    """States minus other states, the short way round where a state wraps.
-
-    Args:
-        states: (..., n_x), SI units, radians.
-        others: (..., n_x), the same units.
-        signals: that say which states are periodic.
-
-    Returns:
-        Differences (..., n_x).
-    """
-    gaps = np.array(states - others, dtype=np.float64)
-    for i, state in enumerate(signals.states):
-        if getattr(state, "periodic", False):
-            gaps[..., i] = np.remainder(gaps[..., i] + np.pi, 2.0 * np.pi) - np.pi
-    return gaps
-
-
 def angles(signals: Signals) -> list[int]:
     """Which states are angles: those measured in rad; all states where there is none.
 
@@ -64,11 +46,10 @@ def of_states(kind: str, states: Floats, test: Test) -> float:
     if len(states) < test.steps + 1:
         return CUT_FACTOR * of_nothing(kind, test)
     if kind == "final_distance":
-        gap = difference(states[-1], test.target_state, test.family.signals)
-        return final_distance(gap, np.zeros_like(gap))
+        return final_distance(states[-1], test.target_state)
     if kind == "iae":
         signals = test.family.signals
-        gaps = np.abs(difference(states[1:], test.target_state, signals))[:, angles(signals)]
+        gaps = np.abs(states[1:] - test.target_state)[:, angles(signals)]
         return float(signals.dt * gaps.sum())
     raise unknown("quality", kind, KINDS)
 

@@ -11,7 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.exam.integrals import regression
-from twinloop.exam.library import Library, model_inputs, monomials, unknown_states, variables_of
+from twinloop.exam.library import Library, model_inputs, monomials, variables_of
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 
@@ -64,7 +64,7 @@ def own_form(
     """
     import pysindy
 
-    learnt = unknown_states(signals)
+    learnt = list(signals.driven)
     given = [i for i in variables if i not in learnt]
     states, inputs = [], []
     for run in trajectories:

@@ -62,9 +62,8 @@ def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
         return [Chain((i,), i, False, sensors[[i]], sensors[[i]]) for i in range(signals.n_x)]
     driven, given = [], []
     names = signals.state_names
-    outputs = [i for i in range(signals.n_x) if not signals.is_given(i)]
     seen: set[int] = set()
-    for output, first in enumerate(outputs):
+    for output, first in enumerate(signals.driven):
         states = [first]
         parent = signals.states[first].derivative_of
         while parent is not None and len(states) < 4:

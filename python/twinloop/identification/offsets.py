@@ -61,7 +61,7 @@ def _moved(run: Run, signals: Signals, offsets: Floats) -> Run:
     states = run.states.copy()
     orders = np.array([_order(signals, i) for i in range(signals.n_x)])
     # Derivatives that are driven are taken from the middle of the time to cover, others from where it begins.
-    shares = np.array([1.0 if signals.is_given(i) else 0.5 for i in range(signals.n_x)])
+    shares = np.array([0.5 if i in signals.driven else 1.0 for i in range(signals.n_x)])
     # Derivatives first: what they are derivatives of is moved along them.
     nearest = np.argsort(-orders, kind="stable")
     for size in (offset for offset in dict.fromkeys(offsets[nearest].tolist()) if offset != 0.0):
@@ -93,7 +93,7 @@ def _order(signals: Signals, state: int) -> int:
 
 def _coasting(signals: Signals, dt: float) -> _core.Model:
     """What states do in a time of dt where nothing drives them."""
-    outputs: list[dict[int, float]] = [{} for i in range(signals.n_x) if not signals.is_given(i)]
+    outputs: list[dict[int, float]] = [{} for _ in signals.driven]
     program = Pool(signals.n_x + signals.n_u).program(outputs)
     with engine_input():
         return _core.Model(program, "acceleration", replace(signals, dt=dt).engine)

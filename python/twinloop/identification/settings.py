@@ -76,4 +76,4 @@ class IdentificationOptions:
         """The form, where "auto" is decided by the signals."""
         if self.form != "auto":
             return self.form
-        return "acceleration" if any(signals.is_given(i) for i in range(signals.n_x)) else "increment"
+        return "acceleration" if len(signals.driven) < signals.n_x else "increment"
