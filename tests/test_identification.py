@@ -18,7 +18,7 @@ from twinloop.identification.libraries import rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import prices
+from twinloop.identification.structure import all_judged, prices
 from twinloop.presets import options_of
 
 WORKERS = _core.Workers()
@@ -248,6 +248,19 @@ def test_from_above_gusts_are_told_from_terms_where_from_below_they_are_not(seed
     assert both.terms < 12 < below.terms
     gusts = np.sqrt([found.chain.motion[1] for found in both.sums])
     assert ((gusts > 0.2) & (gusts < 2.0)).all()
+
+
+def test_terms_that_exact_runs_cannot_tell_apart_are_left_out():
+    features = np.random.default_rng(1).normal(size=(50, 3))
+    twins = np.hstack([features, features])
+    measured = np.vstack([np.zeros((1, 1)), np.cumsum(features @ [[1.0], [2.0], [0.0]], axis=0)])
+    record = (measured, np.ones_like(measured), twins, twins, twins)
+    gram = _core.Regression(1, 1.0, False, [record]).gram([1e-6], (1e-9, 0.0, 1.0))
+    both, prices_ = [(0, 1, 3), (1, 4)], np.ones(6)
+    assert all(gram.solve(list(subset)) is None for subset in both)
+    found = all_judged(gram, both, prices_, {})
+    assert {subset for subset, *_ in found} == {(0, 1), (1,)}
+    assert all_judged(gram, [*both, (2,)], prices_, {})[0][0] == (2,)
 
 
 def test_where_nothing_drives_a_state_but_noise_no_term_does():

@@ -18,6 +18,8 @@ from twinloop.signals import Bounds
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
+Judged = tuple[tuple[int, ...], float, float, Floats]
+"""A subset of features, its energy, what it leaves, its coefficients."""
 NOISE_ROUNDS = 5
 """Times at most that terms are searched and the noise that they leave is estimated."""
 GUSTS = (1e-3, 1e-1, 10.0)
@@ -289,7 +291,7 @@ def search(
             limits = problem.limits(chain, usable)
             subsets = _with_what_must_be(subsets, gram, costs[i], limits)
             judged = sorted(
-                (f for f in (_judged(gram, s, costs[i], limits) for s in dict.fromkeys(subsets)) if f),
+                all_judged(gram, subsets, costs[i], limits),
                 key=lambda found: (
                     found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]),
                     found[0],
@@ -340,9 +342,37 @@ def _with_what_must_be(
     return forced
 
 
-def _judged(
-    gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Limits
-) -> tuple[tuple[int, ...], float, float, Floats] | None:
+def all_judged(
+    gram: _core.Gram, subsets: Sequence[tuple[int, ...]], costs: Floats, limits: Limits
+) -> list[Judged]:
+    """Least squares on subsets; where rounding leaves none of them a solution, on the largest parts that have one.
+
+    Args:
+        gram: of the features.
+        subsets: of them.
+        costs: of each feature, in units of χ².
+        limits: bounds of coefficients, by feature.
+
+    Returns:
+        Those that have a solution.
+    """
+    found = [_judged(gram, subset, costs, limits) for subset in dict.fromkeys(subsets)]
+    if not any(found):
+        parts = dict.fromkeys(_told_apart(gram, subset) for subset in subsets)
+        found = [_judged(gram, subset, costs, limits) for subset in parts]
+    return [judged for judged in found if judged]
+
+
+def _told_apart(gram: _core.Gram, subset: tuple[int, ...]) -> tuple[int, ...]:
+    """The features of a subset, in order, that those before them do not already span."""
+    kept: list[int] = []
+    for feature in subset:
+        if gram.solve([*kept, feature]) is not None:
+            kept.append(feature)
+    return tuple(kept)
+
+
+def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Limits) -> Judged | None:
     solved = bounded_solution(gram, subset, limits)
     if solved is None:
         return None
