@@ -21,7 +21,7 @@ from twinloop.identification.bounds import declared_bounds
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.committee import committee
 from twinloop.identification.evolution import evolve
-from twinloop.identification.fitting import Fitting
+from twinloop.identification.fitting import Fitting, Tuned
 from twinloop.identification.formulas import fixed_term, parsed_term
 from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
@@ -120,44 +120,11 @@ class _Learner:
         self.stream = 0
 
     def learn(self) -> Identified:
-        options = self.options
-        base = self.ladder
         self.watch("noise")
         offsets = self._offsets()
         self.fitting.runs = moved(self.fitting.runs, self.signals, offsets)
-        actuators = direct(self.signals)
-        if self.known is not None:
-            actuators = self.known.actuators
-        problem = self._problem(actuators)
-        start = base[0]
-        known: list[Sum | None] = [None] * len(self.driven)
-        if self.known is not None:
-            known = [replace(s, others=[]) for s in self.known.sums]
-        known = self._from_both_sides(problem, start, known)
-        if options.lags and (self.known is None or len(self.fitting.runs) <= LAGS_AGAIN):
-            self.watch("actuators")
-            before = actuators
-            actuators, known = self._actuators(start, [s.chain for s in known if s])
-            problem = self._problem(actuators)
-            if actuators != before:
-                # The noise was that of other actuators, and a disturbance may still stand in for terms.
-                known = self._from_both_sides(problem, start, known)
-        self.watch("terms")
-        driven = [s.chain for s in known if s]
-        sums = self._climb(problem, driven, known, base)
-        tuned = self.fitting.tuned(sums, self.given, actuators)
-        for _ in range(options.passes - 1):
-            if not self.fitting.smooth(tuned.model, tuned.observer):
-                break
-            self.watch("smoothed")
-            lags = self.fitting.lags_of(tuned.model)
-            problem = self._problem(lags)
-            known = list(tuned.sums)
-            again = self._climb(problem, [s.chain for s in tuned.sums], known, base, brief=True)
-            other = self.fitting.tuned(again, self.given, lags)
-            if not np.isfinite(other.left) and np.isfinite(tuned.left):
-                break
-            tuned = other
+        tuned = self._smoothed(self._lasting(*self._begun()))
+        problem = self._problem(self.fitting.lags_of(tuned.model))
         model, sums, left, readings = tuned.model, tuned.sums, tuned.left, tuned.readings
         observer = self._rescaled(tuned.observer, left, readings)
         self.watch("committee")
@@ -184,6 +151,48 @@ class _Learner:
         )
 
     # Steps
+
+    def _begun(self) -> tuple[list[Actuator], list[Sum], list[Sum]]:
+        """Actuators, with the terms of the first rung behind them: the shortest sums, and those found from above."""
+        actuators = direct(self.signals) if self.known is None else self.known.actuators
+        problem, start = self._problem(actuators), self.ladder[0]
+        known: list[Sum | None] = [None] * len(self.driven)
+        if self.known is not None:
+            known = [replace(s, others=[]) for s in self.known.sums]
+        shortest, above = self._from_both_sides(problem, start, known)
+        if self.options.lags and (self.known is None or len(self.fitting.runs) <= LAGS_AGAIN):
+            self.watch("actuators")
+            before = actuators
+            actuators, shortest = self._actuators(start, [found.chain for found in shortest])
+            if actuators != before:
+                # The noise was that of other actuators, and a disturbance may still stand in for terms.
+                shortest, above = self._from_both_sides(self._problem(actuators), start, shortest)
+        return actuators, shortest, above
+
+    def _lasting(self, actuators: list[Actuator], shortest: list[Sum], above: list[Sum]) -> Tuned:
+        """A tuned model of all rungs that lasts on its own runs, if there is one."""
+        self.watch("terms")
+        problem = self._problem(actuators)
+        tuned = self.fitting.tuned(self._climb(problem, shortest), self.given, actuators)
+        if not np.isfinite(tuned.left):
+            # A short description that runs away is none: the one from above is more modest.
+            other = self.fitting.tuned(self._climb(problem, above), self.given, actuators)
+            tuned = other if np.isfinite(other.left) else tuned
+        return tuned
+
+    def _smoothed(self, tuned: Tuned) -> Tuned:
+        """Terms are selected again on states that the model has smoothed."""
+        for _ in range(self.options.passes - 1):
+            if not self.fitting.smooth(tuned.model, tuned.observer):
+                break
+            self.watch("smoothed")
+            lags = self.fitting.lags_of(tuned.model)
+            again = self._climb(self._problem(lags), tuned.sums, brief=True)
+            other = self.fitting.tuned(again, self.given, lags)
+            if not np.isfinite(other.left) and np.isfinite(tuned.left):
+                break
+            tuned = other
+        return tuned
 
     def _ladder(self) -> list[list[int]]:
         """Candidates, rung by rung."""
@@ -259,8 +268,8 @@ class _Learner:
 
     def _from_both_sides(
         self, problem: Problem, terms: Sequence[int], known: Sequence[Sum | None]
-    ) -> list[Sum | None]:
-        """The shorter of two descriptions of each chain, with the noise estimated from below and from above.
+    ) -> tuple[list[Sum], list[Sum]]:
+        """The shorter description of each chain with the noise estimated from below or from above, and that from above.
 
         From below, little noise makes many terms of few runs and stays little; from above, the strongest terms come
         first and the noise falls as far as they explain it.
@@ -270,11 +279,11 @@ class _Learner:
         below = [first_noise(problem, chain, usable, self.scales, options.gusts) for chain in self.driven]
         low = self._search(problem, below, terms, known, options.moves, 2)
         if not options.noise_from_above:
-            return list(low)
+            return low, low
         above = [unexplained(problem, chain, self.scales, options.gusts) for chain in self.driven]
         none: list[Sum | None] = [None] * len(self.driven)
         high = self._search(problem, above, terms, none, options.moves, 2)
-        return [a if a.energy <= b.energy else b for a, b in zip(low, high, strict=True)]
+        return [a if a.energy <= b.energy else b for a, b in zip(low, high, strict=True)], high
 
     def _next(self) -> int:
         self.stream += 1
@@ -296,47 +305,34 @@ class _Learner:
             fixed_noise=fixed_noise,
         )  # fmt: skip
 
-    def _climb(
-        self,
-        problem: Problem,
-        driven: Sequence[Chain],
-        known: Sequence[Sum | None],
-        ladder: Sequence[Sequence[int]],
-        brief: bool = False,
-    ) -> list[Sum]:
-        options = self.options
-        best: list[Sum | None] = list(known)
-        current = list(driven)
+    def _climb(self, problem: Problem, known: Sequence[Sum], brief: bool = False) -> list[Sum]:
+        """The best sums of all rungs and of evolved terms, where some are known; `brief`: of the first rung only."""
+        options, ladder = self.options, self.ladder
+        best = list(known)
         if options.libraries:
             for number, terms in enumerate(ladder[:1] if brief else ladder):
                 starts = options.starts if number == 0 and not brief else max(1, options.starts // 2)
-                sums = self._search(problem, current, terms, best, options.moves, starts, number > 0)
-                best, current = list(sums), [found.chain for found in sums]
+                driven = [found.chain for found in best]
+                best = self._search(problem, driven, terms, best, options.moves, starts, number > 0)
         if options.generations and not (brief and options.libraries):
             self.watch("evolution")
             seeds = list(ladder[0]) if not options.libraries else [self.pool.one, *range(self.pool.inputs)]
-            seeds += [node for found in best if found for node in found.weights]
+            seeds += [node for found in best for node in found.weights]
             for restart in range(options.restarts):
-                grown = evolve(
-                    problem, current, best, seeds, self.scales,
+                best = evolve(
+                    problem, [found.chain for found in best], best, seeds, self.scales,
                     operators=options.operators, generations=options.generations,
                     population=options.population, longest=options.longest, moves=options.moves // 4,
                     largest=options.largest, seed=self.seed, iteration=self._next() + 100_000 * restart,
                 )  # fmt: skip
-                best, current = list(grown), [found.chain for found in grown]
-        return [found for found in best if found is not None]
+        return best
 
-    def _actuators(
-        self, terms: Sequence[int], driven: Sequence[Chain]
-    ) -> tuple[list[Actuator], list[Sum | None]]:
+    def _actuators(self, terms: Sequence[int], driven: Sequence[Chain]) -> tuple[list[Actuator], list[Sum]]:
         def judge(actuators: list[Actuator]) -> list[Sum]:
             problem = self._problem(actuators)
             return self._search(problem, driven, terms, [None] * len(driven), self.options.moves // 4, 1)
 
-        actuators, sums = search_actuators(
-            self.signals, [None, *self.rests], judge, self.options.longest_delay
-        )
-        return actuators, list(sums)
+        return search_actuators(self.signals, [None, *self.rests], judge, self.options.longest_delay)
 
     def _rescaled(self, observer: Sequence[Chain], left: float, readings: int) -> list[Chain]:
         """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
