@@ -293,8 +293,11 @@ class IdentifyAndPlan:
             return "The best gains flown: the twin diverges on the runs that it was learnt from."
         if not safe:
             return "The best gains flown: a model sees those that the twin prefers leave the envelope."
-        share = f"{100 * better:.0f} %"
-        return f"The best gains flown: the twin prefers others in {share} of its predictions only."
+        share, asked = (f"{100 * part:.0f} %" for part in (better, self.options.confidence))
+        return (
+            f"The best gains flown: the twin prefers others in {share} of its predictions, and {asked} are asked"
+            " for."
+        )
 
     def _first_quality(self, book: Logbook) -> float:
         first = book.measured(book.experiments[0].test.number)
