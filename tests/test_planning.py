@@ -237,3 +237,30 @@ def test_without_excitation_a_flight_that_is_flown_again_is_varied():
     assert "small variation" in found.reason
     again = proposed(planner_of(known), unsure)
     assert same_bits(again.genes, TUNED) and again.excitation is not None
+
+
+def test_flights_for_the_model_go_no_further_than_they_are_allowed_or_than_was_flown():
+    known = signals()
+    committee = committee_of(known)
+    for used, most in ((0.2, 0.45), (0.6, 0.6)):
+        planner = planner_of(known, reach_far=0.45, reach_first=0.9)
+        found = proposed(planner, committee, goal="model", used=used)
+        flown = planner.judge(
+            committee.members,
+            found.genes[np.newaxis],
+            committee.sds,
+            1,
+            None if found.excitation is None else found.excitation[np.newaxis],
+        )
+        assert found.safe and float(flown.worst_usage[0]) <= most + 1e-12
+
+
+def test_what_the_scatter_of_flights_hides_may_be_given_up():
+    planner = planner_of(signals())
+    limit = [
+        planner._limit(1.0, "both", told, 3.0, scatter) for told, scatter in ((1, 0.0), (4, 0.0), (4, 0.2))
+    ]
+    share = planner.options.share
+    assert limit == pytest.approx([1.0 + 2.0 * share, 1.0 + 2.0 * share**4, 1.2])
+    assert planner._limit(1.0, "control", 1, 3.0, 0.5) == pytest.approx(1.0 + 0.2 * share)
+    assert planner._limit(1.0, "both", 1, 0.5, 0.0) == 1.0

@@ -195,11 +195,7 @@ class Planner(Judge):
         self.watch("candidates", 1.0)
         per_member = judged.qualities.mean(axis=1)
         mean = per_member.mean(axis=0)
-        # A model is believed near what was flown: each flight may go somewhat further than those before it.
-        reach = min(
-            1.0 - self.options.margin, max(self.options.reach_first, self.options.reach_growth * used)
-        )
-        keeps = judged.worst_usage <= reach
+        keeps = judged.worst_usage <= self._reach(goal, used)
         scatter = self._scatter(committee, tuned)
         limit = self._limit(float(mean[0]), goal, told, first_quality, scatter)
         allowed = keeps & (mean <= limit)
@@ -288,6 +284,18 @@ class Planner(Judge):
                 amplitude = options.excitation if gentle else most * stream.random()
                 excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
         return genes, excitation
+
+    def _reach(self, goal: str, used: float) -> float:
+        """Usage of the envelope that a proposal may have, where that of the flights so far is known."""
+        options = self.options
+        # A model is believed near what was flown: each flight may go somewhat further than those before it. With gains
+        # far from any that were flown it may be wrong in ways that no member shows.
+        reach = (
+            max(options.reach_far, used)
+            if goal == "model"
+            else max(options.reach_first, options.reach_growth * used)
+        )
+        return min(1.0 - options.margin, reach)
 
     def _scatter(self, committee: Committee, tuned: Floats) -> float:
         """How far the quality of one flight is from that of the next, by the sensors' noise alone."""

@@ -27,6 +27,7 @@ class PlanningOptions:
         draws: of sensor noise under which a flight is judged.
         margin: share of the envelope that a proposal keeps free on every member of the committee.
         reach_first: usage of the envelope that a proposal may always have.
+        reach_far: the same where flights are for the model, whose gains may be far from any that were flown.
         reach_growth: factor by which its usage may exceed the largest one flown.
         evaluations: flights on which gains are tuned, for each member and draw.
         tuning_starts: of the tuning of gains.
@@ -50,6 +51,7 @@ class PlanningOptions:
     draws: int = 16
     margin: float = 0.1
     reach_first: float = 0.7
+    reach_far: float = 0.6
     reach_growth: float = 1.25
     evaluations: int = 12_000
     tuning_starts: int = 3
