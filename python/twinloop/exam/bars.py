@@ -12,6 +12,8 @@ from twinloop.exam.results import Results, spread
 Verdict = tuple[str, bool] | None
 """What was measured and whether the bar is met; None if it was not measured."""
 OURS = "ours"
+GOALS = (OURS, "ours-model", "ours-control")
+"""Ours, for whatever its flights are."""
 QUADROTORS = ("quadrotor-0", "quadrotor", "quadrotor-noisy", "quadrotor-harsh")
 
 
@@ -152,13 +154,13 @@ def growth(system: str) -> Bar:
 
 
 def safe(system: str) -> Bar:
-    """Experiments that left the envelope."""
+    """Experiments that left the envelope, whatever the flights were for."""
 
     def judge(results: Results) -> Verdict:
-        found = results.all_values(system, OURS, "violated")
+        found = [left for who in GOALS for left in results.all_values(system, who, "violated")]
         return None if not found else (f"{sum(found):.0f} of {len(found)}", sum(found) == 0.0)
 
-    return Bar(system, "experiments that left the envelope", "0", judge)
+    return Bar(system, "experiments that left the envelope, for any goal", "0", judge)
 
 
 def quick(system: str) -> Bar:
