@@ -489,6 +489,19 @@ def test_cells_are_medians_over_seeds_with_quartiles_and_failures(filled):
     assert "Optimum (CMA-ES on the true system): 0.1." in controllers.notes[1]
 
 
+def test_ablations_stand_beside_ours_on_the_same_seeds(store, filled):
+    ablated = Campaigner("without-lags", "default", {"lags": False})
+    for seed in (11, 12, 20):
+        values = {"error_median": 1e-3, "error_p90": 1e-2, "quality": 0.3}
+        store.write(Row(Address("quadrotor", "without-lags", seed, key(ablated)), 1, values, 1.0))
+    ours = Campaigner("ours", "paper", {"model_generations": 7})
+    shown = {t.title: t for t in tables(Results(store, ["quadrotor"], [ours, ablated], ours))}
+    rows = shown["quadrotor: ablations"].rows
+    # Seeds 11 and 12: errors of 2e-4 and 3e-4.
+    assert rows[0][1] == "0.00025 / 0.0025 [0.00023, 0.00028] (2)"
+    assert rows[1][1] == "0.001 / 0.01 [0.001, 0.001] (2)"
+
+
 def test_a_table_reads_as_markdown_and_as_json(filled):
     lines = as_markdown(tables(filled)[0]).splitlines()
     assert lines[2].startswith("| after Υ0 + | 0 | 1") and lines[3] == "| --- | --- | --- | --- |"

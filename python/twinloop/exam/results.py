@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import copy
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +72,19 @@ class Results:
     def rows(self, system: str, learner: str) -> list[Row]:
         """Rows of a learner on a system, by seed and k; none if it was not measured."""
         return self._rows.get((system, learner), [])
+
+    def shared_seeds(self, system: str, learners: Sequence[str]) -> set[int]:
+        """Seeds with which all of some learners were measured on a system; those without any row do not count."""
+        seeds = [{row.address.seed for row in self.rows(system, who)} for who in learners]
+        return set.intersection(*filter(None, seeds)) if any(seeds) else set()
+
+    def at(self, seeds: Collection[int]) -> Results:
+        """The same of some seeds only."""
+        view = copy.copy(self)
+        view._rows = {
+            where: [row for row in rows if row.address.seed in seeds] for where, rows in self._rows.items()
+        }
+        return view
 
     def experiments(self, system: str, learner: str) -> list[int]:
         """Numbers of experiments at which a learner was measured on a system, failures included."""

@@ -173,6 +173,7 @@ def _conduct(results: Results, system: str, learners: Sequence[str]) -> Table:
 
 def _ablations(results: Results, system: str, learners: Sequence[str]) -> Table:
     rows = []
+    results = results.at(results.shared_seeds(system, learners))
     for who in learners:
         cells = [_error_cell(results, system, who, k) for k in (1, 2)]
         cells += [
@@ -181,7 +182,8 @@ def _ablations(results: Results, system: str, learners: Sequence[str]) -> Table:
         ]
         rows.append([who, *cells])
     head = ["option off", "error, Υ0 + 1", "error, Υ0 + 2", "controller, Υ0 + 1", "controller, Υ0 + 2"]
-    return Table(f"{system}: ablations", head, rows)
+    notes = ("All rows are of the same seeds, those with which each was measured.",)
+    return Table(f"{system}: ablations", head, rows, notes)
 
 
 def _bars(results: Results) -> Table:
