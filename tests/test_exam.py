@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import twinloop as tl
 from twinloop import _core
 from twinloop.cli import main
-from twinloop.exam import bars, campaigns, held_out, kinds, least_squares, measures, quality, study
+from twinloop.exam import bars, campaigns, held_out, kinds, least_squares, measures, operon, quality, study
 from twinloop.exam.expressions import program
 from twinloop.exam.integrals import regression
 from twinloop.exam.kinds import Campaigner, Fitter, Flyer, Optimum
@@ -313,6 +313,20 @@ def test_pysindys_optimiser_on_integrals_finds_the_quadrotor(excited, rig, judge
 
 
 @pytest.mark.filterwarnings("default")
+def test_operons_samples_are_means_over_windows_of_inputs_and_slopes(rig, excited):
+    runs, window = excited[0][:2], 4
+    inputs, slopes = operon.samples(runs, rig.signals, [0, 3, 7], window)
+    assert inputs.shape == (2 * 57, 3) and slopes.shape == (2 * 57, 3)
+    states, commands = runs[1].states, runs[1].commands
+    row, rates = 57 + 10, [3, 4, 5]
+    rise = (states[10 + window, rates] - states[10, rates]) / (window * rig.signals.dt)
+    np.testing.assert_allclose(slopes[row], rise, rtol=1e-12)
+    middles = 0.5 * (states[10 : 10 + window] + states[11 : 11 + window])
+    scale = rig.signals.commands[1].size
+    expected = [middles[:, 0].mean(), middles[:, 3].mean(), commands[10 : 10 + window, 1].mean() / scale]
+    np.testing.assert_allclose(inputs[row], expected, rtol=1e-12)
+
+
 def test_a_pyoperon_formula_becomes_a_program_that_predicts_the_same():
     pytest.importorskip("pyoperon", reason="optional: pip install 'twinloop[exam]'")
     from twinloop.exam.operon import formula, search

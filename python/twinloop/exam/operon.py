@@ -69,7 +69,7 @@ def samples(
         kernel = np.full(window, 1.0 / window)
         columns = [np.convolve(middles[:, i], kernel, mode="valid") for i in variables]
         inputs.append(np.stack(columns, axis=1))
-        learnt = run.states[:(signals)]
+        learnt = run.states[:, list(signals.driven)]
         targets.append((learnt[window:] - learnt[:-window]) / (window * signals.dt))
     return np.vstack(inputs), np.vstack(targets)
 
