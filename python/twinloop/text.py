@@ -295,10 +295,11 @@ def _advice(result: Mapping[str, Any]) -> str:
             title + "The model diverged on flights that it was learnt from: it cannot say. Fly another one."
         )
     share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
-    words = (
-        f"When test {advice['before_test']} was planned, knowing which model is right would have improved the"
-        f" quality\nby {_with_unit(advice['gain'], unit)}{share}."
-    )
+    before = f"When test {advice['before_test']} was planned, knowing which model is right would"
+    if advice["gain"] == 0.0:
+        stop = " For the controller, stop." if advice["stop"] else ""
+        return f"{title}{before} not have improved\nthe quality.{stop}"
+    words = f"{before} have improved the quality\nby {_with_unit(advice['gain'], unit)}{share}."
     if scatter is None:
         return title + words
     repeated = f"the scatter of one measurement, {_with_unit(scatter, unit)}"
