@@ -197,27 +197,25 @@ impl Whitening {
         // W = P Hᵀ L⁻ᵀ: the gain is W L⁻¹, and W Wᵀ is what the reading tells.
         let mut told: Small = [[0.0; MOST]; MOST];
         for i in 0..inner {
-            for j in 0..d {
-                told[i][j] = (0..=j).map(|l| covariance[i][l] * root[j][l]).sum();
+            for (told, root) in told[i].iter_mut().zip(&root).take(d) {
+                *told = covariance[i].iter().zip(root).take(d).map(|(p, r)| p * r).sum();
             }
         }
         for row in told.iter().take(inner) {
-            for j in 0..d {
-                self.gains.push((j..d).map(|l| row[l] * root[l][j]).sum());
-            }
+            let column = |j: usize| row.iter().zip(&root).take(d).map(|(told, root)| told * root[j]).sum();
+            self.gains.extend((0..d).map::<f64, _>(column));
         }
         for i in 0..inner {
             for j in 0..inner {
                 covariance[i][j] -= (0..d).map(|l| told[i][l] * told[j][l]).sum::<f64>();
             }
         }
-        for i in 0..d {
-            for j in 0..d {
-                // A reading that is ignored adds nothing to the sum of squares.
-                self.roots.push(if weights[i] > 0.0 { root[i][j] } else { 0.0 });
-            }
-            if weights[i] > 0.0 {
-                self.log_determinant -= 2.0 * libm::log(root[i][i]);
+        for (i, row) in root.iter().enumerate().take(d) {
+            // A reading that is ignored adds nothing to the sum of squares.
+            let counts = weights[i] > 0.0;
+            self.roots.extend(row[..d].iter().map(|&value| if counts { value } else { 0.0 }));
+            if counts {
+                self.log_determinant -= 2.0 * libm::log(row[i]);
             }
         }
     }
