@@ -11,7 +11,8 @@ from twinloop import _core
 from twinloop.identification.bounds import bounded_solution
 from twinloop.identification.chains import Chain
 from twinloop.identification.fitting import Fitting
-from twinloop.identification.structure import Problem, Sum
+from twinloop.identification.problem import Problem
+from twinloop.identification.structure import Sum
 from twinloop.streams import stream
 
 PLAUSIBLE = 1.5

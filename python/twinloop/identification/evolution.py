@@ -14,7 +14,8 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import UNARY, Pool
-from twinloop.identification.structure import Problem, Sum, search
+from twinloop.identification.problem import Problem
+from twinloop.identification.structure import Sum, search
 from twinloop.streams import stream
 
 PRODUCTS = 0.5

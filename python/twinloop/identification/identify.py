@@ -25,19 +25,14 @@ from twinloop.identification.fitting import Fitting, Tuned
 from twinloop.identification.formulas import fixed_term, parsed_term
 from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
+from twinloop.identification.noise import BEST_SENSOR, first_noise, unexplained
 from twinloop.identification.offsets import moved, search_offsets
 from twinloop.identification.pool import Pool
+from twinloop.identification.problem import Problem
 from twinloop.identification.records import Actuator, Run, direct, guessed_noise, stages
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import (
-    BEST_SENSOR,
-    Problem,
-    Sum,
-    first_noise,
-    search,
-    unexplained,
-)
+from twinloop.identification.structure import Sum, search
 from twinloop.signals import Bounds, Signals
 
 LAGS_AGAIN = 4

@@ -16,9 +16,9 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.chains import Chain
+from twinloop.identification.noise import floor_of
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.identification.structure import floor_of
 from twinloop.signals import Signals
 
 OFFSETS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)

@@ -9,9 +9,10 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.identification.bounds import Limits
 from twinloop.identification.chains import Chain
+from twinloop.identification.noise import BEST_SENSOR
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.identification.structure import BEST_SENSOR, Sum
+from twinloop.identification.structure import Sum
 from twinloop.signals import Signals
 
 TWINS = 4.0

@@ -11,10 +11,10 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.bounds import Limits, bounded_solution, excludes_zero
-from twinloop.identification.chains import Chain, Motion
+from twinloop.identification.chains import Chain
+from twinloop.identification.noise import floor_of
 from twinloop.identification.pool import Pool
-from twinloop.identification.records import Run, Stages
-from twinloop.signals import Bounds
+from twinloop.identification.problem import Problem
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
@@ -22,11 +22,6 @@ Judged = tuple[tuple[int, ...], float, float, Floats]
 """A subset of features, its energy, what it leaves, its coefficients."""
 NOISE_ROUNDS = 5
 """Times at most that terms are searched and the noise that they leave is estimated."""
-GUSTS = (1e-3, 1e-1, 10.0)
-"""Variances of a lasting disturbance that are tried first, in units of what the sensor's noise looks like as one."""
-BEST_SENSOR = 0.1
-"""Share of its readings' roughness that a sensor's standard deviation is at least."""
-RIDGE = 1e-9
 RUNG = 20.0
 """What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
 
@@ -50,81 +45,6 @@ class Sum:
     others: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
 
 
-class Problem:
-    """Readings of all runs and the inputs within each period; makes regressions of terms.
-
-    Args:
-        pool: of all expressions.
-        runs: recorded.
-        stages: their inputs within each period.
-        dt: period, s.
-        workers: how the work is carried out.
-        fixed: for the first state of each chain, nodes that drive it and are known.
-        bounds: for the first state of each chain, bounds of coefficients by node.
-    """
-
-    def __init__(
-        self,
-        pool: Pool,
-        runs: Sequence[Run],
-        stages: Stages,
-        dt: float,
-        workers: _core.Workers,
-        fixed: Mapping[int, Sequence[int]] | None = None,
-        bounds: Mapping[int, Limits] | None = None,
-    ) -> None:
-        self.fixed = dict(fixed or {})
-        self.bounds = dict(bounds or {})
-        self.pool = pool
-        self.runs = runs
-        self.stages = stages
-        self.dt = dt
-        self.workers = workers
-        self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
-
-    def usable(self, terms: Sequence[int]) -> list[int]:
-        """Terms whose values are finite on all rows, evaluated."""
-        new = [term for term in terms if term not in self._values]
-        if new:
-            stages = [
-                self.pool.values(new, s) for s in (self.stages.start, self.stages.middle, self.stages.end)
-            ]
-            for i, term in enumerate(new):
-                columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
-                self._values[term] = columns  # type: ignore[assignment]
-        return [term for term in terms if all(np.abs(column).max() < 1e100 for column in self._values[term])]
-
-    def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
-        """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
-        known = self.usable(self.fixed.get(chain.states[0], ()))
-        readings = [run.states[:, list(chain.states)] for run in self.runs]
-        if known:
-            readings = self._of(chain, known, readings).residuals(np.ones(len(known)))
-        return self._of(chain, terms, readings)
-
-    def _of(self, chain: Chain, terms: Sequence[int], readings: Sequence[Floats]) -> _core.Regression:
-        none = np.empty((len(self.stages.start), 0))
-        start, middle, end = (
-            np.stack([self._values[term][s] for term in terms], axis=1) if terms else none for s in range(3)
-        )
-        states = list(chain.states)
-        records = [
-            (measured, run.weights[:, states], start[rows], middle[rows], end[rows])
-            for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
-        ]
-        with engine_input():
-            return _core.Regression(len(states), self.dt, chain.integrated, records)
-
-    def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
-        """Bounds of a chain's coefficients, by place among terms."""
-        bounds = self.bounds.get(chain.states[0], {})
-        return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
-
-    def readings(self, chain: Chain) -> int:
-        """Readings of a chain that count."""
-        return int(sum(run.weights[:, list(chain.states)].sum() for run in self.runs))
-
-
 def prices(pool: Pool, terms: Sequence[int], readings: int, favoured: Mapping[int, float]) -> Floats:
     """What each term costs, in units of χ²: a coefficient, and the description of its expression.
 
@@ -140,82 +60,6 @@ def prices(pool: Pool, terms: Sequence[int], readings: int, favoured: Mapping[in
     lengths = [favoured.get(term, pool.length(term)) for term in terms]
     costs: Floats = np.log(max(readings, 2)) + 2.0 * np.array(lengths)
     return costs
-
-
-def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:
-    """Variances below which noise is not believed: rounding and integration leave that much.
-
-    Disturbances could explain every reading exactly. Sensors are therefore never taken to be much better than their
-    own roughness says, which is all noise of theirs or less.
-    """
-    sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR**2 * chain.rough)
-    period = dt if chain.integrated else 1.0
-    return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / period**2, dt)
-
-
-def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = True) -> Chain:
-    """The noise from above: what would have to disturb the motion if no term drove the chain.
-
-    Args:
-        problem: of the chain.
-        chain: with a first guess of its sensors' noise.
-        scales: of all states (n_x,).
-        gusts: whether disturbances may last.
-
-    Returns:
-        The chain with that noise.
-    """
-    regression = problem.regression(chain, problem.usable([problem.pool.one]))
-    low, slow = floor_of(chain, scales, problem.dt)
-    sensors = np.maximum(chain.sensors, low)
-    period = problem.dt if chain.integrated else 1.0
-    first = float(sensors[0])
-    found = []
-    # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
-    for size in GUSTS if gusts else (0.0,):
-        motion = (max(1e-3 * first / period, slow[0]), size * first / period**2, 10.0 * problem.dt)
-        found.append(regression.most_likely_noise(np.zeros(1), sensors, motion, low, slow))
-    sensors, motion, _ = min(found, key=lambda answer: answer[2])
-    return chain.with_noise(sensors, motion)
-
-
-def first_noise(
-    problem: Problem, chain: Chain, terms: Sequence[int], scales: Floats, gusts: bool = True
-) -> Chain:
-    """The noise that a fit of all terms leaves, with the freedom that it used up given back.
-
-    Args:
-        problem: of the chain.
-        chain: with a first guess of its sensors' noise.
-        terms: usable ones.
-        scales: of all states (n_x,).
-        gusts: whether disturbances may last.
-
-    Returns:
-        The chain with its noise estimated.
-    """
-    regression = problem.regression(chain, terms)
-    low, slow = floor_of(chain, scales, problem.dt)
-    period = problem.dt if chain.integrated else 1.0
-    sensors = np.maximum(chain.sensors, low)
-    first = float(sensors[0])
-    motion = (
-        max(1e-3 * first / period, slow[0]),
-        1e-2 * first / period**2 if gusts else 0.0,
-        10.0 * problem.dt,
-    )
-    readings = problem.readings(chain)
-    for _ in range(2):
-        gram = regression.gram(sensors, motion, problem.workers)
-        solved = gram.solve(list(range(len(terms))), RIDGE)
-        if solved is None:
-            break
-        sensors, motion, _ = regression.most_likely_noise(
-            solved[0], sensors, motion, smallest_sensors=low, smallest_motion=slow
-        )
-        used = min(len(terms), 0.7 * readings)
-        sensors = sensors * readings / (readings - used)
-    return chain.with_noise(sensors, motion)
 
 
 def search(

@@ -1,0 +1,97 @@
+"""The noise of a chain to begin with, from below and from above, and the least that is ever believed.
+
+From below, it is what a fit of all terms leaves; from above, everything that moves is disturbance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.identification.chains import Chain, Motion
+from twinloop.identification.problem import Problem
+
+GUSTS = (1e-3, 1e-1, 10.0)
+"""Variances of a lasting disturbance that are tried first, in units of what the sensor's noise looks like as one."""
+BEST_SENSOR = 0.1
+"""Share of its readings' roughness that a sensor's standard deviation is at least."""
+RIDGE = 1e-9
+"""Added to the columns' unit lengths where all terms are fitted at once."""
+
+
+def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:
+    """Variances below which noise is not believed: rounding and integration leave that much.
+
+    Disturbances could explain every reading exactly. Sensors are therefore never taken to be much better than their
+    own roughness says, which is all noise of theirs or less.
+    """
+    sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR**2 * chain.rough)
+    period = dt if chain.integrated else 1.0
+    return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / period**2, dt)
+
+
+def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = True) -> Chain:
+    """The noise from above: what would have to disturb the motion if no term drove the chain.
+
+    Args:
+        problem: of the chain.
+        chain: with a first guess of its sensors' noise.
+        scales: of all states (n_x,).
+        gusts: whether disturbances may last.
+
+    Returns:
+        The chain with that noise.
+    """
+    regression = problem.regression(chain, problem.usable([problem.pool.one]))
+    low, slow = floor_of(chain, scales, problem.dt)
+    sensors = np.maximum(chain.sensors, low)
+    period = problem.dt if chain.integrated else 1.0
+    first = float(sensors[0])
+    found = []
+    # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
+    for size in GUSTS if gusts else (0.0,):
+        motion = (max(1e-3 * first / period, slow[0]), size * first / period**2, 10.0 * problem.dt)
+        found.append(regression.most_likely_noise(np.zeros(1), sensors, motion, low, slow))
+    sensors, motion, _ = min(found, key=lambda answer: answer[2])
+    return chain.with_noise(sensors, motion)
+
+
+def first_noise(
+    problem: Problem, chain: Chain, terms: Sequence[int], scales: Floats, gusts: bool = True
+) -> Chain:
+    """The noise that a fit of all terms leaves, with the freedom that it used up given back.
+
+    Args:
+        problem: of the chain.
+        chain: with a first guess of its sensors' noise.
+        terms: usable ones.
+        scales: of all states (n_x,).
+        gusts: whether disturbances may last.
+
+    Returns:
+        The chain with its noise estimated.
+    """
+    regression = problem.regression(chain, terms)
+    low, slow = floor_of(chain, scales, problem.dt)
+    period = problem.dt if chain.integrated else 1.0
+    sensors = np.maximum(chain.sensors, low)
+    first = float(sensors[0])
+    motion = (
+        max(1e-3 * first / period, slow[0]),
+        1e-2 * first / period**2 if gusts else 0.0,
+        10.0 * problem.dt,
+    )
+    readings = problem.readings(chain)
+    for _ in range(2):
+        gram = regression.gram(sensors, motion, problem.workers)
+        solved = gram.solve(list(range(len(terms))), RIDGE)
+        if solved is None:
+            break
+        sensors, motion, _ = regression.most_likely_noise(
+            solved[0], sensors, motion, smallest_sensors=low, smallest_motion=slow
+        )
+        used = min(len(terms), 0.7 * readings)
+        sensors = sensors * readings / (readings - used)
+    return chain.with_noise(sensors, motion)

@@ -1,0 +1,91 @@
+"""The problem of one identification: readings of all runs, and what terms make of the inputs within each period."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.identification.bounds import Limits
+from twinloop.identification.chains import Chain
+from twinloop.identification.pool import Pool
+from twinloop.identification.records import Run, Stages
+from twinloop.signals import Bounds
+
+
+class Problem:
+    """Readings of all runs and the inputs within each period; makes regressions of terms.
+
+    Args:
+        pool: of all expressions.
+        runs: recorded.
+        stages: their inputs within each period.
+        dt: period, s.
+        workers: how the work is carried out.
+        fixed: for the first state of each chain, nodes that drive it and are known.
+        bounds: for the first state of each chain, bounds of coefficients by node.
+    """
+
+    def __init__(
+        self,
+        pool: Pool,
+        runs: Sequence[Run],
+        stages: Stages,
+        dt: float,
+        workers: _core.Workers,
+        fixed: Mapping[int, Sequence[int]] | None = None,
+        bounds: Mapping[int, Limits] | None = None,
+    ) -> None:
+        self.fixed = dict(fixed or {})
+        self.bounds = dict(bounds or {})
+        self.pool = pool
+        self.runs = runs
+        self.stages = stages
+        self.dt = dt
+        self.workers = workers
+        self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
+
+    def usable(self, terms: Sequence[int]) -> list[int]:
+        """Terms whose values are finite on all rows, evaluated."""
+        new = [term for term in terms if term not in self._values]
+        if new:
+            stages = [
+                self.pool.values(new, s) for s in (self.stages.start, self.stages.middle, self.stages.end)
+            ]
+            for i, term in enumerate(new):
+                columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
+                self._values[term] = columns  # type: ignore[assignment]
+        return [term for term in terms if all(np.abs(column).max() < 1e100 for column in self._values[term])]
+
+    def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
+        """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
+        known = self.usable(self.fixed.get(chain.states[0], ()))
+        readings = [run.states[:, list(chain.states)] for run in self.runs]
+        if known:
+            readings = self._of(chain, known, readings).residuals(np.ones(len(known)))
+        return self._of(chain, terms, readings)
+
+    def _of(self, chain: Chain, terms: Sequence[int], readings: Sequence[Floats]) -> _core.Regression:
+        none = np.empty((len(self.stages.start), 0))
+        start, middle, end = (
+            np.stack([self._values[term][s] for term in terms], axis=1) if terms else none for s in range(3)
+        )
+        states = list(chain.states)
+        records = [
+            (measured, run.weights[:, states], start[rows], middle[rows], end[rows])
+            for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
+        ]
+        with engine_input():
+            return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+    def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
+        """Bounds of a chain's coefficients, by place among terms."""
+        bounds = self.bounds.get(chain.states[0], {})
+        return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
+
+    def readings(self, chain: Chain) -> int:
+        """Readings of a chain that count."""
+        return int(sum(run.weights[:, list(chain.states)].sum() for run in self.runs))
