@@ -119,6 +119,8 @@ def test_a_campaign_refuses_formulas_before_anything_is_flown():
         {"seed_terms": ("sin(angel)",)},
         {"fixed_terms": ("rate = 3",)},
         {"bounded_terms": ("rate: sin(angle) in 3 .. 2",)},
+        {"fixed_terms": ("angle: rate",)},
+        {"bounded_terms": ("angle: rate in 0 .. 3",)},
     ):
         with pytest.raises(tl.InvalidInput, match=r"[Tt]erm"):
             tl.Campaign(

@@ -13,9 +13,9 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, number, whole
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, engine_input, unknown
-from twinloop.identification.bounds import declared_bounds
-from twinloop.identification.formulas import fixed_term, parsed_term
+from twinloop.identification.formulas import parsed_term
 from twinloop.identification.pool import Pool
+from twinloop.identification.told import told
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS, Quality, quality_of
 from twinloop.presets import AnyOptions, DefaultOptions, Options, options_of
@@ -133,8 +133,7 @@ def checked(
         pool = Pool(signals.n_x + signals.n_u)  # formulas are refused now rather than after the first flight
         for text in chosen.seed_terms:
             parsed_term(text, pool, signals)
-        fixed = [fixed_term(text, pool, signals) for text in chosen.fixed_terms]
-        declared_bounds(chosen.bounded_terms, fixed, pool, signals)
+        told(chosen, pool, signals)
     if isinstance(chosen, Options):
         with engine_input():
             grammar(chosen, signals)

@@ -1,17 +1,14 @@
-"""Bounds on constants of a law: whose they are, and least squares and draws that keep within them."""
+"""Bounds on constants of a law: least squares and draws that keep within them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.errors import InvalidInput
-from twinloop.identification.formulas import bare_term, bounded_term
-from twinloop.identification.pool import Pool
-from twinloop.signals import Bounds, Signals
+from twinloop.signals import Bounds
 
 Limits = Mapping[int, Bounds]
 """Bounds by the number of what they bound."""
@@ -19,40 +16,6 @@ SWEEPS = 200
 """Rounds over all bounds at most, until none moves a weight any more."""
 STILL = 1e-9
 """Standard deviations; weights that move by less have stopped."""
-
-
-def declared_bounds(
-    texts: Sequence[str], fixed: Iterable[tuple[int, int]], pool: Pool, signals: Signals
-) -> dict[int, dict[int, Bounds]]:
-    """Bounds that a user has written.
-
-    Args:
-        texts: each "state: formula in low .. high".
-        fixed: (state, node) of terms whose constants are known.
-        pool: where the formulas are entered.
-        signals: whose names they may use.
-
-    Returns:
-        For each state, bounds of coefficients by node.
-
-    Raises:
-        InvalidInput: text that is no such bound, a term that is bounded twice, or one that is fixed.
-    """
-    known = {(state, bare_term(node, pool)[0]) for state, node in fixed}
-    found: dict[int, dict[int, Bounds]] = {}
-    for text in texts:
-        state, node, bounds = bounded_term(text, pool, signals)
-        if (state, node) in known:
-            raise InvalidInput(
-                f"Bounded term {text!r}: expected a term whose constant is to be found, found one that is fixed;"
-                " remove it from fixed_terms or from bounded_terms."
-            )
-        if node in found.setdefault(state, {}):
-            raise InvalidInput(
-                f"Bounded term {text!r}: expected one pair of bounds a term, found a second one; join them."
-            )
-        found[state][node] = bounds
-    return found
 
 
 def excludes_zero(bounds: Bounds) -> bool:

@@ -47,6 +47,11 @@ class Chain:
         return list(self.states), self.sensors.tolist(), self.motion, self.integrated
 
 
+def driven_states(signals: Signals, form: str) -> tuple[int, ...]:
+    """The states that a program's outputs drive under a form, in the order of the outputs."""
+    return signals.driven if form == "acceleration" else tuple(range(signals.n_x))
+
+
 def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
     """Chains of a form, those without an output last.
 

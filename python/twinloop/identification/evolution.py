@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.identification.chains import Chain
 from twinloop.identification.pool import UNARY, Pool
 from twinloop.identification.problem import Problem
 from twinloop.identification.structure import Sum, search
@@ -26,8 +25,7 @@ CONSTANTS = 0.15
 
 def evolve(
     problem: Problem,
-    chains: Sequence[Chain],
-    known: Sequence[Sum | None],
+    known: Sequence[Sum],
     terms: Sequence[int],
     scales: Floats,
     *,
@@ -44,8 +42,7 @@ def evolve(
 
     Args:
         problem: of all chains.
-        chains: with their noise.
-        known: the best sum of each chain so far, or None.
+        known: the best sum of each chain so far, with the noise to begin with.
         terms: the nodes to begin with.
         scales: of all states (n_x,).
         operators: that new nodes may use.
@@ -62,7 +59,7 @@ def evolve(
     """
     pool = problem.pool
     draw = stream(seed, 77, iteration)
-    best: list[Sum | None] = list(known)
+    best = list(known)
     survivors: dict[int, int] = dict.fromkeys(terms, 0)
     taken: set[int] = set()
     for generation in range(generations):
@@ -74,7 +71,7 @@ def evolve(
             node = _drawn(pool, parents, operators, draw)
             if node is not None and pool.length(node) <= longest:
                 candidates.setdefault(node)
-        wholes = [_whole(pool, found, taken) if found is not None else {} for found in best]
+        wholes = [_whole(pool, found, taken) for found in best]
         # A chain may use what drives another one; its own sum would be a law that nobody has paid for, and so would
         # sums that use each other.
         favoured = [
@@ -82,16 +79,15 @@ def evolve(
             for i in range(len(wholes))
         ]
         usable = problem.usable([*candidates, *(node for whole in wholes for node in whole)])
-        sums = search(
-            problem, [s.chain if s else c for s, c in zip(best, chains, strict=True)], usable, best, scales,
+        best = search(
+            problem, [found.chain for found in best], usable, best, scales,
             moves=moves, starts=2, largest=largest, seed=seed, iteration=iteration * 1000 + generation,
             favoured=favoured, forbidden=[set(whole) for whole in wholes],
             fixed_noise=generation % 4 != 0 and generation != generations - 1,
         )  # fmt: skip
-        best = list(sums)
         # A node survives where a good subset uses it, and a few generations after that.
         used: set[int] = set()
-        for found in sums:
+        for found in best:
             used.update(found.weights)
             for subset, above in found.others:
                 if above < 10.0:
@@ -99,7 +95,7 @@ def evolve(
         aged = {term: age + 1 for term, age in survivors.items() if age < 3 and term not in used}
         kept = dict.fromkeys(sorted(used), 0) | dict(list(aged.items())[: population // 4])
         survivors = dict.fromkeys(range(pool.inputs), 0) | {pool.one: 0} | kept
-    return [found for found in best if found is not None]
+    return best
 
 
 def _drawn(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from twinloop.identification.pool import Pool
 from twinloop.identification.records import Actuator, Run, direct
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Sum, Weights
+from twinloop.identification.told import Told
 from twinloop.signals import Bounds, Signals
 
 PRUNINGS = 3
@@ -51,8 +52,7 @@ class Fitting:
         seed: of the campaign.
         iteration: which streams of random numbers.
         workers: how the work is carried out.
-        fixed: for each output, nodes that drive it and are known.
-        bounds: for each output, bounds of coefficients by node.
+        told: what is known of the law.
     """
 
     def __init__(
@@ -65,11 +65,9 @@ class Fitting:
         seed: int,
         iteration: int,
         workers: _core.Workers,
-        fixed: Mapping[int, Sequence[int]] | None = None,
-        bounds: Mapping[int, Limits] | None = None,
+        told: Told,
     ) -> None:
-        self.fixed = dict(fixed or {})
-        self.bounds = dict(bounds or {})
+        self.told = told
         self.runs = list(runs)
         self.pool = pool
         self.signals = signals
@@ -130,14 +128,14 @@ class Fitting:
 
         Constants inside nodes come first, then, output after output, a 1 for each known node and the weights.
         """
-        known = [node for nodes in self.fixed.values() for node in nodes]
+        known = [node for nodes in self.told.fixed.values() for node in nodes]
         used = [term for found in sums for term in found.weights if term != self.pool.one]
         held = [node for node in self.pool.needed([*used, *known]) if self._holds_constant(node)]
         kept = {self.pool.one, *self.pool.needed(known)}
         free = [place for place, node in enumerate(held) if node not in kept]
         place, weights = len(held), []
         for output, found in enumerate(sums):
-            place += len(self.fixed.get(output, ()))
+            place += len(self._fixed(found))
             weights.append(range(place, place + len(found.weights)))
             free += weights[-1]
             place += len(found.weights)
@@ -148,14 +146,22 @@ class Fitting:
     def _limits(self, sums: Sequence[Sum]) -> dict[int, Bounds]:
         """Bounds by place among a program's constants."""
         limits: dict[int, Bounds] = {}
-        for output, (found, places) in enumerate(zip(sums, self._layout(sums)[1], strict=True)):
-            bounds = self.bounds.get(output, {})
+        for found, places in zip(sums, self._layout(sums)[1], strict=True):
+            bounds = self._bounds(found)
             for place, term in zip(places, found.weights, strict=True):
                 if term in bounds:
-                    itself = float(self.form == "absolute" and term == output)
+                    itself = float(self.form == "absolute" and term == found.chain.states[0])
                     low, high = bounds[term]
                     limits[place] = (low + itself, high + itself)
         return limits
+
+    def _fixed(self, found: Sum) -> Sequence[int]:
+        """Nodes that are known to drive what a sum drives."""
+        return self.told.fixed.get(found.chain.states[0], ())
+
+    def _bounds(self, found: Sum) -> Limits:
+        """Bounds of a sum's coefficients, by node."""
+        return self.told.bounds.get(found.chain.states[0], {})
 
     def _holds_constant(self, number: int) -> bool:
         if number == self.pool.one:
@@ -165,15 +171,14 @@ class Fitting:
 
     def _without_weak(self, tuned: Tuned) -> tuple[list[Sum], float]:
         """The sums without terms whose uncertain weights do not pay for them, and what those cost."""
-        if (
-            not tuned.covariance.size
-        ):  # a small change of a constant makes it diverge: nothing is known of weights
+        if not tuned.covariance.size:
+            # A small change of a constant makes it diverge: nothing is known of weights.
             return list(tuned.sums), 0.0
         free, places = self._layout(tuned.sums)
         variances = dict(zip(free, np.diag(tuned.covariance).tolist(), strict=False))
         saved, kept = 0.0, []
-        for output, (found, at) in enumerate(zip(tuned.sums, places, strict=True)):
-            must = {t for t, bounds in self.bounds.get(output, {}).items() if excludes_zero(bounds)}
+        for found, at in zip(tuned.sums, places, strict=True):
+            must = {term for term, bounds in self._bounds(found).items() if excludes_zero(bounds)}
             price = np.log(max(2, sum(int(run.weights[:, found.chain.states[0]].sum()) for run in self.runs)))
             weights: Weights = {}
             for place, (term, weight) in zip(at, found.weights.items(), strict=True):
@@ -189,7 +194,7 @@ class Fitting:
 
     def model(self, sums: Sequence[Sum], actuators: Sequence[Actuator]) -> _core.Model:
         """The model whose outputs are sums, behind actuators."""
-        outputs = [dict.fromkeys(self.fixed.get(i, ()), 1.0) | found.weights for i, found in enumerate(sums)]
+        outputs = [dict.fromkeys(self._fixed(found), 1.0) | found.weights for found in sums]
         if self.form == "absolute":
             for i, terms in enumerate(outputs):
                 terms[i] = terms.get(i, 0.0) + 1.0

@@ -15,14 +15,12 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.errors import InvalidInput
 from twinloop.identification.actuation import search_actuators, total
-from twinloop.identification.bounds import declared_bounds
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.committee import committee
 from twinloop.identification.evolution import evolve
 from twinloop.identification.fitting import Fitting, Tuned
-from twinloop.identification.formulas import fixed_term, parsed_term
+from twinloop.identification.formulas import parsed_term
 from twinloop.identification.identified import Identified
 from twinloop.identification.libraries import rungs
 from twinloop.identification.noise import BEST_SENSOR, first_noise, unexplained
@@ -33,7 +31,8 @@ from twinloop.identification.records import Actuator, Run, direct, guessed_noise
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Sum, search
-from twinloop.signals import Bounds, Signals
+from twinloop.identification.told import told
+from twinloop.signals import Signals
 
 LAGS_AGAIN = 4
 """Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
@@ -104,13 +103,11 @@ class _Learner:
         every = chains(signals, self.form, guessed_noise(runs, self.scales))
         self.driven = [self._declared_noise(chain) for chain in every if chain.output is not None]
         self.given = [self._given_noise(chain) for chain in every if chain.output is None]
-        self.fixed = self._known_terms()
         self.ladder = self._ladder()
-        self.bounds = self._bounded_terms()
-        outputs = {i: self.fixed.get(chain.states[0], []) for i, chain in enumerate(self.driven)}
-        bounds = {i: self.bounds.get(chain.states[0], {}) for i, chain in enumerate(self.driven)}
+        self.told = told(options, self.pool, signals)
+        self._admit_bounded()
         self.fitting = Fitting(
-            runs, self.pool, signals, self.form, options, seed, iteration, workers, outputs, bounds
+            runs, self.pool, signals, self.form, options, seed, iteration, workers, self.told
         )
         self.stream = 0
 
@@ -141,7 +138,7 @@ class _Learner:
                 *remarks(runs, self.pool, self.signals, sums, left, readings),
                 *late_sensors(offsets, [chain.states[0] for chain in self.driven], self.signals),
                 *other_noise(tuned.observer, self.signals),
-                *held_at_bounds(sums, self.bounds, self.pool, self.signals, self.form),
+                *held_at_bounds(sums, self.told.bounds, self.pool, self.signals, self.form),
             ],
         )
 
@@ -200,44 +197,17 @@ class _Learner:
         found = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
         return [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
 
-    def _bounded_terms(self) -> dict[int, dict[int, Bounds]]:
-        """Bounds of coefficients by state and node; a term that no rung has stands on the first one."""
-        fixed = [(state, node) for state, nodes in self.fixed.items() for node in nodes]
-        found = declared_bounds(self.options.bounded_terms, fixed, self.pool, self.signals)
-        outputs = [chain.states[0] for chain in self.driven]
-        for state, bounds in found.items():
-            if state not in outputs:
-                raise InvalidInput(
-                    f"Option 'bounded_terms': expected states that an output drives, any of"
-                    f" {', '.join(self.signals.state_names[i] for i in outputs)}, found"
-                    f" {self.signals.state_names[state]}; bound a constant in the equation of one of them."
-                )
-            strangers = [node for node in bounds if node not in self.ladder[-1]]
-            self.pool.rungs.update(dict.fromkeys(strangers, 0))
-            self.ladder = [[*terms, *strangers] for terms in self.ladder]
-            if self.form == "absolute" and state in bounds:
-                # Sums are what is added to a state.
-                bounds[state] = (bounds[state][0] - 1.0, bounds[state][1] - 1.0)
-        return found
-
-    def _known_terms(self) -> dict[int, list[int]]:
-        """Nodes that are known to drive a state, by the state."""
-        outputs = [chain.states[0] for chain in self.driven]
-        known: dict[int, list[int]] = {}
-        for text in self.options.fixed_terms:
-            state, node = fixed_term(text, self.pool, self.signals)
-            if state not in outputs:
-                raise InvalidInput(
-                    f"Fixed term {text!r}: expected a state that an output drives, one of"
-                    f" {', '.join(self.signals.state_names[i] for i in outputs)}; write it for one of them."
-                )
-            known.setdefault(state, []).append(node)
-        return known
+    def _admit_bounded(self) -> None:
+        """A bounded term that no rung has stands on the first one."""
+        bounded = dict.fromkeys(node for limits in self.told.bounds.values() for node in limits)
+        strangers = [node for node in bounded if node not in self.ladder[-1]]
+        self.pool.rungs.update(dict.fromkeys(strangers, 0))
+        self.ladder = [[*terms, *strangers] for terms in self.ladder]
 
     def _problem(self, actuators: Sequence[Actuator]) -> Problem:
         inputs = stages(self.fitting.runs, self.signals, actuators)
         runs, dt = self.fitting.runs, self.signals.dt
-        return Problem(self.pool, runs, inputs, dt, self.workers, self.fixed, self.bounds)
+        return Problem(self.pool, runs, inputs, dt, self.workers, self.told)
 
     def _offsets(self) -> Floats:
         """By how much later than those of the driven states each state's readings were taken from it (n_x,), s."""
@@ -315,7 +285,7 @@ class _Learner:
             seeds += [node for found in best for node in found.weights]
             for restart in range(options.restarts):
                 best = evolve(
-                    problem, [found.chain for found in best], best, seeds, self.scales,
+                    problem, best, seeds, self.scales,
                     operators=options.operators, generations=options.generations,
                     population=options.population, longest=options.longest, moves=options.moves // 4,
                     largest=options.largest, seed=self.seed, iteration=self._next() + 100_000 * restart,

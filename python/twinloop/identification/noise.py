@@ -15,6 +15,8 @@ from twinloop.identification.problem import Problem
 
 GUSTS = (1e-3, 1e-1, 10.0)
 """Variances of a lasting disturbance that are tried first, in units of what the sensor's noise looks like as one."""
+GUST = 1e-2
+"""The same where terms have explained what they can."""
 BEST_SENSOR = 0.1
 """Share of its readings' roughness that a sensor's standard deviation is at least."""
 RIDGE = 1e-9
@@ -46,14 +48,9 @@ def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = Tr
     """
     regression = problem.regression(chain, problem.usable([problem.pool.one]))
     low, slow = floor_of(chain, scales, problem.dt)
-    sensors = np.maximum(chain.sensors, low)
-    period = problem.dt if chain.integrated else 1.0
-    first = float(sensors[0])
-    found = []
     # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
-    for size in GUSTS if gusts else (0.0,):
-        motion = (max(1e-3 * first / period, slow[0]), size * first / period**2, 10.0 * problem.dt)
-        found.append(regression.most_likely_noise(np.zeros(1), sensors, motion, low, slow))
+    begun = [_begun(chain, low, slow, problem.dt, size) for size in (GUSTS if gusts else (0.0,))]
+    found = [regression.most_likely_noise(np.zeros(1), *start, low, slow) for start in begun]
     sensors, motion, _ = min(found, key=lambda answer: answer[2])
     return chain.with_noise(sensors, motion)
 
@@ -75,14 +72,7 @@ def first_noise(
     """
     regression = problem.regression(chain, terms)
     low, slow = floor_of(chain, scales, problem.dt)
-    period = problem.dt if chain.integrated else 1.0
-    sensors = np.maximum(chain.sensors, low)
-    first = float(sensors[0])
-    motion = (
-        max(1e-3 * first / period, slow[0]),
-        1e-2 * first / period**2 if gusts else 0.0,
-        10.0 * problem.dt,
-    )
+    sensors, motion = _begun(chain, low, slow, problem.dt, GUST if gusts else 0.0)
     readings = problem.readings(chain)
     for _ in range(2):
         gram = regression.gram(sensors, motion, problem.workers)
@@ -95,3 +85,11 @@ def first_noise(
         used = min(len(terms), 0.7 * readings)
         sensors = sensors * readings / (readings - used)
     return chain.with_noise(sensors, motion)
+
+
+def _begun(chain: Chain, low: Floats, slow: Motion, dt: float, gust: float) -> tuple[Floats, Motion]:
+    """Where a search for the noise begins, with a gust of some size."""
+    sensors = np.maximum(chain.sensors, low)
+    period = dt if chain.integrated else 1.0
+    first = float(sensors[0])
+    return sensors, (max(1e-3 * first / period, slow[0]), gust * first / period**2, 10.0 * dt)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
-from twinloop.identification.bounds import Limits
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, Stages
+from twinloop.identification.told import Told
 from twinloop.signals import Bounds
 
 
@@ -25,8 +25,7 @@ class Problem:
         stages: their inputs within each period.
         dt: period, s.
         workers: how the work is carried out.
-        fixed: for the first state of each chain, nodes that drive it and are known.
-        bounds: for the first state of each chain, bounds of coefficients by node.
+        told: what is known of the law.
     """
 
     def __init__(
@@ -36,11 +35,9 @@ class Problem:
         stages: Stages,
         dt: float,
         workers: _core.Workers,
-        fixed: Mapping[int, Sequence[int]] | None = None,
-        bounds: Mapping[int, Limits] | None = None,
+        told: Told,
     ) -> None:
-        self.fixed = dict(fixed or {})
-        self.bounds = dict(bounds or {})
+        self.told = told
         self.pool = pool
         self.runs = runs
         self.stages = stages
@@ -62,7 +59,7 @@ class Problem:
 
     def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
         """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
-        known = self.usable(self.fixed.get(chain.states[0], ()))
+        known = self.usable(self.told.fixed.get(chain.states[0], ()))
         readings = [run.states[:, list(chain.states)] for run in self.runs]
         if known:
             readings = self._of(chain, known, readings).residuals(np.ones(len(known)))
@@ -83,7 +80,7 @@ class Problem:
 
     def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
         """Bounds of a chain's coefficients, by place among terms."""
-        bounds = self.bounds.get(chain.states[0], {})
+        bounds = self.told.bounds.get(chain.states[0], {})
         return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
 
     def readings(self, chain: Chain) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -174,10 +174,8 @@ def _with_what_must_be(
     subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
 ) -> list[tuple[int, ...]]:
     """Subsets that hold every term whose bounds exclude 0, as far as the runs can tell those terms apart."""
-    must: list[int] = []
-    for place, bounds in limits.items():
-        if excludes_zero(bounds) and np.isfinite(costs[place]) and gram.solve([*must, place]) is not None:
-            must.append(place)
+    told = (place for place, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[place]))
+    must = _told_apart(gram, told)
     if not must:
         return subsets
     forced = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
@@ -207,7 +205,7 @@ def all_judged(
     return [judged for judged in found if judged]
 
 
-def _told_apart(gram: _core.Gram, subset: tuple[int, ...]) -> tuple[int, ...]:
+def _told_apart(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]:
     """The features of a subset, in order, that those before them do not already span."""
     kept: list[int] = []
     for feature in subset:

@@ -18,6 +18,8 @@ Ends = tuple[Floats, Floats]
 """Initial states and target states (K, n_x)."""
 HOPELESS = 1e9
 """What a flight that diverges is worth."""
+DIVERGED = 1e-3 * HOPELESS
+"""A mean or spread of this or more: some flight in it has diverged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ def expected(means: Floats) -> float:
     Args:
         means: of the members.
     """
-    return float("inf") if bool((means >= HOPELESS / 1e3).any()) else float(means.mean())
+    return float("inf") if bool((means >= DIVERGED).any()) else float(means.mean())
 
 
 class Judge:

@@ -13,7 +13,7 @@ from twinloop.controllers import Family
 from twinloop.flights import disagreements
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import from_unit, to_unit, tune_gains
-from twinloop.planning.judging import HOPELESS, Committee, Ends, Judge, Task, expected
+from twinloop.planning.judging import DIVERGED, Committee, Ends, Judge, Task, expected
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 
@@ -196,7 +196,7 @@ class Planner(Judge):
         per_member = judged.qualities.mean(axis=1)
         mean = per_member.mean(axis=0)
         keeps = judged.worst_usage <= self._reach(goal, used)
-        scatter = self._scatter(committee, tuned)
+        scatter = self._scatter(committee, tuned) if goal == "both" else 0.0
         limit = self._limit(float(mean[0]), goal, told, first_quality, scatter)
         allowed = keeps & (mean <= limit)
         repeats = len(genes) - self._repeats(len(genes))
@@ -280,8 +280,7 @@ class Planner(Judge):
         most = options.excitation_most * (2.0 if goal == "model" else 1.0)
         if most > 0.0 and options.excitation > 0.0:
             for i in range(1, count):
-                gentle = i >= count - self._repeats(count)
-                amplitude = options.excitation if gentle else most * stream.random()
+                amplitude = options.excitation if i >= count - again else most * stream.random()
                 excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
         return genes, excitation
 
@@ -290,18 +289,15 @@ class Planner(Judge):
         options = self.options
         # A model is believed near what was flown: each flight may go somewhat further than those before it. With gains
         # far from any that were flown it may be wrong in ways that no member shows.
-        reach = (
-            max(options.reach_far, used)
-            if goal == "model"
-            else max(options.reach_first, options.reach_growth * used)
-        )
-        return min(1.0 - options.margin, reach)
+        near = max(options.reach_first, options.reach_growth * used)
+        far = max(options.reach_far, used)
+        return min(1.0 - options.margin, far if goal == "model" else near)
 
     def _scatter(self, committee: Committee, tuned: Floats) -> float:
         """How far the quality of one flight is from that of the next, by the sensors' noise alone."""
         flights = self.judge(committee.members[:1], tuned[np.newaxis], committee.sds, self.options.draws)
         scatter = float(flights.qualities.std())
-        return scatter if scatter < HOPELESS / 1e3 else 0.0
+        return scatter if scatter < DIVERGED else 0.0
 
     def _limit(self, tuned: float, goal: str, told: int, first: float, scatter: float) -> float:
         """Predicted quality that a test may have at most."""
