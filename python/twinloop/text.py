@@ -295,17 +295,18 @@ def _advice(result: Mapping[str, Any]) -> str:
             title + "The model diverged on flights that it was learnt from: it cannot say. Fly another one."
         )
     share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
-    before = f"When test {advice['before_test']} was planned, knowing which model is right would"
+    words = f"{title}When test {advice['before_test']} was planned, knowing which model is right would"
+    size = None if scatter is None else _with_unit(scatter, unit)
     if advice["gain"] == 0.0:
         stop = " For the controller, stop." if advice["stop"] else ""
-        return f"{title}{before} not have improved\nthe quality.{stop}"
-    words = f"{before} have improved the quality\nby {_with_unit(advice['gain'], unit)}{share}."
-    if scatter is None:
-        return title + words
-    repeated = f"the scatter of one measurement, {_with_unit(scatter, unit)}"
+        told = "" if size is None else f"\nThe scatter of one measurement is {size}."
+        return f"{words} not have improved\nthe quality.{stop}{told}"
+    words += f" have improved the quality\nby {_with_unit(advice['gain'], unit)}{share}."
+    if size is None:
+        return words
     if advice["stop"]:
-        return f"{title}{words}\nThat is below {repeated}. For the controller, stop."
-    return f"{title}{words}\nThat is above {repeated}: another experiment may pay."
+        return f"{words}\nThat is below the scatter of one measurement, {size}. For the controller, stop."
+    return f"{words}\nThat is above the scatter of one measurement, {size}: another experiment may pay."
 
 
 def _with_unit(value: float, unit: str) -> str:
