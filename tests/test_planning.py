@@ -182,6 +182,21 @@ def test_where_no_candidate_keeps_the_margin_the_safest_is_offered_and_said_so()
     assert 0.9 < usages(planner, committee, found).max() <= quiet
 
 
+@pytest.mark.parametrize("exploit", [False, True])
+@pytest.mark.parametrize("goal", ["both", "control"])
+def test_where_the_twin_promises_less_than_was_flown_the_flown_gains_fly_again(goal, exploit):
+    known = signals()
+    planner, committee = planner_of(known), committee_of(known)
+    flown, lazy = np.array([3.0, 0.2, 1.5]), np.array([0.1, 0.0, 3.0])
+    quality = float(planner.judge(committee.members, TUNED[None], committee.sds, 1).mean[0])
+    found = planner.propose(
+        committee, lazy, flown, goal=goal, number=3, told=1, first_quality=0.5 * quality, used=1.0, exploit=exploit
+    )  # fmt: skip
+    assert same_bits(found.genes, flown) and "again" in found.reason and found.excitation is not None
+    # Where the twin promises more than that, it is followed.
+    assert not same_bits(proposed(planner, committee, goal=goal, exploit=exploit).genes, flown)
+
+
 def test_another_number_is_another_proposal_and_the_same_number_the_same():
     known = signals()
     planner, committee = planner_of(known), committee_of(known)
@@ -263,4 +278,4 @@ def test_what_the_scatter_of_flights_hides_may_be_given_up():
     share = planner.options.share
     assert limit == pytest.approx([1.0 + 2.0 * share, 1.0 + 2.0 * share**4, 1.2])
     assert planner._limit(1.0, "control", 1, 3.0, 0.5) == pytest.approx(1.0 + 0.2 * share)
-    assert planner._limit(1.0, "both", 1, 0.5, 0.0) == 1.0
+    assert planner._limit(1.0, "both", 1, 0.5, 0.0) == 0.5

@@ -248,6 +248,31 @@ def test_constants_and_a_lag_are_those_that_scipy_finds():
     np.testing.assert_allclose(np.cov(drawn.T), covariance, rtol=0.3, atol=0.1 * covariance.max() * 0.1)
 
 
+def test_constants_that_do_the_same_are_drawn_as_far_as_the_runs_bear_it():
+    """speed' = a speed + b c u: only the product of b and c shows, and they may move against each other."""
+    signals = _core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None])
+    page = ["r3 = r1 * 4.0", "r2 = r0 * -1.0", "r3 = r3 * 0.5", "r2 = r2 + r3"]
+    model = _core.Model(_core.Program.parse(program_text(2, 1, 4, [page])), "acceleration", signals)
+    records = [flown(1, truth=(-1.3, 2.0, 1e-9)), flown(2, truth=(-1.3, 2.0, 1e-9))]
+    tuned, left, _, covariance, members = _core.tune(
+        model, CHAIN, records, free=[0, 1, 2], lags=[], iterations=30, draws=200, seed=3
+    )
+    drawn = np.array([member.constants for member in members])
+    outer, damping, inner = np.array(tuned.constants), drawn[:, 1], drawn[:, 0] * drawn[:, 2]
+    assert (np.sqrt(np.diag(covariance)) <= np.abs(outer) * (1.0 + 1e-9)).all()
+    assert np.std(drawn[:, 0]) > 0.02 * abs(outer[0])
+    # As the runs have it where b c is one constant, within what a hundred draws can tell and halving takes away.
+    _, _, _, plain, _ = _core.tune(
+        lagging(-1.0, 2.0, 0.0), CHAIN, records, free=[0, 1], lags=[], iterations=30, draws=0, seed=3
+    )
+    errors = np.sqrt(np.diag(plain))
+    assert 0.1 * errors[0] < np.std(damping) < 1.3 * errors[0]
+    assert np.abs(inner - outer[0] * outer[2]).max() < 8.0 * errors[1]
+    for member in members[:20]:
+        _, chi, *_ = _core.tune(member, CHAIN, records, free=[], lags=[], iterations=0)
+        assert chi <= left + 3.0 + 3.0 * np.sqrt(6.0) + 1e-6
+
+
 def test_predictions_are_those_of_a_plain_loop_and_a_reading_that_does_not_count_is_not_used():
     readings, weights, commands = flown(4)
     weights[37], readings[37] = 0.0, 3.0

@@ -68,22 +68,6 @@ pub struct Tuned {
     pub covariance: Vec<f64>,
 }
 
-impl Tuned {
-    /// The same model with its free values drawn from what the runs leave open.
-    pub fn drawn(&self, tuning: &Tuning<'_>, stream: &mut Stream) -> (Vec<f64>, Vec<f64>) {
-        let start = Variant { constants: self.constants.clone(), lags: self.lags.clone() };
-        let size = tuning.size();
-        let Some(factor) =
-            (!self.covariance.is_empty()).then(|| Cholesky::new(&self.covariance, size, 0.0)).flatten()
-        else {
-            return (start.constants, start.lags);
-        };
-        let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
-        let drawn = tuning.moved(&start, &factor.times(&normal));
-        (drawn.constants, drawn.lags)
-    }
-}
-
 /// Constants and lags of one variant.
 #[derive(Clone, Debug)]
 struct Variant {
@@ -97,6 +81,8 @@ const STEP: f64 = 1e-6;
 const DAMPINGS: [f64; 8] = [1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e6];
 /// Variants that run side by side.
 const LANES: usize = 32;
+/// How often a draw is taken back by half, and one more.
+const HALVES: i32 = 16;
 
 impl Tuning<'_> {
     /// Refuses parts that do not fit each other.
@@ -160,11 +146,50 @@ impl Tuning<'_> {
         if left.is_finite()
             && let Some((_, curvature)) = self.normal(&whitenings, &best, workers)
         {
-            covariance = inverse(&curvature, self.size()).unwrap_or_default();
+            covariance = inverse(&curvature, &self.values(&best)).unwrap_or_default();
         }
         let readings =
             self.records.iter().map(|record| record.weights.iter().filter(|&&w| w > 0.0).count()).sum();
         Tuned { constants: best.constants, lags: best.lags, left, readings, covariance }
+    }
+
+    /// Tuned models with their free values drawn from what the runs leave open, one for each stream of random numbers.
+    ///
+    /// What is left is known where χ² is a parabola; a draw that leaves the place where it is one is taken back by
+    /// halves until the runs bear it.
+    pub fn drawn(
+        &self,
+        tuned: &Tuned,
+        streams: impl IntoIterator<Item = Stream>,
+        workers: &Workers,
+    ) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let start = Variant { constants: tuned.constants.clone(), lags: tuned.lags.clone() };
+        let size = self.size();
+        let factor =
+            (!tuned.covariance.is_empty()).then(|| Cholesky::new(&tuned.covariance, size, 0.0)).flatten();
+        let tries: Vec<Variant> = streams
+            .into_iter()
+            .flat_map(|mut stream| {
+                let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
+                let step = factor.as_ref().map(|factor| factor.times(&normal));
+                let taken = |halves: i32| {
+                    let share = 0.5_f64.powi(halves);
+                    let step: Option<Vec<f64>> =
+                        step.as_ref().map(|step| step.iter().map(|s| share * s).collect());
+                    step.map_or_else(|| start.clone(), |step| self.moved(&start, &step))
+                };
+                (0..HALVES).map(taken).collect::<Vec<_>>()
+            })
+            .collect();
+        let costs = self.costs(&self.whitenings(), &tries, workers);
+        let bearable = tuned.left + size as f64 + 3.0 * (2.0 * size as f64).sqrt();
+        let borne = |(tries, costs): (&[Variant], &[f64])| {
+            let found = tries.iter().zip(costs).find(|(_, cost)| **cost <= bearable);
+            let one = found.map_or(&start, |(one, _)| one);
+            (one.constants.clone(), one.lags.clone())
+        };
+        let halves = HALVES as usize;
+        tries.chunks_exact(halves).zip(costs.chunks_exact(halves)).map(borne).collect()
     }
 
     /// Whitened prediction errors of the model as it is, (n + 1) × n_x for each record, and its states once each
@@ -195,6 +220,12 @@ impl Tuning<'_> {
 
     fn size(&self) -> usize {
         self.free.len() + self.lags.len()
+    }
+
+    /// What is free to move, as it is in a variant.
+    fn values(&self, variant: &Variant) -> Vec<f64> {
+        let constants = self.free.iter().map(|&constant| variant.constants[constant]);
+        constants.chain(self.lags.iter().map(|group| variant.lags[group[0]])).collect()
     }
 
     fn whitenings(&self) -> Vec<Vec<Whitening>> {
@@ -252,11 +283,7 @@ impl Tuning<'_> {
         let size = self.size();
         let mut steps = Vec::with_capacity(size);
         let mut variants = Vec::with_capacity(size);
-        for p in 0..size {
-            let value = match p.checked_sub(self.free.len()) {
-                None => at.constants[self.free[p]],
-                Some(group) => at.lags[self.lags[group][0]],
-            };
+        for (p, value) in self.values(at).into_iter().enumerate() {
             let mut step = vec![0.0; size];
             step[p] = STEP * value.abs().max(1e-6);
             steps.push(step[p]);
@@ -320,15 +347,18 @@ fn step(gradient: &[f64], curvature: &[f64], damping: f64) -> Option<Vec<f64>> {
     Some(scaled.iter().zip(&scales).map(|(x, s)| x * s).collect())
 }
 
-fn inverse(curvature: &[f64], size: usize) -> Option<Vec<f64>> {
+/// What the runs leave open of values that are known to their own size beforehand: where two constants of a program do
+/// the same, no run tells them apart.
+fn inverse(curvature: &[f64], values: &[f64]) -> Option<Vec<f64>> {
+    let size = values.len();
     let scales = scales(curvature, size);
     let mut matrix = vec![0.0; size * size];
     for i in 0..size {
         for j in 0..size {
             matrix[i * size + j] = curvature[i * size + j] * scales[i] * scales[j];
         }
-        // What the runs say nothing about keeps a wide, but finite, spread.
-        matrix[i * size + i] += 1e-9;
+        let known = scales[i] / values[i].abs().max(f64::MIN_POSITIVE.sqrt());
+        matrix[i * size + i] += 1e-9 + (known * known).min(1e12);
     }
     let inverse = Cholesky::new(&matrix, size, 0.0)?.inverse();
     Some((0..size * size).map(|ij| inverse[ij] * scales[ij / size] * scales[ij % size]).collect())

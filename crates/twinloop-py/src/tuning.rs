@@ -93,12 +93,10 @@ pub fn tune<'py>(
     let covariance = to_matrix(py, size, tuned.covariance.clone());
     let (left, readings) = (tuned.left, tuned.readings);
     let finished = model.varied(&tuned.constants, &tuned.lags)?;
-    let mut members = Vec::with_capacity(draws);
-    for draw in 0..draws {
-        let mut stream = Stream::new(seed, Purpose::Members, iteration, unit, draw as u64);
-        let (constants, lags) = tuned.drawn(&tuning, &mut stream);
-        members.push(model.varied(&constants, &lags)?);
-    }
+    let streams = (0..draws).map(|draw| Stream::new(seed, Purpose::Members, iteration, unit, draw as u64));
+    let drawn = py.detach(|| tuning.drawn(&tuned, streams, &workers));
+    let members: Vec<PyModel> =
+        drawn.iter().map(|(constants, lags)| model.varied(constants, lags)).collect::<Result<_>>()?;
     Ok((finished, left, readings, covariance, members))
 }
 

@@ -104,12 +104,18 @@ class Pool:
 
         It is linear, made of one input twice, or of two inputs: three kinds, and a choice within the kind, for laws of
         machines are as often quadratic as linear. Each further input or constant is a choice of its own, with its
-        operation.
+        operation, and so is each function: where rates have one sign only, |rate| must not be as short as -rate.
         """
         n, leaves = self.inputs, self.leaves(number)
         choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
         further = max(0, len(leaves) - 2) * float(np.log(n) + np.log(self.operations))
-        return float(np.log(3.0 * choices)) + further
+        return float(np.log(3.0 * choices)) + further + self.functions(number) * float(np.log(self.operations))
+
+    def functions(self, number: int) -> int:
+        """How often an expression applies a function of one operand."""
+        node = self.node(number)
+        own = node is not None and node[0] in UNARY
+        return own + sum(self.functions(operand) for operand in self.operands(number))
 
     def text(self, number: int, symbols: Sequence[str]) -> str:
         """An expression as it would be written, with a symbol for each input."""

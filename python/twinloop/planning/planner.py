@@ -196,18 +196,18 @@ class Planner(Judge):
         per_member = judged.qualities.mean(axis=1)
         mean = per_member.mean(axis=0)
         keeps = judged.worst_usage <= self._reach(goal, used)
-        scatter = self._scatter(committee, tuned) if goal == "both" else 0.0
+        scatter = 0.0 if goal == "model" else self._scatter(committee, tuned)
         limit = self._limit(float(mean[0]), goal, told, first_quality, scatter)
         allowed = keeps & (mean <= limit)
         repeats = len(genes) - self._repeats(len(genes))
         if not committee.trusted:
             # Nothing is known but that these gains have flown: again, with another excitation.
             chosen = repeats
-        elif exploit and keeps[0]:
+        elif exploit and allowed[0]:
             chosen = 0
         elif allowed.any():
             chosen = int(np.argmax(np.where(allowed, values, -np.inf)))
-        elif keeps.any():
+        elif (keeps & (mean <= first_quality)).any():
             chosen = int(np.argmin(np.where(keeps, mean, np.inf)))
         else:
             # What was flown has kept the envelope, whatever the members make of it.
@@ -277,10 +277,12 @@ class Planner(Judge):
             )
             genes[count - again :] = from_unit(self.family, np.clip(near, 0.0, 1.0))
         excitation = np.zeros((count, self.task.steps, self.signals.n_u))
-        most = options.excitation_most * (2.0 if goal == "model" else 1.0)
+        most = options.excitation_most
         if most > 0.0 and options.excitation > 0.0:
             for i in range(1, count):
-                amplitude = options.excitation if i >= count - again else most * stream.random()
+                # Gains that have flown bear more of it, and once more the same would tell little.
+                stronger = min(2.0 * options.excitation, options.excitation_most)
+                amplitude = stronger if i >= count - again else most * stream.random()
                 excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
         return genes, excitation
 
@@ -303,11 +305,11 @@ class Planner(Judge):
         """Predicted quality that a test may have at most."""
         if goal == "model":
             return max(first, 2.0 * tuned)
-        share = self.options.share ** max(1, told)
-        if goal == "control":
-            return tuned + 0.1 * share * max(0.0, first - tuned)
+        given = self.options.share ** max(1, told) * max(0.0, first - tuned)
         # What is lost in the scatter of the flights costs nothing.
-        return tuned + max(scatter, share * (first - tuned))
+        given = 0.1 * given if goal == "control" else max(scatter, given)
+        # Where the tuned gains promise less than the first ones gave, the committee knows too little to lead anywhere.
+        return min(tuned + given, first + scatter)
 
     def _smallest(self) -> Floats:
         """Differences below this are rounding (n_x,)."""
@@ -339,7 +341,7 @@ class Planner(Judge):
     ) -> str:
         sentences = []
         if repeats:
-            change = "another gentle excitation" if self.options.excitation > 0.0 else "a small variation"
+            change = "a stronger excitation" if self.options.excitation > 0.0 else "a small variation"
             sentences.append(f"The best gains flown, again, with {change}: they are known to fly.")
         if exploits:
             sentences.append("The best gains that the twin knows, flown as they are.")

@@ -41,7 +41,7 @@ class PlanningOptions:
 
     tests: str = "ask"
     excitation: float = 0.02
-    excitation_most: float = 0.04
+    excitation_most: float = 0.08
     fade: float = 0.25
     initial_range: tuple[float, ...] = ()
     target_range: tuple[float, ...] = ()
