@@ -447,8 +447,8 @@ def tune(
 ) -> tuple[Model, float, int, _Floats, list[Model]]:
     """The model with free constants and lags of groups of commands moved until the least is left.
 
-    Returns it with χ² (infinite where it diverges), readings that counted, the covariance of what was free,
-    and members drawn from that.
+    Returns it with χ² (infinite where it diverges), readings that counted, the covariance of what was free, each
+    value being known to its own size beforehand, and members drawn from that as far as the records bear them.
     """
 
 def predictions(

@@ -64,7 +64,8 @@ pub struct Tuned {
     pub left: f64,
     /// Readings that counted.
     pub readings: usize,
-    /// Covariance of the free constants, then of the free lags; empty if it could not be had.
+    /// Covariance of the free constants, then of the free lags, each known to its own size beforehand; empty if it
+    /// could not be had.
     pub covariance: Vec<f64>,
 }
 
@@ -171,12 +172,11 @@ impl Tuning<'_> {
             .into_iter()
             .flat_map(|mut stream| {
                 let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
-                let step = factor.as_ref().map(|factor| factor.times(&normal));
+                let step = factor.as_ref().map_or_else(|| vec![0.0; size], |factor| factor.times(&normal));
                 let taken = |halves: i32| {
                     let share = 0.5_f64.powi(halves);
-                    let step: Option<Vec<f64>> =
-                        step.as_ref().map(|step| step.iter().map(|s| share * s).collect());
-                    step.map_or_else(|| start.clone(), |step| self.moved(&start, &step))
+                    let step: Vec<f64> = step.iter().map(|s| share * s).collect();
+                    self.moved(&start, &step)
                 };
                 (0..HALVES).map(taken).collect::<Vec<_>>()
             })
