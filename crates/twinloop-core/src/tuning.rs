@@ -181,6 +181,10 @@ impl Tuning<'_> {
                 (0..HALVES).map(taken).collect::<Vec<_>>()
             })
             .collect();
+        if tries.is_empty() {
+            // Most tunings draw nothing: no filter has to be run for them.
+            return vec![];
+        }
         let costs = self.costs(&self.whitenings(), &tries, workers);
         let bearable = tuned.left + size as f64 + 3.0 * (2.0 * size as f64).sqrt();
         let borne = |(tries, costs): (&[Variant], &[f64])| {

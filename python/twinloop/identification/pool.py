@@ -108,10 +108,9 @@ class Pool:
         """
         n, leaves = self.inputs, self.leaves(number)
         choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
-        further = max(0, len(leaves) - 2) * float(np.log(n) + np.log(self.operations))
-        return (
-            float(np.log(3.0 * choices)) + further + self.functions(number) * float(np.log(self.operations))
-        )
+        operation = float(np.log(self.operations))
+        further = max(0, len(leaves) - 2) * (float(np.log(n)) + operation)
+        return float(np.log(3.0 * choices)) + further + self.functions(number) * operation
 
     def functions(self, number: int) -> int:
         """How often an expression applies a function of one operand."""

@@ -279,9 +279,9 @@ class Planner(Judge):
         excitation = np.zeros((count, self.task.steps, self.signals.n_u))
         most = options.excitation_most
         if most > 0.0 and options.excitation > 0.0:
+            # Gains that have flown bear more of it than at first, and once more the same would tell little.
+            stronger = min(2.0 * options.excitation, most)
             for i in range(1, count):
-                # Gains that have flown bear more of it, and once more the same would tell little.
-                stronger = min(2.0 * options.excitation, options.excitation_most)
                 amplitude = stronger if i >= count - again else most * stream.random()
                 excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
         return genes, excitation
