@@ -32,8 +32,9 @@ INPUTS = 3
 
 @st.composite
 def pools(draw):
-    """A pool with a few nodes, and those of them that stay moderate."""
+    """A pool with a few nodes, a hidden state among them."""
     pool = Pool(INPUTS)
+    pool.hidden(0)
     for _ in range(draw(st.integers(0, 8))):
         operand = st.integers(0, len(pool) - 1)
         constant = st.floats(-5.0, 5.0).filter(lambda x: abs(x) > 1e-3)
@@ -53,6 +54,8 @@ def value(pool, number, rows):
     operation, a, b = node
     if operation == "one":
         return np.ones(len(rows))
+    if operation == "hidden":
+        return rows[:, INPUTS + a]
     first = value(pool, a, rows)
     if b is None:
         return operate(operation, first)
@@ -62,10 +65,10 @@ def value(pool, number, rows):
 
 @given(pools(), st.data(), st.integers(0, 2**32 - 1))
 def test_a_program_of_sums_is_those_sums(pool, data, seed):
-    rows = np.random.default_rng(seed).uniform(-2.0, 2.0, (7, INPUTS))
+    rows = np.random.default_rng(seed).uniform(-2.0, 2.0, (7, INPUTS + 1))
     node, weight = st.integers(0, len(pool) - 1), st.floats(-9.0, 9.0)
     outputs = data.draw(st.lists(st.dictionaries(node, weight, max_size=6), min_size=1, max_size=3))
-    found = pool.program(outputs).run(rows)
+    found = pool.program(outputs, hidden=1).run(rows)
     with np.errstate(all="ignore"):
         for i, terms in enumerate(outputs):
             parts = [w * value(pool, n, rows) for n, w in terms.items()]
@@ -77,7 +80,7 @@ def test_a_program_of_sums_is_those_sums(pool, data, seed):
 
 @given(pools(), st.integers(0, 2**32 - 1))
 def test_values_of_nodes_are_those_of_the_recursion(pool, seed):
-    rows = np.random.default_rng(seed).uniform(-2.0, 2.0, (7, INPUTS))
+    rows = np.random.default_rng(seed).uniform(-2.0, 2.0, (7, INPUTS + 1))
     numbers = list(range(len(pool)))[::-1]
     with np.errstate(all="ignore"):
         expected = np.stack([value(pool, n, rows) for n in numbers], axis=1)
@@ -206,8 +209,9 @@ def gravity(angle, rate, torque):
     return -9.0 * np.sin(angle) - 0.4 * rate + 5.0 * torque
 
 
-def identified(runs, signals, **changes):
-    return identify_runs(runs, signals, options_of("default", {**FAST, **changes}), workers=WORKERS)
+def identified(runs, signals, rests=(), workers=WORKERS, **changes):
+    options = options_of("default", {**FAST, **changes})
+    return identify_runs(runs, signals, options, rests=rests, workers=workers)
 
 
 def law(found, output=0):
@@ -244,7 +248,7 @@ def flown_in_gusts(seed):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_from_above_gusts_are_told_from_terms_where_from_below_they_are_not(seed):
     signals, runs = flown_in_gusts(seed)
-    changes = {"libraries": ("linear", "quadratic", "damping"), "moves": 50_000}
+    changes = {"libraries": ("linear", "quadratic", "damping"), "moves": 50_000, "hidden": False}
     both, below = (identified(runs, signals, noise_from_above=above, **changes) for above in (True, False))
     assert both.energy < below.energy - 100.0
     assert both.terms < 12 < below.terms
@@ -290,11 +294,70 @@ def test_a_lag_of_the_actuator_is_found():
         readings = np.array(states)[:, None]
         runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands))
     found = identified(runs, signals, lags=True, form="acceleration", longest_delay=1)
-    [(time, delay, _)] = found.actuators
+    [(time, delay, _)] = found.actuation.actuators
     assert time == pytest.approx(lag, rel=0.1) and delay == 0
     terms = law(found)
     assert set(terms) == {0, 1}
     assert terms[0] == pytest.approx(-0.8, rel=0.1) and terms[1] == pytest.approx(3.0, rel=0.1)
+
+
+def fans(runs, fading, seed=3, noise=1e-3):
+    """Two fans turn a rotor against each other; the air that both have set moving weakens them, and comes to rest."""
+    dt, stream, found = 0.02, np.random.default_rng(seed), []
+    fan = {"unit": "1", "bounds": (0.0, 2.0), "scale": 1.0}
+    signals = tl.Signals(
+        [tl.State("speed", "rad/s", 5.0)],
+        [tl.Command("left", **fan), tl.Command("right", **fan)],
+        dt,
+    )
+    for _ in range(runs):
+        commands = np.repeat(stream.uniform(0.2, 1.8, (15, 2)), 10, axis=0)
+        speed, air, states = 0.0, 0.0, [0.0]
+        for left, right in commands:
+            for _ in range(50):
+                push = 6.0 * (left * left - right * right)
+                air += dt / 50 * (0.5 * (left * left + right * right) - 1.0 - air / 0.8)
+                speed += dt / 50 * (push - 1.5 * speed - fading * air * (left - right))
+            states.append(speed)
+        readings = np.array(states)[:, None]
+        found.append(Run.of(readings + noise * stream.normal(size=readings.shape), commands))
+    return signals, found
+
+
+def test_a_hidden_state_that_commands_fill_is_found():
+    signals, runs = fans(3, fading=3.0)
+    rests = [np.array([1.0, 1.0])]
+    blind = identified(runs, signals, rests=rests, form="acceleration", hidden=False)
+    found = identified(runs, signals, rests=rests, form="acceleration")
+    [(commands, squared, rest, time)] = found.actuation.hidden
+    assert (list(commands), squared, rest) == ([0, 1], True, 1.0)
+    assert time == pytest.approx(0.8, rel=0.1)
+    assert found.energy < blind.energy - 100.0 and found.terms < 8
+    # What is left is noise alone; without the state it is several times as much, or a disturbance.
+    assert found.misfit == pytest.approx(1.0, abs=0.2)
+    assert found.chains[0].motion[1] < 0.1 * blind.chains[0].motion[1]
+    text = tl.Twin(found.model, signals).equations(3)
+    assert "d hidden / dt = (left² + right²) / 2 - 1 - hidden / 0." in text
+    assert all(len(member.hidden) == 1 for member in found.members)
+    alone = identified(runs, signals, rests=rests, workers=_core.Workers(threads=1), form="acceleration")
+    assert alone.model.hidden == found.model.hidden
+    assert same_bits(alone.model.constants, found.model.constants)
+
+
+def test_where_nothing_is_hidden_the_law_is_as_if_nobody_had_looked():
+    signals, runs = fans(2, fading=0.0)
+    laws = [
+        identified(runs, signals, rests=[np.ones(2)], form="acceleration", hidden=hidden)
+        for hidden in (True, False)
+    ]
+    assert laws[0].actuation.hidden == ()
+    assert same_bits(laws[0].model.constants, laws[1].model.constants)
+    assert str(laws[0].model.program) == str(laws[1].model.program)
+
+
+def test_one_run_has_no_hidden_state():
+    signals, runs = fans(1, fading=3.0)
+    assert identified(runs, signals, rests=[np.ones(2)], form="acceleration").actuation.hidden == ()
 
 
 def test_a_law_in_increments_is_found():

@@ -63,7 +63,7 @@ TUNED = np.array([4.0, 0.1, 2.0])
 
 def proposed(planner, committee, tuned=TUNED, **changes):
     arguments = {
-        "goal": "both", "number": 3, "told": 1, "first_quality": 1.0, "used": 1.0, "exploit": False, **changes,
+        "goal": "both", "number": 3, "told": 1, "first_quality": 1.0, "used": [1.0], "exploit": False, **changes,
     }  # fmt: skip
     return planner.propose(committee, tuned, tuned, **arguments)
 
@@ -190,7 +190,7 @@ def test_where_the_twin_promises_less_than_was_flown_the_flown_gains_fly_again(g
     flown, lazy = np.array([3.0, 0.2, 1.5]), np.array([0.1, 0.0, 3.0])
     quality = float(planner.judge(committee.members, TUNED[None], committee.sds, 1).mean[0])
     found = planner.propose(
-        committee, lazy, flown, goal=goal, number=3, told=1, first_quality=0.5 * quality, used=1.0, exploit=exploit
+        committee, lazy, flown, goal=goal, number=3, told=1, first_quality=0.5 * quality, used=[1.0], exploit=exploit
     )  # fmt: skip
     assert same_bits(found.genes, flown) and "again" in found.reason and found.excitation is not None
     # Where the twin promises more than that, it is followed.
@@ -257,8 +257,8 @@ def test_without_excitation_a_flight_that_is_flown_again_is_varied():
 def test_flights_for_the_model_go_no_further_than_they_are_allowed_or_than_was_flown():
     known = signals()
     committee = committee_of(known)
-    for used, most in ((0.2, 0.45), (0.6, 0.6)):
-        planner = planner_of(known, reach_far=0.45, reach_first=0.9)
+    for used, most in (([0.5], 0.45), ([0.33], 0.43), ([0.33, 0.44, 0.4], 0.44), ([0.6], 0.6)):
+        planner = planner_of(known, reach_far=0.45, reach_first=0.9, reach_growth=1.3)
         found = proposed(planner, committee, goal="model", used=used)
         flown = planner.judge(
             committee.members,

@@ -45,7 +45,7 @@ ACTUATORS = [
 @pytest.mark.parametrize("actuators", ACTUATORS)
 def test_the_effects_of_commands_are_those_of_a_plain_loop(actuators):
     commands = np.random.default_rng(0).normal(size=(25, 2))
-    found = _core.command_effects(actuators, DT, commands)
+    found = _core.command_effects(actuators, [], np.ones(2), DT, commands)
     lines = [Line(*actuator) for actuator in actuators]
     expected = np.array(
         [[line.effects(c, DT) for line, c in zip(lines, row, strict=True)] for row in commands]
@@ -85,6 +85,96 @@ def test_a_model_with_actuators_flies_as_a_plain_loop_does(rig, rig_family, form
         assert lasted == runs.lasted[i]
         np.testing.assert_allclose(runs.states[i, : lasted + 1], states, rtol=1e-9, atol=1e-11)
         np.testing.assert_allclose(runs.commands[i, :lasted], commands, rtol=1e-9, atol=1e-11)
+
+
+class Filling:
+    """A hidden state that commands fill, integrated in small steps rather than solved."""
+
+    def __init__(self, commands, squared, rest, time):
+        self.commands, self.squared, self.rest, self.time, self.value = commands, squared, rest, time, 0.0
+
+    def values(self, command, scales, dt, steps=4000):
+        given = np.array([command[i] / scales[i] for i in self.commands])
+        level = np.mean(given**2 if self.squared else given)
+        self.rest = level if self.rest is None else self.rest
+        found = [self.value]
+        for _ in range(2):
+            for _ in range(steps // 2):
+                # Heun's rule.
+                h = dt / steps
+                first = level - self.rest - self.value / self.time
+                second = level - self.rest - (self.value + h * first) / self.time
+                self.value += 0.5 * h * (first + second)
+            found.append(self.value)
+        return found
+
+
+HIDDEN = [
+    [([0, 1], True, 0.3, 0.7)],
+    [([1], False, None, 0.2)],
+    [([0], True, None, 5.0), ([0, 1], False, 0.0, 0.1)],
+]
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_hidden_states_are_those_of_a_plain_loop(hidden):
+    commands, scales = np.random.default_rng(0).normal(size=(25, 2)), np.array([2.0, 0.5])
+    found = _core.command_effects(ACTUATORS[1], hidden, scales, DT, commands)
+    plain = _core.command_effects(ACTUATORS[1], [], scales, DT, commands)
+    states = [Filling(*parts) for parts in hidden]
+    expected = np.array([[state.values(row, scales, DT) for state in states] for row in commands])
+    for stage in range(3):
+        assert same_bits(found[stage][:, :2], plain[stage])
+        np.testing.assert_allclose(found[stage][:, 2:], expected[:, :, stage], rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("actuators", [[(0.0, 0, None)] * 2, ACTUATORS[1]])
+@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_family, form, actuators):
+    hidden, scales = HIDDEN[2], np.array([1.0, 4.0])
+    text = program_text(
+        6, 2, 9, [["r6 = r1 * 0.1", "r8 = r2 * r4", "r6 = r6 + r8", "r7 = r3 - r1", "r7 = r7 + r5"]]
+    )
+    if form == "acceleration":
+        text = program_text(6, 1, 8, [["r6 = r2 * r4", "r7 = r3 - r1", "r6 = r6 + r7", "r6 = r6 + r5"]])
+    program = _core.Program.parse(text)
+    model = _core.Model(program, form, rig, actuators, hidden)
+    assert model.hidden == hidden and model.actuators == actuators
+    genes, steps = np.random.default_rng(1).uniform(0.0, 1.0, (3, 6)), 12
+    runs = _core.rollout(model, rig_family, genes, _core.Task([0.4, 0.0], [-0.2, 0.0], steps), rig)
+    for i in range(len(genes)):
+        lasted = runs.lasted[i]
+        effects = _core.command_effects(actuators, hidden, scales, 0.1, runs.commands[i, :lasted])
+        inputs = [np.hstack([e[:, :2] / scales, e[:, 2:]]) for e in effects]
+        state = np.array([0.4, 0.0])
+        for k in range(lasted):
+            seen = [stage[k] for stage in inputs]
+            if form == "acceleration":
+                stages = iter([seen[0], seen[1], seen[1], seen[2]])
+
+                def slope(s, stages=stages):
+                    return np.array([s[1], program.run([[*s, *next(stages)]])[0, 0]])
+
+                state = rk4(slope, state, 0.1)
+            else:
+                change = program.run([[*state, *seen[1]]])[0]
+                state = change + (state if form == "increment" else 0.0)
+            np.testing.assert_allclose(runs.states[i, k + 1], state, rtol=1e-9, atol=1e-11)
+        assert lasted == steps
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [([], True, None, 1.0), ([2], True, None, 1.0), ([0], True, np.nan, 1.0), ([0], True, None, 0.0)],
+)
+def test_hidden_states_that_there_are_none_of_are_refused(rig, hidden):
+    program = _core.Program.parse(program_text(5, 2, 7, [["r5 = r2 + 0.0"]]))
+    with pytest.raises(ValueError, match="expected"):
+        _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2, [hidden])
+    with pytest.raises(ValueError, match="expected actuators"):
+        _core.Model(program, "absolute", rig, None, [([0], True, None, 1.0)])
+    with pytest.raises(ValueError, match="expected a program of 4 inputs"):
+        _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2)
 
 
 def test_actuators_that_act_at_once_are_none(rig, rig_family):
@@ -335,3 +425,45 @@ def test_parts_that_do_not_fit_the_model_are_refused(wrong):
     given = {"chains": CHAIN, "records": [flown(1)], "free": [0], "lags": [], **wrong}
     with pytest.raises(ValueError, match="expected"):
         _core.tune(lagging(-1.0, 1.0, 0.1), given.pop("chains"), given.pop("records"), iterations=1, **given)
+
+
+def test_the_time_of_a_hidden_state_is_tuned_with_the_constants():
+    truth = (-1.3, 2.0, -0.8, 0.6)
+    signals = _core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None])
+
+    def model(a, b, c, time):
+        lines = ["r3 = r0 * " + repr(a), "r4 = r1 * " + repr(b), "r3 = r3 + r4", "r4 = r2 * " + repr(c)]
+        text = program_text(3, 1, 5, [[*lines, "r3 = r3 + r4"]])
+        hidden = [([0], True, 0.0, time)]
+        return _core.Model(_core.Program.parse(text), "acceleration", signals, [(0.0, 0, None)], hidden)
+
+    stream, records, steps = np.random.default_rng(5), [], 160
+    for _ in range(2):
+        commands = np.repeat(stream.uniform(-2.0, 2.0, (steps // 10, 1)), 10, axis=0)
+        inputs = _core.command_effects([(0.0, 0, None)], [([0], True, 0.0, truth[3])], [1.0], DT, commands)
+        states = [np.array([0.5])]
+        for k in range(steps):
+            stages = iter([inputs[0][k], inputs[1][k], inputs[1][k], inputs[2][k]])
+
+            def slope(x, stages=stages):
+                return np.array([np.dot(truth[:3], [x[0], *next(stages)])])
+
+            states.append(rk4(slope, states[-1], DT))
+        readings = np.array(states) + np.sqrt(SENSOR) * stream.normal(size=(steps + 1, 1))
+        records.append((readings, np.ones_like(readings), commands))
+    tuned, left, readings, covariance, members = _core.tune(
+        model(-0.9, 1.5, -0.4, 0.3),
+        CHAIN,
+        records,
+        free=[0, 1, 2],
+        lags=[[1]],
+        iterations=30,
+        draws=300,
+        seed=3,
+    )
+    found = np.array([*tuned.constants, tuned.hidden[0][3]])
+    np.testing.assert_allclose(found, truth, rtol=0.03)
+    assert left == pytest.approx(readings, rel=0.2)
+    assert (np.abs(found - truth) < 4.0 * np.sqrt(np.diag(covariance))).all()
+    drawn = np.array([[*member.constants, member.hidden[0][3]] for member in members])
+    np.testing.assert_allclose(drawn.std(axis=0), np.sqrt(np.diag(covariance)), rtol=0.2)

@@ -10,6 +10,8 @@ _Floats = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 _Actuator = tuple[float, int, float | None]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
+_Hidden = tuple[Sequence[int], bool, float | None, float]
+"""Commands, whether their squares fill it, their mean at rest (scaled; None: of the first period), and time (s)."""
 _Motion = tuple[float, float, float]
 """Variance of a white disturbance, variance of a lasting one, time after which that is forgotten to 1/e (s)."""
 _Chain = tuple[Sequence[int], Sequence[float], _Motion, bool]
@@ -144,8 +146,14 @@ class Model:
     """A program with the form that makes it dynamics: "absolute", "increment" or "acceleration"."""
 
     def __new__(
-        cls, program: Program, form: str, signals: Signals, actuators: Sequence[_Actuator] | None = None
-    ) -> Model: ...
+        cls,
+        program: Program,
+        form: str,
+        signals: Signals,
+        actuators: Sequence[_Actuator] | None = None,
+        hidden: Sequence[_Hidden] = ...,
+    ) -> Model:
+        """A program of states, commands and hidden states; these need actuators, one a command."""
     @staticmethod
     def shape(form: str, signals: Signals) -> tuple[int, int]:
         """Inputs and outputs that a program must have for this form."""
@@ -155,12 +163,16 @@ class Model:
     def form(self) -> str: ...
     @property
     def actuators(self) -> list[_Actuator]:
-        """One a command; none at all where every command acts at once."""
+        """One a command; none at all where every command acts at once and nothing is hidden."""
+    @property
+    def hidden(self) -> list[_Hidden]:
+        """States that commands fill; inputs of the program after the commands."""
     @property
     def constants(self) -> _Floats:
         """Of the effective program, in its order."""
     def with_constants(self, constants: Sequence[float], lags: Sequence[float] | None) -> Model:
-        """The same model without introns, with other constants, and other lags unless None."""
+        """The same model without introns, with other constants, and, unless None, other lags and times of
+        hidden states."""
     def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats:
         """Next states (rows, n_x) of states (rows, n_x) and commands (rows, n_u)."""
 
@@ -371,8 +383,15 @@ def disagreements(
 ) -> tuple[_Floats, _Integers]:
     """log det(I + D Dᵀ) of each flight (K,), and where members are the furthest apart (K, 4)."""
 
-def command_effects(actuators: Sequence[_Actuator], dt: float, commands: ArrayLike) -> list[_Floats]:
-    """What arrives of commands (n, n_u) at the start, the middle and the end of each period, (n, n_u) each."""
+def command_effects(
+    actuators: Sequence[_Actuator],
+    hidden: Sequence[_Hidden],
+    scales: ArrayLike,
+    dt: float,
+    commands: ArrayLike,
+) -> list[_Floats]:
+    """What arrives of commands (n, n_u), then the states that they fill, at the start, the middle and the end of each
+    period, (n, n_u + hidden) each."""
 
 @final
 class Regression:

@@ -20,6 +20,7 @@ LINE_SECONDS = 5.0
 STEPS = {
     "noise": ("estimating the noise", 0.2),
     "actuators": ("searching lags and delays", 4.0),
+    "hidden": ("searching a hidden state", 1.0),
     "terms": ("selecting terms", 1.2),
     "evolution": ("growing terms", 0.7),
     "smoothed": ("selecting again, on smoothed states", 0.5),

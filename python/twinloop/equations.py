@@ -211,14 +211,16 @@ def equations(model: _core.Model, signals: Signals, digits: int = 6) -> str:
     if not 1 <= digits <= 17:
         raise InvalidInput(f"Equations, digits: expected 1 to 17, found {digits}; 17 are exact.")
     symbols = [_scaled(command.name, command.size, signals) for command in signals.commands]
-    graph, outputs = program_graph(model.program, [*signals.state_names, *symbols])
-    taken = set(signals.state_names) | set(symbols)
+    hidden = hidden_names(signals, len(model.hidden))
+    graph, outputs = program_graph(model.program, [*signals.state_names, *symbols, *hidden])
+    taken = {*signals.state_names, *symbols, *hidden}
     prefix = "t"
     while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in taken):
         prefix += "_"
     writer = Writer(graph, outputs, digits, prefix)
     body = [f"{name} = {writer.expression(node, define=True)}" for node, name in writer.names.items()]
     body += _states(model.form, signals, [writer.expression(output) for output in outputs])
+    body += [_filling(name, parts, symbols, writer) for name, parts in zip(hidden, model.hidden, strict=True)]
     legend = _legend(model.form, signals, symbols, writer) + _actuators(model, signals, writer)
     return "\n".join([*legend, "", *body])
 
@@ -288,6 +290,33 @@ def _actuators(model: _core.Model, signals: Signals, writer: Writer) -> list[str
         start = "the first command" if rest is None else writer.number(rest)
         lines.append(f"# {', '.join(names)}: act with {' and '.join(parts)}, from {start} at the start")
     return lines
+
+
+def hidden_names(signals: Signals, count: int) -> list[str]:
+    """Symbols of hidden states, none of which is a signal's.
+
+    Args:
+        signals: of the system.
+        count: how many there are.
+
+    Returns:
+        As many names.
+    """
+    prefix = "hidden"
+    while any(name.startswith(prefix) for name in signals.state_names + signals.command_names):
+        prefix += "_"
+    return [prefix if count == 1 else f"{prefix}_{number + 1}" for number in range(count)]
+
+
+def _filling(
+    name: str, parts: tuple[Sequence[int], bool, float | None, float], symbols: Sequence[str], writer: Writer
+) -> str:
+    """The equation of a hidden state that commands fill."""
+    commands, squared, rest, time = parts
+    given = " + ".join(f"{symbols[i]}²" if squared else symbols[i] for i in commands)
+    mean = f"({given}) / {len(commands)}" if len(commands) > 1 else given
+    still = "the same at the start" if rest is None else writer.number(rest)
+    return f"d {name} / dt = {mean} - {still} - {name} / {writer.number(time)}, from 0 at the start"
 
 
 def _scaled(name: str, size: float, signals: Signals) -> str:

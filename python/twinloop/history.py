@@ -103,6 +103,8 @@ class Lesson:
         sensors: standard deviation of each state's sensor, estimated, in its unit.
         lags: time constant of each command's actuator, s.
         delays: of each command's actuator, periods.
+        hidden: states that commands fill: which commands, whether with their squares, the mean at rest in units of
+            their scale (None: that of the first period), and the time in s after which 1/e is left.
         offsets: by how much later than those of the driven states each state's readings were taken from it, s.
         closed_loop: of the best model, one for each selected test, SI units squared.
         normalised: closed_loop over that of the model that never moves.
@@ -120,6 +122,7 @@ class Lesson:
     sensors: tuple[float, ...]
     lags: tuple[float, ...]
     delays: tuple[int, ...]
+    hidden: tuple[tuple[tuple[int, ...], bool, float | None, float], ...]
     offsets: tuple[float, ...]
     closed_loop: tuple[float, ...]
     normalised: tuple[float, ...]

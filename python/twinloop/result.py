@@ -170,6 +170,15 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
             {"name": command.name, "lag": lag, "delay": delay}
             for command, lag, delay in zip(campaign.signals.commands, lesson.lags, lesson.delays, strict=True)
         ],
+        "hidden": [
+            {
+                "commands": [campaign.signals.commands[i].name for i in commands],
+                "squared": squared,
+                "rest": rest,
+                "time": time,
+            }
+            for commands, squared, rest, time in lesson.hidden
+        ],
         "disturbances": _disturbances(campaign, twin),
         "remarks": list(lesson.remarks),
     }

@@ -187,6 +187,7 @@ def _states(result: Mapping[str, Any]) -> str:
         " standard\ndeviation, as estimated. A ratio of 1 is a twin that leaves the sensors' noise alone.",
         _disturbances(twin["disturbances"]),
         _actuators(twin["actuators"]),
+        *(_hidden(state) for state in twin["hidden"]),
         f"{twin['terms']} terms, {twin['committee']} models in the committee; χ² a reading {cell(twin['misfit'])}"
         f" (1: noise and disturbances explain what is left)\nover {twin['readings']} readings,"
         f" {twin['ignored']} ignored.",
@@ -221,6 +222,15 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
         late = f"delay {delay} period{'s' if delay != 1 else ''}" if delay else "no delay"
         words.append(f"{', '.join(names)}: {slow}, {late}")
     return f"Actuators: {'; '.join(words)}."
+
+
+def _hidden(state: Mapping[str, Any]) -> str:
+    """A state that no sensor reads, in words."""
+    what = "squares" if state["squared"] else "values"
+    return (
+        f"Hidden: the {what} of {', '.join(state['commands'])} fill a state that no sensor reads; it is forgotten to"
+        f" 1/e in {state['time']:.3g} s."
+    )
 
 
 def _identified_errors(result: Mapping[str, Any]) -> str:

@@ -1,6 +1,8 @@
-//! Actuators: what stands between a command and its effect, a delay and a first-order lag; a hidden state of a model.
+//! Actuation: what stands between commands and a model. Each command has an actuator with a delay and a first-order
+//! lag; hidden states that commands fill may follow.
 
 use crate::error::{Result, invalid};
+use crate::hidden::{Filling, Hidden};
 use crate::lanes::Vector;
 
 /// The way from one command to its effect.
@@ -38,38 +40,92 @@ impl Actuator {
     }
 }
 
-/// Whether commands act at once, so that a model has no hidden state.
-pub fn all_direct(actuators: &[Actuator]) -> bool {
-    actuators.iter().all(Actuator::is_direct)
+/// What a model sees of commands: their effects, then the states that they fill.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Actuation {
+    /// One a command, or none at all where every command acts at once and nothing is hidden.
+    pub actuators: Vec<Actuator>,
+    /// States that commands fill.
+    pub hidden: Vec<Hidden>,
+}
+
+impl Actuation {
+    /// Refuses parts that do not fit so many commands.
+    pub fn validated(self, commands: usize) -> Result<Self> {
+        if self.actuators.len() != commands {
+            return invalid(format!(
+                "actuators: expected one for each of {commands} commands, found {}",
+                self.actuators.len()
+            ));
+        }
+        let actuators = self.actuators.into_iter().map(Actuator::validated).collect::<Result<Vec<_>>>()?;
+        let hidden: Vec<_> =
+            self.hidden.into_iter().map(|hidden| hidden.validated(commands)).collect::<Result<_>>()?;
+        let direct = hidden.is_empty() && actuators.iter().all(Actuator::is_direct);
+        Ok(Self { actuators: if direct { vec![] } else { actuators }, hidden })
+    }
+
+    /// Whether a model sees commands as they are sent.
+    pub fn is_direct(&self) -> bool {
+        self.actuators.is_empty()
+    }
+
+    /// Lag of each actuator, then time of each hidden state, s.
+    pub fn times(&self) -> Vec<f64> {
+        let lags = self.actuators.iter().map(|actuator| actuator.lag);
+        lags.chain(self.hidden.iter().map(|hidden| hidden.time)).collect()
+    }
+
+    /// The same with other lags and times.
+    pub fn with_times(&self, times: &[f64]) -> Result<Self> {
+        if times.len() != self.actuators.len() + self.hidden.len() {
+            return invalid(format!(
+                "lags: expected {}, found {}",
+                self.actuators.len() + self.hidden.len(),
+                times.len()
+            ));
+        }
+        let mut other = self.clone();
+        let (lags, rest) = times.split_at(self.actuators.len());
+        other.actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
+        other.hidden.iter_mut().zip(rest).for_each(|(hidden, &time)| hidden.time = time);
+        if self.is_direct() { Ok(other) } else { other.validated(self.actuators.len()) }
+    }
 }
 
 /// What the actuators of a run hold, and what they pass on in the current period.
 pub struct Line<V> {
     actuators: Vec<Actuator>,
+    hidden: Vec<Filling<V>>,
+    factors: Vec<f64>,
     /// e^(−dt / 2 lag) of each command.
     halves: Vec<V>,
     memory: Vec<V>,
     /// Commands on their way, the oldest first, for each command.
     queues: Vec<Vec<V>>,
-    /// Effect at the start, the middle and the end of the period.
+    /// Effect of each command, then each hidden state, at the start, the middle and the end of the period.
     pub effects: [Vec<V>; 3],
     started: bool,
 }
 
 impl<V: Vector> Line<V> {
-    /// Actuators at the start of a run. `lags` (n_u lanes) stand in for those of the actuators, where they are given.
-    pub fn new(actuators: &[Actuator], dt: f64, lags: Option<&[V]>) -> Self {
-        let halves = actuators.iter().enumerate().map(|(i, actuator)| match lags {
-            Some(lags) => lags[i].map(|lag| decay(lag, dt)),
-            None => V::splat(decay(actuator.lag, dt)),
-        });
-        let zeros = || vec![V::splat(0.0); actuators.len()];
+    /// Actuation at the start of a run, of commands in units of 1 / `factors`. `times` (lanes) stand in for its own,
+    /// where they are given.
+    pub fn new(actuation: &Actuation, factors: &[f64], dt: f64, times: Option<&[V]>) -> Self {
+        let Actuation { actuators, hidden } = actuation;
+        let own = actuation.times();
+        let time = |i: usize| times.map_or_else(|| V::splat(own[i]), |times| times[i]);
+        let commands = actuators.len();
+        let zeros = |size: usize| vec![V::splat(0.0); size];
+        let effects = || zeros(commands + hidden.len());
         Self {
-            halves: halves.collect(),
-            memory: zeros(),
+            halves: (0..commands).map(|i| time(i).map(|lag| decay(lag, dt))).collect(),
+            memory: zeros(commands),
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
-            effects: [zeros(), zeros(), zeros()],
-            actuators: actuators.to_vec(),
+            effects: [effects(), effects(), effects()],
+            hidden: (0..hidden.len()).map(|j| Filling::new(&hidden[j], dt, time(commands + j))).collect(),
+            factors: factors.to_vec(),
+            actuators: actuators.clone(),
             started: false,
         }
     }
@@ -102,6 +158,12 @@ impl<V: Vector> Line<V> {
             }
             self.memory[i] = end;
         }
+        for (place, hidden) in (command.len()..).zip(&mut self.hidden) {
+            let values = hidden.pass(command, &self.factors);
+            for (effects, value) in self.effects.iter_mut().zip(values) {
+                effects[place] = value;
+            }
+        }
         self.started = true;
     }
 }
@@ -111,12 +173,13 @@ fn decay(lag: f64, dt: f64) -> f64 {
     if lag > 0.0 { libm::exp(-0.5 * dt / lag) } else { 0.0 }
 }
 
-/// Effects of recorded commands (n × n_u) at the start, the middle and the end of each period (n × n_u each).
-pub fn effects(actuators: &[Actuator], dt: f64, commands: &[f64]) -> [Vec<f64>; 3] {
+/// Effects of recorded commands (n × n_u), then the states that they fill, at the start, the middle and the end of each
+/// period (n × (n_u + hidden) each). Every command has its actuator.
+pub fn effects(actuation: &Actuation, factors: &[f64], dt: f64, commands: &[f64]) -> [Vec<f64>; 3] {
     use crate::lanes::Scalar;
-    let mut line = Line::<Scalar>::new(actuators, dt, None);
+    let mut line = Line::<Scalar>::new(actuation, factors, dt, None);
     let mut out = [vec![], vec![], vec![]];
-    for command in commands.chunks_exact(actuators.len().max(1)) {
+    for command in commands.chunks_exact(actuation.actuators.len().max(1)) {
         line.pass(&command.iter().map(|&value| Scalar::splat(value)).collect::<Vec<_>>());
         for (out, effects) in out.iter_mut().zip(&line.effects) {
             out.extend(effects.iter().map(|value| value.lane(0)));
@@ -129,11 +192,15 @@ pub fn effects(actuators: &[Actuator], dt: f64, commands: &[f64]) -> [Vec<f64>; 
 mod tests {
     use super::*;
 
+    fn of(actuator: Actuator) -> Actuation {
+        Actuation { actuators: vec![actuator], hidden: vec![] }
+    }
+
     #[test]
     fn a_step_rises_as_one_minus_an_exponential() {
         let (lag, dt) = (0.05, 0.02);
         let actuator = Actuator { lag, delay: 0, rest: Some(1.0) };
-        let [start, middle, end] = effects(&[actuator], dt, &[3.0; 20]);
+        let [start, middle, end] = effects(&of(actuator), &[1.0], dt, &[3.0; 20]);
         for k in 0..20 {
             let expected = |t: f64| 3.0 - 2.0 * (-t / lag).exp();
             let t = k as f64 * dt;
@@ -146,11 +213,54 @@ mod tests {
     #[test]
     fn a_delay_shifts_commands_by_whole_periods_and_nothing_is_direct() {
         let commands: Vec<f64> = (0..10).map(f64::from).collect();
-        let [start, _, end] = effects(&[Actuator { lag: 0.0, delay: 3, rest: Some(-1.0) }], 0.1, &commands);
+        let [start, _, end] =
+            effects(&of(Actuator { lag: 0.0, delay: 3, rest: Some(-1.0) }), &[1.0], 0.1, &commands);
         let expected = [-1.0, -1.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         assert_eq!(start, expected);
         assert_eq!(end, expected);
-        let [start, middle, end] = effects(&[Actuator::DIRECT], 0.1, &commands);
+        let [start, middle, end] = effects(&of(Actuator::DIRECT), &[1.0], 0.1, &commands);
         assert!(start == commands && middle == commands && end == commands);
+    }
+
+    #[test]
+    fn a_hidden_state_fills_and_fades_as_its_equation_says() {
+        let (time, dt, scale) = (0.3, 0.02, 2.0);
+        for squared in [false, true] {
+            let hidden = Hidden { commands: vec![0, 1], squared, rest: Some(0.25), time };
+            let actuation = Actuation { actuators: vec![Actuator::DIRECT; 2], hidden: vec![hidden] };
+            // Ten periods of 3 and 1, then ten at rest.
+            let (full, rest): (f64, f64) = if squared { (1.25, 0.5) } else { (1.0, 0.25) };
+            let still = scale * if squared { rest } else { 0.25 };
+            let commands: Vec<f64> =
+                (0..20).flat_map(|k| if k < 10 { [3.0, 1.0] } else { [still, still] }).collect();
+            let [start, middle, end] = effects(&actuation, &[1.0 / scale; 2], dt, &commands);
+            let exact = |t: f64| {
+                let filled = |t: f64| (full - 0.25) * time * (1.0 - (-t / time).exp());
+                if t <= 0.2 { filled(t) } else { filled(0.2) * (-(t - 0.2) / time).exp() }
+            };
+            for k in 0..20 {
+                let t = k as f64 * dt;
+                assert!((start[3 * k + 2] - exact(t)).abs() < 1e-12);
+                assert!((middle[3 * k + 2] - exact(t + 0.5 * dt)).abs() < 1e-12);
+                assert!((end[3 * k + 2] - exact(t + dt)).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn parts_that_fit_no_commands_are_refused() {
+        let hidden = |commands: Vec<usize>, time: f64| Hidden { commands, squared: true, rest: None, time };
+        for wrong in
+            [hidden(vec![], 1.0), hidden(vec![1], 1.0), hidden(vec![0], 0.0), hidden(vec![0], f64::NAN)]
+        {
+            let actuation = Actuation { actuators: vec![Actuator::DIRECT], hidden: vec![wrong] };
+            assert!(actuation.validated(1).is_err());
+        }
+        let direct = of(Actuator::DIRECT).validated(1).unwrap();
+        assert!(direct.is_direct() && direct.times().is_empty());
+        let right = Actuation { actuators: vec![Actuator::DIRECT], hidden: vec![hidden(vec![0], 1.0)] };
+        let right = right.validated(1).unwrap();
+        assert_eq!(right.with_times(&[0.0, 2.0]).unwrap().times(), [0.0, 2.0]);
+        assert!(right.with_times(&[0.0]).is_err());
     }
 }

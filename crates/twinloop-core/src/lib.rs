@@ -7,6 +7,7 @@ mod dynamics;
 mod error;
 mod evolution;
 mod flights;
+mod hidden;
 mod integrator;
 mod lanes;
 mod lgp;
@@ -27,7 +28,7 @@ mod trajectory;
 mod tuning;
 mod workers;
 
-pub use actuators::{Actuator, effects};
+pub use actuators::{Actuation, Actuator, effects};
 pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid, StateFeedback};
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};
@@ -35,6 +36,7 @@ pub use evolution::{Problem, Search, Variation};
 pub use flights::{
     Candidate, Disagreement, Draws, Envelope, Flights, Judged, Quality, QualityKind, disagreements, qualities,
 };
+pub use hidden::Hidden;
 pub use integrator::{Field, Stages, rk4};
 pub use lanes::{Isa, Kernel, Piece, Scalar, Vector, Wide, Width, dispatch};
 pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::str::FromStr;
 
-use crate::actuators::{Actuator, Line, all_direct};
+use crate::actuators::{Actuation, Line};
 use crate::dynamics::Dynamics;
 use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
@@ -35,7 +35,7 @@ impl Form {
         }
     }
 
-    /// Inputs (states, then commands) and outputs that a program must have.
+    /// Inputs (states, then commands) and outputs that a program must have where nothing is hidden.
     pub fn shape(self, signals: &Signals) -> (usize, usize) {
         let outputs = match self {
             Self::Absolute | Self::Increment => signals.states(),
@@ -73,11 +73,13 @@ enum Slope {
 pub struct Frame {
     form: Form,
     dt: f64,
-    command_factors: Vec<f64>,
+    /// Commands of the signals.
+    commands: usize,
+    /// What the inputs of a program after the states are multiplied by: commands, then hidden states.
+    factors: Vec<f64>,
     slopes: Vec<Slope>,
     body: Option<RigidBody>,
-    /// One a command, or none at all where every command acts at once.
-    actuators: Vec<Actuator>,
+    actuation: Actuation,
 }
 
 impl Frame {
@@ -95,27 +97,23 @@ impl Frame {
             }
         });
         let slopes = slopes.collect();
-        let command_factors = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
-        Self { form, dt: signals.dt, command_factors, slopes, body: signals.kinematics, actuators: vec![] }
+        let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
+        let (commands, actuation) = (factors.len(), Actuation::default());
+        Self { form, dt: signals.dt, commands, factors, slopes, body: signals.kinematics, actuation }
     }
 
-    /// The same with actuators, one a command.
-    pub fn with_actuators(self, actuators: Vec<Actuator>) -> Result<Self> {
-        if actuators.len() != self.command_factors.len() {
-            return invalid(format!(
-                "actuators: expected one for each of {} commands, found {}",
-                self.command_factors.len(),
-                actuators.len()
-            ));
-        }
-        let actuators = actuators.into_iter().map(Actuator::validated).collect::<Result<Vec<_>>>()?;
-        let actuators = if all_direct(&actuators) { vec![] } else { actuators };
-        Ok(Self { actuators, ..self })
+    /// The same with something between commands and model, an actuator for each command.
+    pub fn with_actuation(self, actuation: Actuation) -> Result<Self> {
+        let actuation = actuation.validated(self.commands)?;
+        let mut factors = self.factors;
+        // Hidden states are made of commands in units of their scales.
+        factors.resize(self.commands + actuation.hidden.len(), 1.0);
+        Ok(Self { actuation, factors, ..self })
     }
 
-    /// The actuators, one a command; empty where every command acts at once.
-    pub fn actuators(&self) -> &[Actuator] {
-        &self.actuators
+    /// What stands between commands and model.
+    pub fn actuation(&self) -> &Actuation {
+        &self.actuation
     }
 
     /// What the outputs mean.
@@ -126,7 +124,10 @@ impl Frame {
     /// Whether these signals have the states, commands, period and derivatives of the frame.
     pub fn fits(&self, signals: &Signals) -> bool {
         let plain = Self::new(self.form, signals);
-        *self == Self { actuators: self.actuators.clone(), ..plain }
+        self.commands == plain.commands
+            && *self
+                == Self { actuation: self.actuation.clone(), factors: self.factors.clone(), ..plain.clone() }
+            && self.factors[..plain.commands] == plain.factors
     }
 
     fn states(&self) -> usize {
@@ -134,7 +135,7 @@ impl Frame {
     }
 
     pub(crate) fn commands(&self) -> usize {
-        self.command_factors.len()
+        self.commands
     }
 }
 
@@ -148,9 +149,10 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// Refuses a program whose inputs and outputs do not fit the form.
-    pub fn check(program: &Program, form: Form, signals: &Signals) -> Result<()> {
+    /// Refuses a program whose inputs and outputs do not fit the form, with so many hidden states after the commands.
+    pub fn check(program: &Program, form: Form, signals: &Signals, hidden: usize) -> Result<()> {
         let (inputs, outputs) = form.shape(signals);
+        let inputs = inputs + hidden;
         let shape = program.shape();
         if (shape.inputs, shape.outputs) != (inputs, outputs) {
             return invalid(format!(
@@ -172,8 +174,8 @@ impl<'a> Model<'a> {
         state: &[f64],
         command: &[f64],
     ) -> Cow<'w, [V]> {
-        if self.frame.form == Form::Absolute && self.frame.actuators.is_empty() {
-            let inputs = Interleaved { state, command, factors: &self.frame.command_factors };
+        if self.frame.form == Form::Absolute && self.frame.actuation.is_direct() {
+            let inputs = Interleaved { state, command, factors: &self.frame.factors };
             return Cow::Borrowed(self.code.run(&mut workspace.bank, &inputs));
         }
         let mut state = vectors(state);
@@ -184,11 +186,11 @@ impl<'a> Model<'a> {
     /// The code's outputs at a state, under a command.
     #[inline(always)]
     fn outputs<'b, V: Vector>(&self, bank: &'b mut Bank<V>, state: &[V], command: &[V]) -> &'b [V] {
-        self.code.run(bank, &StateAndCommand { state, command, factors: &self.frame.command_factors })
+        self.code.run(bank, &StateAndCommand { state, command, factors: &self.frame.factors })
     }
 }
 
-/// The inputs of a model's program: states, then commands in units of their scale.
+/// The inputs of a model's program: states, commands in units of their scale, then hidden states.
 struct StateAndCommand<'a, V> {
     state: &'a [V],
     command: &'a [V],
@@ -232,14 +234,18 @@ pub struct ModelWorkspace<V: Vector> {
 
 impl<'a> Model<'a> {
     /// A workspace whose lanes are models of their own: constants of the code (each on lanes, in the code's order), and
-    /// lags of the actuators.
-    pub(crate) fn variants<V: Vector>(&self, constants: &[V], lags: &[V]) -> ModelWorkspace<V> {
-        let Frame { actuators, dt, .. } = self.frame;
+    /// times of the actuation.
+    pub(crate) fn variants<V: Vector>(&self, constants: &[V], times: &[V]) -> ModelWorkspace<V> {
         ModelWorkspace {
             bank: self.code.bank_of(constants),
             stages: Stages::new(self.integrated()),
-            line: (!actuators.is_empty()).then(|| Line::new(actuators, *dt, Some(lags))),
+            line: self.line(Some(times)),
         }
+    }
+
+    fn line<V: Vector>(&self, times: Option<&[V]>) -> Option<Line<V>> {
+        let Frame { actuation, factors, dt, .. } = self.frame;
+        (!actuation.is_direct()).then(|| Line::new(actuation, factors, *dt, times))
     }
 
     fn integrated(&self) -> usize {
@@ -251,11 +257,10 @@ impl Dynamics for Model<'_> {
     type Workspace<V: Vector> = ModelWorkspace<V>;
 
     fn workspace<V: Vector>(&self) -> ModelWorkspace<V> {
-        let Frame { actuators, dt, .. } = self.frame;
         ModelWorkspace {
             bank: self.code.bank(),
             stages: Stages::new(self.integrated()),
-            line: (!actuators.is_empty()).then(|| Line::new(actuators, *dt, None)),
+            line: self.line(None),
         }
     }
 

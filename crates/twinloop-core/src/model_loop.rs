@@ -91,7 +91,7 @@ impl ModelSearch {
         let (grammar, variation) = (grammar.validated()?, variation.validated()?);
         let frame = Frame::new(form, selected.signals());
         let empty = Program::new(grammar.shape, vec![])?;
-        Model::check(&empty, form, selected.signals())?;
+        Model::check(&empty, form, selected.signals(), 0)?;
         let problem = Models { grammar: &grammar, frame: &frame, selected };
         let search = Search::start(&problem, &variation, seed, 1, workers);
         Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), variation })

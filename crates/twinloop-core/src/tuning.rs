@@ -1,4 +1,4 @@
-//! Tuning: moves a model's constants, and the lags of its actuators, until its predictions leave white noise only.
+//! Tuning: moves a model's constants, and the times of its actuation, until its predictions leave white noise only.
 //!
 //! A prediction-error method with an observer of fixed gains (Ljung 1999, chapter 7). With little process noise the
 //! gains fade and it is an output-error fit over whole runs; with much of it they stay and it is one of single steps.
@@ -49,7 +49,8 @@ pub struct Tuning<'a> {
     pub limits: &'a [f64],
     /// Constants of the code that may move.
     pub free: &'a [usize],
-    /// Groups of commands whose lag is one number that may move.
+    /// Groups of lags, and of times of hidden states, that are one number which may move: commands by number, then
+    /// hidden states.
     pub lags: &'a [Vec<usize>],
 }
 
@@ -58,7 +59,7 @@ pub struct Tuning<'a> {
 pub struct Tuned {
     /// All constants of the code.
     pub constants: Vec<f64>,
-    /// Lag of every command, s.
+    /// Lag of every command, then time of every hidden state, s.
     pub lags: Vec<f64>,
     /// Sum of squares of the whitened prediction errors, χ²; infinite if the model diverges on the runs.
     pub left: f64,
@@ -99,8 +100,7 @@ impl Tuning<'_> {
                     && observed.noise.sensors.len() == observed.chain.states
             })
             && self.free.iter().all(|&c| c < self.code.constants().len())
-            && self.lags.iter().flatten().all(|&command| command < commands)
-            && (self.lags.is_empty() || self.frame.actuators().len() == commands)
+            && self.lags.iter().flatten().all(|&place| place < self.frame.actuation().times().len())
             && self.records.iter().all(|record| {
                 let steps = record.commands.len() / commands;
                 record.commands.len() == steps * commands
@@ -216,10 +216,7 @@ impl Tuning<'_> {
     }
 
     fn start(&self) -> Variant {
-        Variant {
-            constants: self.code.constants().to_vec(),
-            lags: self.frame.actuators().iter().map(|actuator| actuator.lag).collect(),
-        }
+        Variant { constants: self.code.constants().to_vec(), lags: self.frame.actuation().times() }
     }
 
     fn size(&self) -> usize {

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Actuator, Form, Frame, Learnt, Model, RigidBody, Signals, effects, step_rows};
+use twinloop_core::{
+    Actuation, Actuator, Form, Frame, Hidden, Learnt, Model, RigidBody, Signals, effects, step_rows,
+};
 
 use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector, views};
 use crate::error::{Result, misuse};
@@ -54,18 +56,15 @@ impl PyModel {
         Self { learnt, frame, signals }
     }
 
-    /// The same model without introns, with these constants and lags.
+    /// The same model without introns, with these constants, lags and times of hidden states.
     pub fn varied(&self, constants: &[f64], lags: &[f64]) -> Result<PyModel> {
         let program = self.learnt.program.effective().with_constants(constants)?;
-        let mut actuators = self.frame.actuators().to_vec();
-        if actuators.len() != lags.len() {
-            return Err(misuse(format!("lags: expected {}, found {}", actuators.len(), lags.len())));
-        }
-        actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
-        let frame = if actuators.is_empty() {
+        let actuation = self.frame.actuation();
+        let other = actuation.with_times(lags)?;
+        let frame = if actuation.is_direct() {
             self.frame.clone()
         } else {
-            Arc::new((*self.frame).clone().with_actuators(actuators)?)
+            Arc::new((*self.frame).clone().with_actuation(other)?)
         };
         Ok(PyModel::of(Arc::new(Learnt::new(program)), frame, self.signals().clone()))
     }
@@ -84,26 +83,36 @@ impl PyModel {
 #[pymethods]
 impl PyModel {
     #[new]
-    #[pyo3(signature = (program, form, signals, actuators = None))]
+    #[pyo3(signature = (program, form, signals, actuators = None, hidden = vec![]))]
     fn new(
         program: &PyProgram,
         form: &str,
         signals: &PySignals,
-        actuators: Option<Vec<(f64, usize, Option<f64>)>>,
+        actuators: Option<Vec<ActuatorParts>>,
+        hidden: Vec<HiddenParts>,
     ) -> Result<Self> {
         let form: Form = form.parse()?;
-        Model::check(&program.0.program, form, &signals.0)?;
+        Model::check(&program.0.program, form, &signals.0, hidden.len())?;
         let mut frame = Frame::new(form, &signals.0);
         if let Some(actuators) = actuators {
-            frame = frame.with_actuators(actuators.into_iter().map(actuator).collect())?;
+            frame = frame.with_actuation(actuation(actuators, hidden))?;
+        } else if !hidden.is_empty() {
+            return Err(misuse("model: expected actuators with hidden states, found none".into()));
         }
         Ok(Self::of(program.0.clone(), Arc::new(frame), signals.0.clone()))
     }
 
-    /// (lag, delay, rest) of each command's actuator; empty where every command acts at once.
+    /// (lag, delay, rest) of each command's actuator; empty where every command acts at once and nothing is hidden.
     #[getter]
-    fn actuators(&self) -> Vec<(f64, usize, Option<f64>)> {
-        self.frame.actuators().iter().map(|a| (a.lag, a.delay, a.rest)).collect()
+    fn actuators(&self) -> Vec<ActuatorParts> {
+        self.frame.actuation().actuators.iter().map(|a| (a.lag, a.delay, a.rest)).collect()
+    }
+
+    /// (commands, squared, rest, time) of each hidden state.
+    #[getter]
+    fn hidden(&self) -> Vec<HiddenParts> {
+        let parts = |h: &Hidden| (h.commands.clone(), h.squared, h.rest, h.time);
+        self.frame.actuation().hidden.iter().map(parts).collect()
     }
 
     #[staticmethod]
@@ -122,10 +131,9 @@ impl PyModel {
         to_vector(py, self.learnt.code.constants().to_vec())
     }
 
-    /// The same model without introns, with other constants and other lags (none: the same).
+    /// The same model without introns, with other constants, and other lags and times of hidden states (none: the same).
     fn with_constants(&self, constants: Vec<f64>, lags: Option<Vec<f64>>) -> Result<PyModel> {
-        let kept = || self.frame.actuators().iter().map(|actuator| actuator.lag).collect();
-        self.varied(&constants, &lags.unwrap_or_else(kept))
+        self.varied(&constants, &lags.unwrap_or_else(|| self.frame.actuation().times()))
     }
 
     #[getter]
@@ -150,23 +158,43 @@ impl PyModel {
     }
 }
 
-fn actuator((lag, delay, rest): (f64, usize, Option<f64>)) -> Actuator {
-    Actuator { lag, delay, rest }
+/// Lag, delay, rest.
+type ActuatorParts = (f64, usize, Option<f64>);
+/// Commands, whether squared, rest, time.
+type HiddenParts = (Vec<usize>, bool, Option<f64>, f64);
+
+fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Actuation {
+    let actuator = |(lag, delay, rest)| Actuator { lag, delay, rest };
+    let filled = |(commands, squared, rest, time)| Hidden { commands, squared, rest, time };
+    Actuation {
+        actuators: actuators.into_iter().map(actuator).collect(),
+        hidden: hidden.into_iter().map(filled).collect(),
+    }
 }
 
-/// Effects of commands (n, n_u) behind actuators (lag, delay, rest) at the start, the middle and the end of each period.
+/// Effects of commands (n, n_u) in their units behind actuators (lag, delay, rest), then the hidden states that they
+/// fill (commands, squared, rest, time), at the start, the middle and the end of each period.
 #[pyfunction]
 pub fn command_effects<'py>(
     py: Python<'py>,
-    actuators: Vec<(f64, usize, Option<f64>)>,
+    actuators: Vec<ActuatorParts>,
+    hidden: Vec<HiddenParts>,
+    scales: Vector<'_>,
     dt: f64,
     commands: Matrix<'py>,
 ) -> Result<[Bound<'py, PyArray2<f64>>; 3]> {
-    let columns = actuators.len();
-    let commands = rows("commands", &commands, columns)?.concat();
-    let actuators: Vec<_> =
-        actuators.into_iter().map(|a| actuator(a).validated()).collect::<std::result::Result<_, _>>()?;
-    Ok(effects(&actuators, dt, &commands).map(|values| to_matrix(py, columns, values)))
+    let n_u = actuators.len();
+    let commands = rows("commands", &commands, n_u)?.concat();
+    let factors: Vec<f64> = vector(&scales).iter().map(|scale| 1.0 / scale).collect();
+    if factors.len() != n_u {
+        return Err(misuse(format!("scales: expected {n_u}, found {}", factors.len())));
+    }
+    let asked = actuation(actuators, hidden);
+    let all = asked.actuators.clone();
+    // Actuators that all act at once are kept: here they only pass commands on.
+    let checked = Actuation { actuators: all, ..asked.validated(n_u)? };
+    let columns = n_u + checked.hidden.len();
+    Ok(effects(&checked, &factors, dt, &commands).map(|values| to_matrix(py, columns, values)))
 }
 
 /// Refuses states and commands of different numbers of rows.

@@ -1,86 +1,51 @@
-"""Lag and delay of the actuators: hidden states that are searched on a grid by description length, then tuned."""
+"""What stands between commands and a model: actuators that lag, and hidden states that commands fill."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-from twinloop.arrays import Floats
-from twinloop.identification.records import Actuator
-from twinloop.identification.structure import Sum
+from twinloop import _core
 from twinloop.signals import Signals
 
-LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
-"""Time constants that are tried, in periods."""
-DELAYS = (0, 1, 2, 3)
-"""Delays that are tried, in periods."""
-PRICE = 12.0
-"""What a hidden state must gain in description length: its number, and the choice of having one."""
+Actuator = tuple[float, int, "float | None"]
+"""(lag in s, delay in periods, command whose effect is there at the start or None for the first)."""
+Hidden = tuple[Sequence[int], bool, "float | None", float]
+"""(commands that fill it, whether with their squares, their mean at rest or None for the first, time in s)."""
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What a model sees of commands: their effects, then the states that they fill.
+
+    Args:
+        actuators: one a command.
+        hidden: states h with dh/dt = mean over their commands, or their squares, − the mean at rest − h / time.
+    """
+
+    actuators: tuple[Actuator, ...]
+    hidden: tuple[Hidden, ...] = ()
+
+    @staticmethod
+    def direct(signals: Signals) -> Actuation:
+        """Commands that act at once."""
+        return Actuation(((0.0, 0, None),) * signals.n_u)
+
+    @staticmethod
+    def of(model: _core.Model, signals: Signals) -> Actuation:
+        """That of a model, with an actuator for each command even where all act at once."""
+        if not model.actuators:
+            return Actuation.direct(signals)
+        return Actuation(tuple(model.actuators), tuple(model.hidden))
+
+    def bare(self) -> Actuation:
+        """The same without hidden states."""
+        return replace(self, hidden=())
 
 
 def groups(signals: Signals) -> list[list[int]]:
-    """Commands that are alike, by unit and bounds; they share a lag and a delay."""
+    """Commands that are alike, by unit and bounds; they share a lag and a delay, and fill hidden states together."""
     found: dict[tuple[object, ...], list[int]] = {}
     for i, command in enumerate(signals.commands):
         found.setdefault((command.unit, command.bounds, command.size), []).append(i)
     return list(found.values())
-
-
-def search_actuators(
-    signals: Signals,
-    rests: Sequence[Floats | None],
-    judge: Callable[[list[Actuator]], list[Sum]],
-    longest: int,
-) -> tuple[list[Actuator], list[Sum]]:
-    """Tries lags and delays of each group of commands, one group after another.
-
-    Args:
-        signals: of the system.
-        rests: commands whose effect may be there at the start (n_u,); None: the first command.
-        judge: finds the sums under given actuators.
-        longest: delay at most, periods.
-
-    Returns:
-        The actuators of the shortest description, and the sums under them.
-    """
-    best: list[Actuator] = [(0.0, 0, None)] * signals.n_u
-    sums = judge(best)
-    energy = total(sums)
-    for group in groups(signals):
-        for delay in (d for d in DELAYS if d <= longest):
-            rising = 0
-            for lag in LAGS:
-                if lag == 0.0 and delay == 0:
-                    continue
-                score, tried, found = min(
-                    (_tried(signals, best, group, lag, delay, rest, judge) for rest in rests),
-                    key=lambda answer: answer[0],
-                )
-                if score + PRICE < energy:
-                    best, sums, energy, rising = tried, found, score + PRICE, 0
-                else:
-                    rising += 1
-                # Past the best lag the fit only gets worse.
-                if rising >= 2:
-                    break
-    return best, sums
-
-
-def _tried(
-    signals: Signals,
-    base: Sequence[Actuator],
-    group: Sequence[int],
-    lag: float,
-    delay: int,
-    rest: Floats | None,
-    judge: Callable[[list[Actuator]], list[Sum]],
-) -> tuple[float, list[Actuator], list[Sum]]:
-    tried = list(base)
-    for i in group:
-        tried[i] = (lag * signals.dt, delay, None if rest is None else float(rest[i]))
-    found = judge(tried)
-    return total(found), tried, found
-
-
-def total(sums: Sequence[Sum]) -> float:
-    """Description length of all sums."""
-    return sum(found.energy for found in sums)

@@ -68,7 +68,7 @@ def committee(
             else:
                 weights = dict(zip(terms, solved[0].tolist(), strict=True))
                 varied.append(replace(found, weights=weights))
-        model = fitting.model(varied, fitting.lags_of(best))
+        model = fitting.model(varied, fitting.actuation(best))
         _, left, _, _, drawn = fitting.tune(model, varied, observer, 4, 1, unit=attempt + 1)
         if np.isfinite(left) and left <= plausible and drawn:
             members.append(drawn[0])

@@ -10,13 +10,13 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
-from twinloop.identification.actuation import groups
+from twinloop.identification.actuation import Actuation, groups
 from twinloop.identification.bounds import Limits, bounded_model, excludes_zero
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
-from twinloop.identification.records import Actuator, Run, direct
+from twinloop.identification.records import Run
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Sum, Weights
+from twinloop.identification.structure import Sum, Weights, total
 from twinloop.identification.told import Told
 from twinloop.signals import Bounds, Signals
 
@@ -38,6 +38,11 @@ class Tuned:
     left: float
     readings: int
     covariance: Floats
+
+
+def described(tuned: Tuned) -> float:
+    """Description length of a tuned model; infinite where it diverges on its own runs."""
+    return total(tuned.sums) if np.isfinite(tuned.left) else float("inf")
 
 
 class Fitting:
@@ -77,27 +82,27 @@ class Fitting:
         self.iteration = iteration
         self.workers = workers
 
-    def tuned(self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator]) -> Tuned:
+    def tuned(self, sums: Sequence[Sum], given: Sequence[Chain], actuation: Actuation) -> Tuned:
         """The model of the sums with its constants tuned, and without terms that tuning has shown to be nothing."""
-        tuned = self._fitted(sums, given, actuators)
+        tuned = self._fitted(sums, given, actuation)
         if not np.isfinite(tuned.left) or not self.options.tuning:
             return tuned
         errors = self._predictions(tuned.model, tuned.observer)
         if errors is not None and self._ignore_outliers([e for e, _ in errors]):
-            tuned = self._fitted(tuned.sums, given, self.lags_of(tuned.model))
+            tuned = self._fitted(tuned.sums, given, self.actuation(tuned.model))
         for _ in range(PRUNINGS if self.form != "absolute" else 0):
             kept, saved = self._without_weak(tuned)
             if saved == 0.0:
                 break
-            other = self._fitted(kept, given, self.lags_of(tuned.model))
+            other = self._fitted(kept, given, self.actuation(tuned.model))
             if not other.left - tuned.left < saved:
                 break
             tuned = other
         return tuned
 
-    def _fitted(self, sums: Sequence[Sum], given: Sequence[Chain], actuators: Sequence[Actuator]) -> Tuned:
+    def _fitted(self, sums: Sequence[Sum], given: Sequence[Chain], actuation: Actuation) -> Tuned:
         observer = [*(found.chain for found in sums), *given]
-        model = self.model(sums, actuators)
+        model = self.model(sums, actuation)
         tuned, left, readings, covariance, _ = self.tune(model, sums, observer, self.options.tuning_steps, 0)
         if not np.isfinite(left):
             # Held to its readings at every step it cannot run away; from there it may be let go.
@@ -192,15 +197,17 @@ class Fitting:
             kept.append(replace(found, weights=weights or dict(found.weights)))
         return kept, float(saved)
 
-    def model(self, sums: Sequence[Sum], actuators: Sequence[Actuator]) -> _core.Model:
-        """The model whose outputs are sums, behind actuators."""
+    def model(self, sums: Sequence[Sum], actuation: Actuation) -> _core.Model:
+        """The model whose outputs are sums, behind an actuation; without hidden states that no sum uses."""
+        if not any(self.pool.is_hidden(term) for found in sums for term in found.weights):
+            actuation = actuation.bare()
         outputs = [dict.fromkeys(self._fixed(found), 1.0) | found.weights for found in sums]
         if self.form == "absolute":
             for i, terms in enumerate(outputs):
                 terms[i] = terms.get(i, 0.0) + 1.0
-        program = self.pool.program(outputs)
+        program = self.pool.program(outputs, len(actuation.hidden))
         with engine_input():
-            return _core.Model(program, self.form, self.signals.engine, list(actuators))
+            return _core.Model(program, self.form, self.signals.engine, actuation.actuators, actuation.hidden)
 
     def tune(
         self,
@@ -225,7 +232,9 @@ class Fitting:
             The tuned model, its χ², the readings that counted, the covariance of its constants and lags, the draws.
         """
         free = list(range(len(model.constants))) if self.form == "absolute" else self._layout(sums)[0]
-        lags = [g for g in groups(self.signals) if self.lags_of(model)[g[0]][0] > 0.0]
+        actuation = self.actuation(model)
+        lags = [group for group in groups(self.signals) if actuation.actuators[group[0]][0] > 0.0]
+        lags += [[self.signals.n_u + j] for j in range(len(actuation.hidden))]
         limits = self._limits(sums) if self.options.tuning else {}
         # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
         start = model.constants.tolist()
@@ -267,9 +276,9 @@ class Fitting:
                 workers=self.workers,
             )
 
-    def lags_of(self, model: _core.Model) -> list[Actuator]:
-        """Actuators of a model, one a command even where all act at once."""
-        return list(model.actuators) or direct(self.signals)
+    def actuation(self, model: _core.Model) -> Actuation:
+        """What stands between commands and a model, an actuator for each command even where all act at once."""
+        return Actuation.of(model, self.signals)
 
     def smooth(self, model: _core.Model, observer: Sequence[Chain]) -> bool:
         """Takes the states that the model's observer believes for those that the features are made of."""

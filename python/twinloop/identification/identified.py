@@ -8,9 +8,9 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
-from twinloop.identification.records import Actuator
 from twinloop.identification.structure import Sum
 from twinloop.models import Noise
 from twinloop.signals import Signals
@@ -26,7 +26,7 @@ class Identified:
         pool: of all expressions.
         sums: the terms that drive each chain.
         chains: with the noise of sensors and motion.
-        actuators: lag, delay and rest of each command.
+        actuation: lags, delays and hidden states between commands and model.
         offsets: by how much later than those of the driven states each state's readings were taken from it (n_x,), s.
         left: χ² of the whitened prediction errors of the best model.
         readings: that counted.
@@ -40,7 +40,7 @@ class Identified:
     pool: Pool
     sums: list[Sum]
     chains: list[Chain]
-    actuators: list[Actuator]
+    actuation: Actuation
     offsets: Floats
     left: float
     readings: int

@@ -8,6 +8,7 @@ predictions; the whole is repeated on states that the model has smoothed.
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -15,27 +16,31 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.identification.actuation import search_actuators, total
+from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.committee import committee
 from twinloop.identification.evolution import evolve
-from twinloop.identification.fitting import Fitting, Tuned
+from twinloop.identification.fitting import Fitting, Tuned, described
 from twinloop.identification.formulas import parsed_term
+from twinloop.identification.hidden import enter_directions, filled, search_hidden
 from twinloop.identification.identified import Identified
+from twinloop.identification.lags import search_actuators
 from twinloop.identification.libraries import rungs
 from twinloop.identification.noise import BEST_SENSOR, first_noise, unexplained
 from twinloop.identification.offsets import moved, search_offsets
 from twinloop.identification.pool import Pool
 from twinloop.identification.problem import Problem
-from twinloop.identification.records import Actuator, Run, direct, guessed_noise, stages
+from twinloop.identification.records import Run, guessed_noise, stages
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Sum, search
+from twinloop.identification.structure import Sum, search, total
 from twinloop.identification.told import told
 from twinloop.signals import Signals
 
 LAGS_AGAIN = 4
 """Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
+HIDDEN = 900
+"""Number of the stream of random numbers in which hidden states are searched."""
 
 
 def identify_runs(
@@ -114,9 +119,8 @@ class _Learner:
     def learn(self) -> Identified:
         self.watch("noise")
         offsets = self._offsets()
-        self.fitting.runs = moved(self.fitting.runs, self.signals, offsets)
-        tuned = self._smoothed(self._lasting(*self._begun()))
-        problem = self._problem(self.fitting.lags_of(tuned.model))
+        tuned = self._best(moved(self.fitting.runs, self.signals, offsets))
+        problem = self._problem(self.fitting.actuation(tuned.model))
         model, sums, left, readings = tuned.model, tuned.sums, tuned.left, tuned.readings
         observer = self._rescaled(tuned.observer, left, readings)
         self.watch("committee")
@@ -128,7 +132,7 @@ class _Learner:
             pool=self.pool,
             sums=sums,
             chains=observer,
-            actuators=self.fitting.lags_of(model),
+            actuation=self.fitting.actuation(model),
             offsets=offsets,
             left=left,
             readings=readings,
@@ -144,47 +148,85 @@ class _Learner:
 
     # Steps
 
-    def _begun(self) -> tuple[list[Actuator], list[Sum], list[Sum]]:
-        """Actuators, with the terms of the first rung behind them: the shortest sums, and those found from above."""
-        actuators = direct(self.signals) if self.known is None else self.known.actuators
-        problem, start = self._problem(actuators), self.ladder[0]
-        known: list[Sum | None] = [None] * len(self.driven)
-        if self.known is not None:
-            known = [replace(s, others=[]) for s in self.known.sums]
-        shortest, above = self._from_both_sides(problem, start, known)
-        if self.options.lags and (self.known is None or len(self.fitting.runs) <= LAGS_AGAIN):
-            self.watch("actuators")
-            before = actuators
-            actuators, shortest = self._actuators(start, [found.chain for found in shortest])
-            if actuators != before:
-                # The noise was that of other actuators, and a disturbance may still stand in for terms.
-                shortest, above = self._from_both_sides(self._problem(actuators), start, shortest)
-        return actuators, shortest, above
+    def _best(self, runs: Sequence[Run]) -> Tuned:
+        """The shorter description of runs: found anew, or from what was known of fewer of them."""
+        ways = [self._anew]
+        if self.known is not None and self.known.actuation.hidden:
+            # What is hidden shows when terms are nearly right, and these when it shows.
+            ways.append(self._renewed)
+        plain, found = self.ladder, []
+        for way in ways:
+            self.fitting.runs, self.ladder = list(runs), plain
+            tuned = self._smoothed(way())
+            found.append((described(tuned), tuned, self.fitting.runs, self.ladder))
+        _, tuned, self.fitting.runs, self.ladder = min(found, key=lambda answer: answer[0])
+        return tuned
 
-    def _lasting(self, actuators: list[Actuator], shortest: list[Sum], above: list[Sum]) -> Tuned:
+    def _anew(self) -> Tuned:
+        """Lags, hidden states, noise and terms are searched."""
+        start = self.ladder[0]
+        nothing: list[Sum | None] = [None] * len(self.driven)
+        actuation, known = Actuation.direct(self.signals), nothing
+        again = self.known is None or len(self.fitting.runs) <= LAGS_AGAIN
+        if self.known is not None:
+            actuation = self.known.actuation.bare()
+            known = [self._without_hidden(found) for found in self.known.sums]
+        shortest, above = self._from_both_sides(self._problem(actuation), start, known)
+        if self.options.lags and again:
+            self.watch("actuators")
+            before = actuation
+            actuation, shortest = self._actuators(start, [found.chain for found in shortest])
+            if actuation != before:
+                # The noise was that of other actuators, and a disturbance may still stand in for terms.
+                shortest, above = self._from_both_sides(self._problem(actuation), start, shortest)
+        if self._may_hide():
+            self.watch("hidden")
+            found, sums = self._hidden(actuation, shortest)
+            if found.hidden:
+                actuation = found
+                shortest, above = self._from_both_sides(self._problem(actuation), self.ladder[0], sums)
+        return self._lasting(actuation, shortest, above)
+
+    def _renewed(self) -> Tuned:
+        """What was known, tuned on all runs."""
+        assert self.known is not None
+        self._admit_hidden()
+        sums = [replace(found, others=[]) for found in self.known.sums]
+        return self.fitting.tuned(sums, self.given, self.known.actuation)
+
+    def _lasting(self, actuation: Actuation, shortest: list[Sum], above: list[Sum]) -> Tuned:
         """A tuned model of all rungs that lasts on its own runs, if there is one."""
         self.watch("terms")
-        problem = self._problem(actuators)
-        tuned = self.fitting.tuned(self._climb(problem, shortest), self.given, actuators)
+        problem = self._problem(actuation)
+        tuned = self.fitting.tuned(self._climb(problem, shortest), self.given, actuation)
         if not np.isfinite(tuned.left):
             # A short description that runs away is none: the one from above is more modest.
-            other = self.fitting.tuned(self._climb(problem, above), self.given, actuators)
+            other = self.fitting.tuned(self._climb(problem, above), self.given, actuation)
             tuned = other if np.isfinite(other.left) else tuned
         return tuned
 
     def _smoothed(self, tuned: Tuned) -> Tuned:
-        """Terms are selected again on states that the model has smoothed."""
-        for _ in range(self.options.passes - 1):
+        """Terms are selected again on states that the model has smoothed, as long as they are described the shorter."""
+        best, runs = tuned, self.fitting.runs
+        for number in itertools.count(1):
+            hidden = self.fitting.actuation(tuned.model).hidden
+            if number >= self.options.passes * (2 if hidden else 1):
+                break
             if not self.fitting.smooth(tuned.model, tuned.observer):
                 break
             self.watch("smoothed")
-            lags = self.fitting.lags_of(tuned.model)
-            again = self._climb(self._problem(lags), tuned.sums, brief=True)
-            other = self.fitting.tuned(again, self.given, lags)
-            if not np.isfinite(other.left) and np.isfinite(tuned.left):
+            actuation, sums = self.fitting.actuation(tuned.model), tuned.sums
+            if number == 1 and self._may_hide():
+                actuation, sums = self._hidden(actuation, sums)
+            again = self._climb(self._problem(actuation), sums, brief=True)
+            tuned = self.fitting.tuned(again, self.given, actuation)
+            # Descriptions of raw states and of smoothed ones do not compare.
+            if (number == 1 and np.isfinite(tuned.left)) or described(tuned) < described(best):
+                best, runs = tuned, self.fitting.runs
+            if not np.isfinite(tuned.left):
                 break
-            tuned = other
-        return tuned
+        self.fitting.runs = runs
+        return best
 
     def _ladder(self) -> list[list[int]]:
         """Candidates, rung by rung."""
@@ -194,7 +236,8 @@ class _Learner:
         seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
         self.pool.rungs.update(dict.fromkeys(seeds, 0))
         # What was known is never out of reach, whatever rung it came from.
-        found = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
+        known = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
+        found = [node for node in known if not self.pool.is_hidden(node)]
         return [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
 
     def _admit_bounded(self) -> None:
@@ -204,8 +247,20 @@ class _Learner:
         self.pool.rungs.update(dict.fromkeys(strangers, 0))
         self.ladder = [[*terms, *strangers] for terms in self.ladder]
 
-    def _problem(self, actuators: Sequence[Actuator]) -> Problem:
-        inputs = stages(self.fitting.runs, self.signals, actuators)
+    def _admit_hidden(self) -> None:
+        """Terms of a hidden state stand on the first rung, and so do those that were known of it."""
+        known = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
+        terms = [*filled(self.pool), *(node for node in known if self.pool.is_hidden(node))]
+        for term in terms:
+            self.pool.rungs.setdefault(term, 0)
+        self.ladder = [list(dict.fromkeys([*rung, *terms])) for rung in self.ladder]
+
+    def _without_hidden(self, found: Sum) -> Sum | None:
+        weights = {node: w for node, w in found.weights.items() if not self.pool.is_hidden(node)}
+        return None if found.weights and not weights else replace(found, weights=weights, others=[])
+
+    def _problem(self, actuation: Actuation) -> Problem:
+        inputs = stages(self.fitting.runs, self.signals, actuation)
         runs, dt = self.fitting.runs, self.signals.dt
         return Problem(self.pool, runs, inputs, dt, self.workers, self.told)
 
@@ -263,11 +318,12 @@ class _Learner:
         moves: int,
         starts: int,
         fixed_noise: bool = False,
+        iteration: int | None = None,
     ) -> list[Sum]:
         return search(
             problem, driven, terms, known, self.scales,
-            moves=moves, starts=starts, largest=self.options.largest, seed=self.seed, iteration=self._next(),
-            fixed_noise=fixed_noise,
+            moves=moves, starts=starts, largest=self.options.largest, seed=self.seed,
+            iteration=self._next() if iteration is None else iteration, fixed_noise=fixed_noise,
         )  # fmt: skip
 
     def _climb(self, problem: Problem, known: Sequence[Sum], brief: bool = False) -> list[Sum]:
@@ -292,9 +348,36 @@ class _Learner:
                 )  # fmt: skip
         return best
 
-    def _actuators(self, terms: Sequence[int], driven: Sequence[Chain]) -> tuple[list[Actuator], list[Sum]]:
-        def judge(actuators: list[Actuator]) -> list[Sum]:
-            problem = self._problem(actuators)
+    def _may_hide(self) -> bool:
+        """Whether a hidden state is looked for: in one run it is a function of time, and that may be anything."""
+        return self.options.hidden and len(self.fitting.runs) > 1
+
+    def _hidden(self, actuation: Actuation, sums: Sequence[Sum]) -> tuple[Actuation, list[Sum]]:
+        """With the best hidden state where it makes the description shorter, else as it was."""
+        enter_directions(self._problem(actuation), sums, self.signals)
+        # Whether anything is hidden shows on the terms that there are; a full search follows if so.
+        terms = list(dict.fromkeys([*filled(self.pool), *(term for found in sums for term in found.weights)]))
+        self.pool.rungs.update(dict.fromkeys(filled(self.pool), 0))
+        driven = [found.chain for found in sums]
+        # A stream of its own: where nothing is hidden, what follows is as if nobody had looked.
+        stream = self.iteration * 1000 + HIDDEN
+
+        def judge(tried: Actuation) -> list[Sum]:
+            problem = self._problem(tried)
+            return self._search(problem, driven, terms, sums, self.options.moves // 10, 1, iteration=stream)
+
+        before = actuation.hidden or (() if self.known is None else self.known.actuation.hidden)
+        longest = self.signals.dt * max(len(run.commands) for run in self.fitting.runs)
+        rests: Sequence[Floats | None] = self.rests or [None]
+        found, better, score = search_hidden(self.signals, actuation, before, rests, longest, judge)
+        if not actuation.hidden and score >= total(sums):
+            return actuation, list(sums)
+        self._admit_hidden()
+        return found, better
+
+    def _actuators(self, terms: Sequence[int], driven: Sequence[Chain]) -> tuple[Actuation, list[Sum]]:
+        def judge(actuation: Actuation) -> list[Sum]:
+            problem = self._problem(actuation)
             return self._search(problem, driven, terms, [None] * len(driven), self.options.moves // 4, 1)
 
         return search_actuators(self.signals, [None, *self.rests], judge, self.options.longest_delay)

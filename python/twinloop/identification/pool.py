@@ -10,7 +10,10 @@ from twinloop import _core
 from twinloop.arrays import Floats
 
 Node = tuple[str, int, "int | float | None"]
-"""(operation, operand, second operand): a number of a node, a constant, or None under a unary operation."""
+"""(operation, operand, second operand): a number of a node, a constant, or None under a unary operation.
+
+("hidden", i, None) is a hidden state by its number: a further input, where a model has one.
+"""
 
 UNARY = ("abs", "sqrt", "sin", "cos", "tanh", "exp")
 ONE = ("one", 0, None)
@@ -19,6 +22,9 @@ ONE = ("one", 0, None)
 
 class Pool:
     """Nodes by number; operands come before what uses them. The first ones are the inputs.
+
+    `rungs` says on which rung of the ladder a term stands; `found`, what an expression costs (nats) that was read off a
+    model, which is one choice however long it is.
 
     Args:
         inputs: how many inputs a program has.
@@ -32,6 +38,7 @@ class Pool:
         # 2 the node and 2.0 the constant are equal to Python.
         self._numbers: dict[tuple[Node, bool], int] = {}
         self.rungs: dict[int, int] = {}
+        self.found: dict[int, float] = {}
         self.one = self.add(ONE)
 
     def __len__(self) -> int:
@@ -64,6 +71,26 @@ class Pool:
         top = max(self.rungs.values(), default=-1) + 1
         return max((self.rungs.get(number, top) for number in numbers), default=0)
 
+    def hidden(self, number: int) -> int:
+        """The node of a hidden state."""
+        return self.add(("hidden", number, None))
+
+    def is_hidden(self, number: int) -> bool:
+        """Whether a node is made of a hidden state."""
+        return any(self._is_input(part) and part >= self.inputs for part in self._parts(number))
+
+    def _is_input(self, number: int) -> bool:
+        node = self.node(number)
+        return node is None or node[0] == "hidden"
+
+    def _input(self, number: int) -> int:
+        """The place of an input among those of a program: hidden states are the last ones."""
+        node = self.node(number)
+        return number if node is None else self.inputs + node[1]
+
+    def _parts(self, number: int) -> list[int]:
+        return [number, *(part for operand in self.operands(number) for part in self._parts(operand))]
+
     def product(self, *factors: int) -> int:
         """The node of a product of several nodes."""
         result = factors[0]
@@ -74,7 +101,7 @@ class Pool:
     def operands(self, number: int) -> list[int]:
         """Nodes that a node is computed from."""
         node = self.node(number)
-        if node is None or node == ONE:
+        if node is None or node == ONE or node[0] == "hidden":
             return []
         return [node[1], *([node[2]] if isinstance(node[2], int) else [])]
 
@@ -84,7 +111,7 @@ class Pool:
         waiting = list(numbers)
         while waiting:
             number = waiting.pop()
-            if number >= self.inputs and number not in found:
+            if not self._is_input(number) and number not in found:
                 found.add(number)
                 waiting.extend(self.operands(number))
         return sorted(found)
@@ -92,7 +119,7 @@ class Pool:
     def leaves(self, number: int) -> list[int | None]:
         """Inputs that an expression is written with, one after another; None for a constant."""
         node = self.node(number)
-        if node is None:
+        if node is None or node[0] == "hidden":
             return [number]
         if node == ONE:
             return [None]
@@ -106,6 +133,8 @@ class Pool:
         machines are as often quadratic as linear. Each further input or constant is a choice of its own, with its
         operation, and so is each function: where rates have one sign only, |rate| must not be as short as -rate.
         """
+        if number in self.found:
+            return self.found[number]
         n, leaves = self.inputs, self.leaves(number)
         choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
         operation = float(np.log(self.operations))
@@ -119,10 +148,10 @@ class Pool:
         return own + sum(self.functions(operand) for operand in self.operands(number))
 
     def text(self, number: int, symbols: Sequence[str]) -> str:
-        """An expression as it would be written, with a symbol for each input."""
+        """An expression as it would be written, with a symbol for each input, hidden states last."""
         node = self.node(number)
-        if node is None:
-            return symbols[number]
+        if node is None or node[0] == "hidden":
+            return symbols[self._input(number)]
         operation, a, b = node
         if node == ONE:
             return "1"
@@ -139,64 +168,68 @@ class Pool:
 
         Args:
             numbers: p nodes.
-            rows: inputs (rows, inputs).
+            rows: inputs, then hidden states (rows, inputs + hidden).
 
         Returns:
             Values (rows, p); not finite where an operation overflows.
         """
         order = self.needed(numbers)
         if not order:
-            return np.ascontiguousarray(rows[:, list(numbers)])
-        register = {number: number for number in range(self.inputs)}
-        register |= {number: self.inputs + i for i, number in enumerate(order)}
-        lines = [self._instruction(number, register) for number in order]
-        text = _text(self.inputs, len(order), len(register), lines)
-        computed = _core.Program.parse(text).run(rows)
+            return np.ascontiguousarray(rows[:, [self._input(number) for number in numbers]])
+        inputs = rows.shape[1]
         place = {number: i for i, number in enumerate(order)}
-        columns = [rows[:, n] if n < self.inputs else computed[:, place[n]] for n in numbers]
+        lines = [self._instruction(number, place, inputs) for number in order]
+        text = _text(inputs, len(order), inputs + len(order), lines)
+        computed = _core.Program.parse(text).run(rows)
+        columns = [rows[:, self._input(n)] if self._is_input(n) else computed[:, place[n]] for n in numbers]
         return np.ascontiguousarray(np.stack(columns, axis=1))
 
-    def program(self, outputs: Sequence[Mapping[int, float]]) -> _core.Program:
+    def program(self, outputs: Sequence[Mapping[int, float]], hidden: int = 0) -> _core.Program:
         """A program of which each output is a weighted sum of nodes.
 
         Args:
             outputs: for each output, weights by node.
+            hidden: how many hidden states follow the inputs.
 
         Returns:
             The program; its constants are the weights, output after output, and those inside nodes.
         """
         order = self.needed(n for terms in outputs for n in terms if n != self.one)
-        first = self.inputs + len(outputs)
-        register = {number: number for number in range(self.inputs)}
-        register |= {number: first + i for i, number in enumerate(order)}
+        inputs = self.inputs + hidden
+        first = inputs + len(outputs)
+        place = {number: i for i, number in enumerate(order)}
         spare = first + len(order)
-        lines = [self._instruction(number, register) for number in order]
+        lines = [self._instruction(number, place, first) for number in order]
         for i, terms in enumerate(outputs):
-            target, started = self.inputs + i, False
+            target, started = inputs + i, False
             for number, weight in terms.items():
                 if number == self.one:
                     lines.append(f"r{target} = r{target} + {float(weight)!r}")
                 elif not started:
-                    lines.append(f"r{target} = r{register[number]} * {float(weight)!r}")
+                    lines.append(f"r{target} = {self._register(number, place, first)} * {float(weight)!r}")
                 else:
-                    lines.append(f"r{spare} = r{register[number]} * {float(weight)!r}")
+                    lines.append(f"r{spare} = {self._register(number, place, first)} * {float(weight)!r}")
                     lines.append(f"r{target} = r{target} + r{spare}")
                 started = True
-        return _core.Program.parse(_text(self.inputs, len(outputs), spare + 1, lines))
+        return _core.Program.parse(_text(inputs, len(outputs), spare + 1, lines))
 
-    def _instruction(self, number: int, register: Mapping[int, int]) -> str:
+    def _register(self, number: int, place: Mapping[int, int], first: int) -> str:
+        """Where a node is found, where those that are computed stand from a first register on."""
+        return f"r{self._input(number) if self._is_input(number) else first + place[number]}"
+
+    def _instruction(self, number: int, place: Mapping[int, int], first: int) -> str:
         node = self.node(number)
         assert node is not None
         operation, a, b = node
-        target = f"r{register[number]}"
+        target = self._register(number, place, first)
         if node == ONE:
             return f"{target} = {target} + 1.0"
         if operation in UNARY:
-            return f"{target} = {operation}(r{register[a]})"
-        second = f"r{register[b]}" if isinstance(b, int) else repr(float(b or 0.0))
+            return f"{target} = {operation}({self._register(a, place, first)})"
+        second = self._register(b, place, first) if isinstance(b, int) else repr(float(b or 0.0))
         if operation in ("min", "max"):
-            return f"{target} = {operation}(r{register[a]}, {second})"
-        return f"{target} = r{register[a]} {operation} {second}"
+            return f"{target} = {operation}({self._register(a, place, first)}, {second})"
+        return f"{target} = {self._register(a, place, first)} {operation} {second}"
 
 
 def _text(inputs: int, outputs: int, registers: int, lines: Sequence[str]) -> str:

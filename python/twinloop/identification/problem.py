@@ -46,7 +46,9 @@ class Problem:
         self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
 
     def usable(self, terms: Sequence[int]) -> list[int]:
-        """Terms whose values are finite on all rows, evaluated."""
+        """Terms whose values are finite on all rows, evaluated; none of a hidden state where there is none."""
+        if self.stages.start.shape[1] == self.pool.inputs:
+            terms = [term for term in terms if not self.pool.is_hidden(term)]
         new = [term for term in terms if term not in self._values]
         if new:
             stages = [

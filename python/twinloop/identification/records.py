@@ -9,10 +9,8 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.identification.actuation import Actuation
 from twinloop.signals import Signals
-
-Actuator = tuple[float, int, "float | None"]
-"""(lag in s, delay in periods, command whose effect is there at the start or None for the first)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +45,15 @@ class Stages:
     runs: tuple[slice, ...]
 
 
-def stages(runs: Sequence[Run], signals: Signals, actuators: Sequence[Actuator]) -> Stages:
-    """What a model sees within each period: states, and the effects of commands in units of their scale.
+def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stages:
+    """What a model sees within each period: states, effects of commands in units of their scale, hidden states.
 
     The state in the middle is Hermite's where a state's derivative is another, and the mean elsewhere.
 
     Args:
         runs: recorded.
         signals: of the system.
-        actuators: one a command.
+        actuation: between commands and model.
 
     Returns:
         The three sets of inputs.
@@ -70,21 +68,19 @@ def stages(runs: Sequence[Run], signals: Signals, actuators: Sequence[Actuator])
             if state.derivative_of is not None:
                 parent = signals.state_names.index(state.derivative_of)
                 middle[:, parent] += signals.dt / 8.0 * (before[:, i] - after[:, i])
-        effects = [e / scales for e in _core.command_effects(list(actuators), signals.dt, run.commands)]
+        effects = _core.command_effects(
+            actuation.actuators, actuation.hidden, scales, signals.dt, run.commands
+        )
         parts.append(
             tuple(  # type: ignore[arg-type]
-                np.hstack([x, u]) for x, u in zip((before, middle, after), effects, strict=True)
+                np.hstack([x, e[:, : signals.n_u] / scales, e[:, signals.n_u :]])
+                for x, e in zip((before, middle, after), effects, strict=True)
             )
         )
         slices.append(slice(first, first + len(before)))
         first += len(before)
     start, middle, end = (np.concatenate(stage) for stage in zip(*parts, strict=True))
     return Stages(start, middle, end, tuple(slices))
-
-
-def direct(signals: Signals) -> list[Actuator]:
-    """Actuators that act at once."""
-    return [(0.0, 0, None)] * signals.n_u
 
 
 def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:

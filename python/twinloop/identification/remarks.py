@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.equations import hidden_names
 from twinloop.identification.bounds import Limits
 from twinloop.identification.chains import Chain
 from twinloop.identification.noise import BEST_SENSOR
@@ -19,9 +20,14 @@ TWINS = 4.0
 """Description length within which two laws are equally good."""
 
 
+def symbols_of(signals: Signals) -> list[str]:
+    """What the inputs of a model are called in remarks: states, commands, a hidden state."""
+    return [*signals.state_names, *signals.command_names, *hidden_names(signals, 1)]
+
+
 def identities(found: Sum, pool: Pool, signals: Signals) -> list[str]:
     """The nearest other law that the runs cannot tell from this one: an identity that held on them."""
-    symbols = [*signals.state_names, *signals.command_names]
+    symbols = symbols_of(signals)
     driven = signals.state_names[found.chain.states[0]]
     ours = set(found.weights)
     for subset, above in found.others:
@@ -49,7 +55,7 @@ def held_at_bounds(
     Returns:
         One a constant that is at a bound.
     """
-    symbols = [*signals.state_names, *signals.command_names]
+    symbols = symbols_of(signals)
     said = []
     for found in sums:
         state = found.chain.states[0]

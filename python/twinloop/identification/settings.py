@@ -39,6 +39,7 @@ class IdentificationOptions:
         gusts: whether disturbances may last, as gusts do, rather than be white.
         lags: whether lags and delays of the actuators are searched.
         longest_delay: of an actuator, periods.
+        hidden: whether a hidden state that commands fill and that fades, such as a climb or heat, is searched.
         offsets: whether sensors may be late or early against those of the driven states.
         tuning: whether constants are tuned on predictions.
         tuning_steps: at most.
@@ -65,6 +66,7 @@ class IdentificationOptions:
     gusts: bool = True
     lags: bool = True
     longest_delay: int = 2
+    hidden: bool = True
     offsets: bool = True
     tuning: bool = True
     tuning_steps: int = 20

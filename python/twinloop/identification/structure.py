@@ -224,3 +224,8 @@ def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Li
         # Held at 0 a term is none.
         return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
     return subset, left + float(costs[list(subset)].sum()), left, weights
+
+
+def total(sums: Sequence[Sum]) -> float:
+    """Description length of all sums."""
+    return sum(found.energy for found in sums)

@@ -26,7 +26,7 @@ from twinloop.presets import DefaultOptions
 from twinloop.setup import Setup
 from twinloop.test import Test
 
-STEPS = ("noise", "actuators", "terms", "evolution", "smoothed", "committee", "gains", "candidates")
+STEPS = ("noise", "actuators", "hidden", "terms", "evolution", "smoothed", "committee", "gains", "candidates")
 """What there is to see while it works, in order."""
 FEWEST = 4
 """Members of a committee that are kept in any case."""
@@ -307,15 +307,15 @@ class IdentifyAndPlan:
         genes = book.experiments[0].test.genes[np.newaxis]
         return float(self.planner.judge(committee.members[:1], genes, committee.sds, 1).mean[0])
 
-    def _used(self, book: Logbook) -> float:
-        """Largest usage of the envelope that was flown."""
-        used = 0.0
+    def _used(self, book: Logbook) -> list[float]:
+        """Largest usage of the envelope in each flight."""
+        used = [0.0] * len(book.experiments)
         for i, state in enumerate(self.setup.signals.states):
             if state.envelope is not None:
                 low, high = state.envelope
-                for run in book.experiments:
+                for number, run in enumerate(book.experiments):
                     off = np.abs(run.trajectory.states[:, i] - 0.5 * (low + high)).max()
-                    used = max(used, float(off) / (0.5 * (high - low)))
+                    used[number] = max(used[number], float(off) / (0.5 * (high - low)))
         return used
 
     def _rests(self) -> list[Floats]:
@@ -337,8 +337,11 @@ class IdentifyAndPlan:
             readings=known.readings,
             ignored=known.ignored,
             sensors=tuple(known.sensors(self.setup.signals.n_x).tolist()),
-            lags=tuple(lag for lag, _, _ in known.actuators),
-            delays=tuple(delay for _, delay, _ in known.actuators),
+            lags=tuple(lag for lag, _, _ in known.actuation.actuators),
+            delays=tuple(delay for _, delay, _ in known.actuation.actuators),
+            hidden=tuple(
+                (tuple(of), squared, rest, time) for of, squared, rest, time in known.actuation.hidden
+            ),
             offsets=tuple(known.offsets.tolist()),
             closed_loop=tuple(free),
             normalised=tuple(

@@ -163,7 +163,7 @@ class Planner(Judge):
         number: int,
         told: int,
         first_quality: float,
-        used: float,
+        used: Sequence[float],
         exploit: bool,
     ) -> Proposal:
         """The next test.
@@ -176,7 +176,7 @@ class Planner(Judge):
             number: of the test, for its stream.
             told: experiments so far.
             first_quality: of the first controller, as flown or predicted.
-            used: largest usage of the envelope that was flown so far.
+            used: largest usage of the envelope in each flight so far.
             exploit: whether the tuned gains are flown as they are.
 
         Returns:
@@ -286,13 +286,15 @@ class Planner(Judge):
                 excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
         return genes, excitation
 
-    def _reach(self, goal: str, used: float) -> float:
-        """Usage of the envelope that a proposal may have, where that of the flights so far is known."""
+    def _reach(self, goal: str, used: Sequence[float]) -> float:
+        """Usage of the envelope that a proposal may have, where that of each flight so far is known."""
         options = self.options
-        # A model is believed near what was flown: each flight may go somewhat further than those before it. With gains
-        # far from any that were flown it may be wrong in ways that no member shows.
-        near = max(options.reach_first, options.reach_growth * used)
-        far = max(options.reach_far, used)
+        first, most = used[0] if used else 0.0, max(used, default=0.0)
+        # A model is believed near what was flown: each flight may go somewhat further than those before it.
+        near = max(options.reach_first, options.reach_growth * most)
+        # With gains far from any that were flown it may be wrong in ways that no member shows, and the more so the
+        # further a flight goes: what is small on the first flight, and in no term, is not small then.
+        far = max(min(options.reach_far, options.reach_growth * first), most)
         return min(1.0 - options.margin, far if goal == "model" else near)
 
     def _scatter(self, committee: Committee, tuned: Floats) -> float:

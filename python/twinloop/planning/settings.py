@@ -27,8 +27,9 @@ class PlanningOptions:
         draws: of sensor noise under which a flight is judged.
         margin: share of the envelope that a proposal keeps free on every member of the committee.
         reach_first: usage of the envelope that a proposal may always have.
-        reach_far: the same where flights are for the model, whose gains may be far from any that were flown.
-        reach_growth: factor by which its usage may exceed the largest one flown.
+        reach_far: usage at most where flights are for the model, whose gains may be far from any that were flown.
+        reach_growth: factor by which its usage may exceed the largest one flown or, where flights are for the model,
+            that of the first flight.
         evaluations: flights on which gains are tuned, for each member and draw.
         tuning_starts: of the tuning of gains.
         tuning_members: of the committee on which gains are tuned; 1: the best model only.

@@ -67,12 +67,12 @@ fn programs_of_other_inputs_or_outputs_are_refused() {
     let program = |inputs, outputs| {
         Program::new(twinloop_core::Shape::new(inputs, outputs, 0).unwrap(), vec![]).unwrap()
     };
-    assert!(Model::check(&program(5, 3), Form::Absolute, signals).is_ok());
-    assert!(Model::check(&program(5, 2), Form::Acceleration, signals).is_ok());
+    assert!(Model::check(&program(5, 3), Form::Absolute, signals, 0).is_ok());
+    assert!(Model::check(&program(5, 2), Form::Acceleration, signals, 0).is_ok());
     for (inputs, outputs, form) in
         [(4, 3, Form::Absolute), (5, 2, Form::Increment), (5, 3, Form::Acceleration)]
     {
-        let error = Model::check(&program(inputs, outputs), form, signals).unwrap_err().to_string();
+        let error = Model::check(&program(inputs, outputs), form, signals, 0).unwrap_err().to_string();
         assert!(error.contains(form.name()) && error.contains(&format!("found {inputs} and {outputs}")));
     }
 }
