@@ -247,6 +247,23 @@ def test_a_twin_that_runs_away_is_cut_at_the_same_step_with_and_without_a_contro
         assert flown.steps == driven.steps
 
 
+def test_commands_reach_a_twin_through_its_lags_and_hidden_states(pendulum_signals, pendulum_controller):
+    family = pendulum_controller.bind(pendulum_signals)
+    test = tl.Test(family, [0.8, 0.1, 0.2], [0.4, 0.0], [0.0, 0.0], 30)
+    text = (
+        "program inputs=4 outputs=1 registers=6\npage 1\n  r4 = r2 * 2.0\n  r5 = r3 * 0.5\n  r4 = r4 - r5\n"
+        "  r4 = r4 - r0\n"
+    )
+    program = tl._core.Program.parse(text)
+    actuators, hidden = [(0.15, 2, 0.3)], [([0], True, None, 0.5)]
+    model = tl._core.Model(program, "acceleration", pendulum_signals.engine, actuators, hidden)
+    twin = tl.Twin(model, pendulum_signals)
+    flown = twin.simulate(test)
+    assert flown.ended == "completed"
+    driven = twin.simulate_commands([0.4, 0.0], flown.commands)
+    np.testing.assert_allclose(driven.states, flown.states, rtol=0.0, atol=1e-12)
+
+
 # Bad answers leave everything as it was
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop.arrays import Floats, floats
+from twinloop.controllers import PID, Mixer
 from twinloop.equations import equations
 from twinloop.errors import engine_input
 from twinloop.flight import fly
@@ -233,11 +234,11 @@ class Twin:
         return following[0] if single else following
 
     def simulate_commands(self, initial_state: ArrayLike, commands: ArrayLike) -> Trajectory:
-        """A free run under given commands, without a controller.
+        """A free run under given commands, without a controller; lags and hidden states begin at rest, as in a flight.
 
         Args:
             initial_state: (n_x,), SI units, radians.
-            commands: (n, n_u), in their units, each held for one period.
+            commands: (n, n_u), in their units, each held for one period; what lies beyond a bound is clipped.
 
         Returns:
             The predicted run, cut where it diverges.
@@ -247,19 +248,12 @@ class Twin:
         """
         state = floats("Initial state", initial_state, (self.signals.n_x,))
         u = floats("Commands", commands, (None, self.signals.n_u))
-        limits = self.divergence_factor * np.array([state.scale for state in self.signals.states])
-        states = [state]
-        for command in u:
-            following = self.predict(states[-1], command)
-            if not (np.abs(following) < limits).all():
-                break
-            states.append(following)
-        lasted = len(states) - 1
-        t = self.signals.dt * np.arange(lasted + 1, dtype=np.float64)
-        if lasted == len(u):
-            return Trajectory(t, np.array(states), u)
-        reason = f"a state left {self.divergence_factor:g} times its scale after {lasted} steps"
-        return Trajectory(t, np.array(states), u[:lasted], ended="diverged", reason=reason)
+        # A controller that asks for nothing, so that there is no second loop: the commands are its excitation.
+        name = self.signals.state_names[0]
+        gains = {f"{name}.{term}": (0.0, 1.0) for term in ("kp", "ki", "kd")}
+        nothing = PID(axes=[(name, None)], gains=gains, output=Mixer(np.zeros((self.signals.n_u, 1))))
+        test = Test(nothing.bind(self.signals), np.zeros(3), state, state, len(u), excitation=u)
+        return fly(self.model, test, divergence_factor=self.divergence_factor)
 
     def __repr__(self) -> str:
         return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+A_DAY = 86_400.0
+"""Seconds: what takes longer to fade does not fade within a flight."""
+
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """Columns of text, the first to the left, the others to the right.
@@ -227,10 +230,8 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
 def _hidden(state: Mapping[str, Any]) -> str:
     """A state that no sensor reads, in words."""
     what = "squares" if state["squared"] else "values"
-    return (
-        f"Hidden: the {what} of {', '.join(state['commands'])} fill a state that no sensor reads; it is forgotten to"
-        f" 1/e in {state['time']:.3g} s."
-    )
+    fading = f"forgotten to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "not forgotten"
+    return f"Hidden: the {what} of {', '.join(state['commands'])} fill a state that no sensor reads; it is {fading}."
 
 
 def _identified_errors(result: Mapping[str, Any]) -> str:
