@@ -96,7 +96,7 @@ def search_hidden(
     rests: Sequence[Floats | None],
     longest: float,
     judge: Callable[[Actuation], list[Sum]],
-) -> tuple[Actuation, list[Sum], float]:
+) -> tuple[Actuation, list[Sum]]:
     """The hidden state of the shortest description.
 
     Args:
@@ -108,13 +108,13 @@ def search_hidden(
         judge: finds the sums under a given actuation.
 
     Returns:
-        The actuation with it, the sums, and their description length with its price.
+        The actuation with it, and the sums.
     """
 
     def tried(hidden: Hidden) -> tuple[float, Actuation, list[Sum]]:
         actuation = replace(base, hidden=(hidden,))
         sums = judge(actuation)
-        return total(sums) + PRICE, actuation, sums
+        return total(sums), actuation, sums
 
     kinds: list[Hidden] = [
         (tuple(group), squared, _mean(signals, group, squared, rest), TIMES[1] * longest)
@@ -125,8 +125,8 @@ def search_hidden(
     found = [tried(hidden) for hidden in [*kinds, *known]]
     commands, squared, level, _ = min(found, key=lambda answer: answer[0])[1].hidden[0]
     found += [tried((commands, squared, level, time * longest)) for time in (TIMES[0], TIMES[2])]
-    score, actuation, sums = min(found, key=lambda answer: answer[0])
-    return actuation, sums, score
+    _, actuation, sums = min(found, key=lambda answer: answer[0])
+    return actuation, sums
 
 
 def _mean(signals: Signals, group: Sequence[int], squared: bool, rest: Floats | None) -> float | None:

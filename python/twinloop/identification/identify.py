@@ -22,7 +22,7 @@ from twinloop.identification.committee import committee
 from twinloop.identification.evolution import evolve
 from twinloop.identification.fitting import Fitting, Tuned, described
 from twinloop.identification.formulas import parsed_term
-from twinloop.identification.hidden import enter_directions, filled, search_hidden
+from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
 from twinloop.identification.identified import Identified
 from twinloop.identification.lags import search_actuators
 from twinloop.identification.libraries import rungs
@@ -181,7 +181,7 @@ class _Learner:
                 shortest, above = self._from_both_sides(self._problem(actuation), start, shortest)
         if self._may_hide():
             self.watch("hidden")
-            found, sums = self._hidden(actuation, shortest)
+            found, sums = self._hidden(actuation, shortest, shortest)
             if found.hidden:
                 actuation = found
                 shortest, above = self._from_both_sides(self._problem(actuation), self.ladder[0], sums)
@@ -215,10 +215,10 @@ class _Learner:
             if not self.fitting.smooth(tuned.model, tuned.observer):
                 break
             self.watch("smoothed")
-            actuation, sums = self.fitting.actuation(tuned.model), tuned.sums
+            actuation = self.fitting.actuation(tuned.model)
+            again = self._climb(self._problem(actuation), tuned.sums, brief=True)
             if number == 1 and self._may_hide():
-                actuation, sums = self._hidden(actuation, sums)
-            again = self._climb(self._problem(actuation), sums, brief=True)
+                actuation, again = self._hidden(actuation, tuned.sums, again)
             tuned = self.fitting.tuned(again, self.given, actuation)
             # Descriptions of raw states and of smoothed ones do not compare.
             if (number == 1 and np.isfinite(tuned.left)) or described(tuned) < described(best):
@@ -352,28 +352,42 @@ class _Learner:
         """Whether a hidden state is looked for: in one run it is a function of time, and that may be anything."""
         return self.options.hidden and len(self.fitting.runs) > 1
 
-    def _hidden(self, actuation: Actuation, sums: Sequence[Sum]) -> tuple[Actuation, list[Sum]]:
-        """With the best hidden state where it makes the description shorter, else as it was."""
-        enter_directions(self._problem(actuation), sums, self.signals)
-        # Whether anything is hidden shows on the terms that there are; a full search follows if so.
-        terms = list(dict.fromkeys([*filled(self.pool), *(term for found in sums for term in found.weights)]))
+    def _hidden(
+        self, actuation: Actuation, start: Sequence[Sum], plain: Sequence[Sum]
+    ) -> tuple[Actuation, list[Sum]]:
+        """With the best hidden state where that makes the description shorter, else as it was.
+
+        Args:
+            actuation: so far.
+            start: sums to begin with. Those that were found without the state stand in for it already.
+            plain: the best sums behind the actuation as it is.
+
+        Returns:
+            The actuation, and the sums behind it.
+        """
+        enter_directions(self._problem(actuation), start, self.signals)
         self.pool.rungs.update(dict.fromkeys(filled(self.pool), 0))
-        driven = [found.chain for found in sums]
-        # A stream of its own: where nothing is hidden, what follows is as if nobody had looked.
+        driven = [found.chain for found in start]
+        own = [term for found in start for term in found.weights]
+        few, many = ([*filled(self.pool), *terms] for terms in (own, self.ladder[0]))
+        # Streams of their own: where nothing is hidden, what follows is as if nobody had looked.
         stream = self.iteration * 1000 + HIDDEN
+        moves, starts = self.options.moves, max(1, self.options.starts // 2)
 
         def judge(tried: Actuation) -> list[Sum]:
-            problem = self._problem(tried)
-            return self._search(problem, driven, terms, sums, self.options.moves // 10, 1, iteration=stream)
+            return self._search(self._problem(tried), driven, few, start, moves // 10, 1, iteration=stream)
 
         before = actuation.hidden or (() if self.known is None else self.known.actuation.hidden)
         longest = self.signals.dt * max(len(run.commands) for run in self.fitting.runs)
         rests: Sequence[Floats | None] = self.rests or [None]
-        found, better, score = search_hidden(self.signals, actuation, before, rests, longest, judge)
-        if not actuation.hidden and score >= total(sums):
-            return actuation, list(sums)
+        found, sums = search_hidden(self.signals, actuation, before, rests, longest, judge)
+        # Which one shows on the terms that there are; whether there is one, when all may change.
+        best = self._search(self._problem(found), driven, many, sums, moves, starts, iteration=stream + 1)
+        price = 0.0 if actuation.hidden else PRICE
+        if total(best) + price >= total(plain):
+            return actuation, list(plain)
         self._admit_hidden()
-        return found, better
+        return found, best
 
     def _actuators(self, terms: Sequence[int], driven: Sequence[Chain]) -> tuple[Actuation, list[Sum]]:
         def judge(actuation: Actuation) -> list[Sum]:
