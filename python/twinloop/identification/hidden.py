@@ -21,8 +21,8 @@ from twinloop.signals import Signals
 
 TIMES = (0.25, 1.0, 4.0)
 """Times that are tried, in lengths of the longest run; the one in the middle first."""
-PRICE = 50.0
-"""What a hidden state must gain in description length: its time, its kind, and the choice of having one."""
+PRICE = 30.0
+"""What a hidden state must gain in description length: its time, its kind, and what a search may find by luck."""
 EQUAL = 0.8
 """Commands that move an output at least this much as strongly as the strongest do it equally."""
 LEAST = 0.1
