@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -86,7 +87,7 @@ def _finished(path: Path, jobs: Sequence[Job], processes: int) -> Iterator[tuple
     # Several processes that each use all cores for their linear algebra only wait for each other.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context, initializer=_quietly) as pool:
+    with ProcessPoolExecutor(processes, mp_context=context, initializer=_as_a_worker) as pool:
         try:
             threads = max(1, available_threads() // processes)
             futures = {pool.submit(work, path, job, threads): job for job in jobs}
@@ -97,9 +98,20 @@ def _finished(path: Path, jobs: Sequence[Job], processes: int) -> Iterator[tuple
             raise
 
 
-def _quietly() -> None:
-    """Ctrl-C ends a worker without a word: what it measured is kept, and the main process speaks."""
+def _as_a_worker() -> None:
+    """Ctrl-C ends a worker without a word: what it measured is kept, and the main process speaks.
+
+    Nor does a worker outlive the main process, however that ends: it would go on writing into the store.
+    """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    threading.Thread(target=_end_with_the_main_process, daemon=True).start()
+
+
+def _end_with_the_main_process() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def work(path: Path, job: Job, threads: int = 1) -> str | None:
