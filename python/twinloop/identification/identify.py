@@ -370,7 +370,7 @@ class _Learner:
         driven = [found.chain for found in start]
         own = [term for found in start for term in found.weights]
         few, many = ([*filled(self.pool), *terms] for terms in (own, self.ladder[0]))
-        # Streams of their own: where nothing is hidden, what follows is as if nobody had looked.
+        # Streams of their own: where nothing is hidden, what follows draws as if nobody had looked.
         stream = self.iteration * 1000 + HIDDEN
         moves, starts = self.options.moves, max(1, self.options.starts // 2)
 
