@@ -262,6 +262,8 @@ def test_commands_reach_a_twin_through_its_lags_and_hidden_states(pendulum_signa
     assert flown.ended == "completed"
     driven = twin.simulate_commands([0.4, 0.0], flown.commands)
     np.testing.assert_allclose(driven.states, flown.states, rtol=0.0, atol=1e-12)
+    nothing = twin.simulate_commands([0.4, 0.0], np.zeros((0, 1)))
+    assert nothing.steps == 0 and same_bits(nothing.states, np.array([[0.4, 0.0]]))
 
 
 # Bad answers leave everything as it was

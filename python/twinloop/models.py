@@ -248,6 +248,8 @@ class Twin:
         """
         state = floats("Initial state", initial_state, (self.signals.n_x,))
         u = floats("Commands", commands, (None, self.signals.n_u))
+        if len(u) == 0:
+            return Trajectory(np.zeros(1), state[np.newaxis], u)
         # A controller that asks for nothing, so that there is no second loop: the commands are its excitation.
         name = self.signals.state_names[0]
         gains = {f"{name}.{term}": (0.0, 1.0) for term in ("kp", "ki", "kd")}
