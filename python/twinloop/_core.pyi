@@ -464,7 +464,8 @@ def tune(
     divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> tuple[Model, float, int, _Floats, list[Model]]:
-    """The model with free constants and lags of groups of commands moved until the least is left.
+    """The model with free constants, and lags of groups of commands and times of hidden states, moved until the least
+    is left. `lags` numbers commands, then hidden states.
 
     Returns it with χ² (infinite where it diverges), readings that counted, the covariance of what was free, each
     value being known to its own size beforehand, and members drawn from that as far as the records bear them.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -32,10 +31,12 @@ STEP = 0.01
 
 
 def filled(pool: Pool) -> list[int]:
-    """Terms of the hidden state: itself, its product with every input, and with what moves an output together."""
+    """Terms of the hidden state, on the first rung: itself, and times every input and what moves an output together."""
     hidden = pool.hidden(0)
     found = [node for node in pool.found if pool.is_hidden(node)]
-    return [hidden, *(pool.product(i, hidden) for i in range(pool.inputs)), *found]
+    terms = [hidden, *(pool.product(i, hidden) for i in range(pool.inputs)), *found]
+    pool.rungs.update(dict.fromkeys(terms, 0))
+    return terms
 
 
 def enter_directions(problem: Problem, sums: Sequence[Sum], signals: Signals) -> None:
@@ -56,16 +57,19 @@ def enter_directions(problem: Problem, sums: Sequence[Sum], signals: Signals) ->
         for row, place in enumerate(places):
             rows[2 * row, place] += STEP
             rows[2 * row + 1, place] -= STEP
-        for found in sums:
-            values = pool.values(list(found.weights), rows) @ np.array(list(found.weights.values()))
-            shares = values[::2] - values[1::2]
+        # How each output answers, and all of them alike, as they fill the state.
+        answers = [*(_answers(pool, found, rows) for found in sums), np.ones(len(group))]
+        for shares in answers:
             together = _together(pool, places, shares)
             if together is not None:
                 term = pool.product(pool.hidden(0), together)
                 pool.found[term] = float(np.log(3.0 * (pool.inputs + 1)))
-        # All of them, as they fill the state.
-        term = pool.product(pool.hidden(0), cast(int, _together(pool, places, np.ones(len(group)))))
-        pool.found[term] = float(np.log(3.0 * (pool.inputs + 1)))
+
+
+def _answers(pool: Pool, found: Sum, rows: Floats) -> Floats:
+    """How strongly a sum answers to each command, from rows a step above and a step below its middle in turn."""
+    values: Floats = pool.values(list(found.weights), rows) @ np.array(list(found.weights.values()))
+    return values[::2] - values[1::2]
 
 
 def _together(pool: Pool, places: Sequence[int], shares: Floats) -> int | None:

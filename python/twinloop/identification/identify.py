@@ -236,9 +236,11 @@ class _Learner:
         seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
         self.pool.rungs.update(dict.fromkeys(seeds, 0))
         # What was known is never out of reach, whatever rung it came from.
-        known = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
-        found = [node for node in known if not self.pool.is_hidden(node)]
+        found = [node for node in self._known_terms() if not self.pool.is_hidden(node)]
         return [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
+
+    def _known_terms(self) -> list[int]:
+        return [] if self.known is None else [node for found in self.known.sums for node in found.weights]
 
     def _admit_bounded(self) -> None:
         """A bounded term that no rung has stands on the first one."""
@@ -249,8 +251,7 @@ class _Learner:
 
     def _admit_hidden(self) -> None:
         """Terms of a hidden state stand on the first rung, and so do those that were known of it."""
-        known = [] if self.known is None else [node for known in self.known.sums for node in known.weights]
-        terms = [*filled(self.pool), *(node for node in known if self.pool.is_hidden(node))]
+        terms = [*filled(self.pool), *(node for node in self._known_terms() if self.pool.is_hidden(node))]
         for term in terms:
             self.pool.rungs.setdefault(term, 0)
         self.ladder = [list(dict.fromkeys([*rung, *terms])) for rung in self.ladder]
@@ -366,7 +367,6 @@ class _Learner:
             The actuation, and the sums behind it.
         """
         enter_directions(self._problem(actuation), start, self.signals)
-        self.pool.rungs.update(dict.fromkeys(filled(self.pool), 0))
         driven = [found.chain for found in start]
         own = [term for found in start for term in found.weights]
         few, many = ([*filled(self.pool), *terms] for terms in (own, self.ladder[0]))

@@ -47,9 +47,9 @@ class Problem:
 
     def usable(self, terms: Sequence[int]) -> list[int]:
         """Terms whose values are finite on all rows, evaluated; none of a hidden state where there is none."""
-        if self.stages.start.shape[1] == self.pool.inputs:
-            terms = [term for term in terms if not self.pool.is_hidden(term)]
         new = [term for term in terms if term not in self._values]
+        if self.stages.start.shape[1] == self.pool.inputs:
+            new = [term for term in new if not self.pool.is_hidden(term)]
         if new:
             stages = [
                 self.pool.values(new, s) for s in (self.stages.start, self.stages.middle, self.stages.end)
@@ -57,7 +57,8 @@ class Problem:
             for i, term in enumerate(new):
                 columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
                 self._values[term] = columns  # type: ignore[assignment]
-        return [term for term in terms if all(np.abs(column).max() < 1e100 for column in self._values[term])]
+        there = [term for term in terms if term in self._values]
+        return [term for term in there if all(np.abs(column).max() < 1e100 for column in self._values[term])]
 
     def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
         """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
