@@ -124,10 +124,8 @@ impl Frame {
     /// Whether these signals have the states, commands, period and derivatives of the frame.
     pub fn fits(&self, signals: &Signals) -> bool {
         let plain = Self::new(self.form, signals);
-        self.commands == plain.commands
-            && *self
-                == Self { actuation: self.actuation.clone(), factors: self.factors.clone(), ..plain.clone() }
-            && self.factors[..plain.commands] == plain.factors
+        self.factors.starts_with(&plain.factors)
+            && *self == Self { actuation: self.actuation.clone(), factors: self.factors.clone(), ..plain }
     }
 
     fn states(&self) -> usize {
