@@ -67,5 +67,5 @@ def test_the_table_on_a_terminal_names_the_step_and_the_errors():
     screen = Console(file=io.StringIO(), width=120)
     screen.print(watch._now())
     shown = screen.file.getvalue()
-    for words in ("quadrotor", "2 of 4", "4 of 9, selecting terms", "closed loop", "2e-05"):
+    for words in ("quadrotor", "2 of 4", "4 of 10, selecting terms", "closed loop", "2e-05"):
         assert words in shown

@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import UNARY, operate, same_bits
 from twinloop import _core
+from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import chains
 from twinloop.identification.fitting import Fitting
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.libraries import rungs
+from twinloop.identification.parts import parts
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.settings import IdentificationOptions
@@ -100,6 +102,21 @@ def test_equal_expressions_are_one_node():
         pool.product(0, 1),
         pool.product(0, 1, 2),
     ]
+
+
+@given(pools(), pools())
+def test_what_is_forgotten_is_as_if_it_had_never_been_entered(pool, more):
+    nodes, entered = list(pool.nodes), len(pool)
+    for number in range(INPUTS, len(more)):
+        node = more.node(number)
+        pool.rungs[pool.add(node)] = 3
+        pool.found[pool.add(node)] = 1.0
+    pool.forget(entered)
+    assert pool.nodes == nodes and len(pool) == entered
+    assert all(number < entered for number in [*pool.rungs, *pool.found])
+    again = Pool(INPUTS)
+    for node in [*nodes, *more.nodes]:
+        assert pool.add(node) == again.add(node)
 
 
 def test_an_empty_sum_is_zero_and_one_is_one():
@@ -353,6 +370,7 @@ def test_where_nothing_is_hidden_the_law_is_as_if_nobody_had_looked():
     assert laws[0].actuation.hidden == ()
     assert same_bits(laws[0].model.constants, laws[1].model.constants)
     assert str(laws[0].model.program) == str(laws[1].model.program)
+    assert laws[0].pool.nodes == laws[1].pool.nodes and laws[0].pool.rungs == laws[1].pool.rungs
 
 
 def test_one_run_has_no_hidden_state():
@@ -374,6 +392,69 @@ def test_a_law_in_increments_is_found():
     assert found.sums[0].weights.keys() == {0, 1}
     assert found.sums[1].weights.keys() == {2, 1, found.pool.product(0, 2)}
     np.testing.assert_allclose(sorted(found.model.constants), [-0.3, -0.1, 0.05, 0.2, 0.25], rtol=1e-3)
+
+
+# Parts of a run
+
+
+def wild(angle, rate, torque):
+    return -9.0 * np.sin(angle) - 0.4 * rate * abs(rate) + 5.0 * torque * np.cos(angle)
+
+
+def free_runs(members, signals, run):
+    """States of members under a run's commands, of those that last (members, n + 1, n_x)."""
+    twins = [tl.Twin(member, signals).simulate_commands(run.states[0], run.commands) for member in members]
+    return np.stack([twin.states for twin in twins if len(twin.states) == len(run.states)])
+
+
+def test_members_of_parts_know_how_far_the_law_of_one_run_carries():
+    """On a wilder run errors are several times the spread without them, and less than it with them."""
+    signals, ratios = pendulum_like(), {True: [], False: []}
+    for seed in range(3):
+        run = swung(wild, seed, start=(0.3, 0.0), noise=1e-3)
+        other = swung(wild, seed + 50, start=(1.5, 0.0))
+        for of_parts, found in ratios.items():
+            members = identified([run], signals, parts=of_parts, committee_size=8).members
+            assert len(members) == 8
+            states = free_runs(members, signals, other)
+            error = np.sqrt(((states.mean(axis=0) - other.states) ** 2).mean())
+            found.append(error / np.sqrt(states.var(axis=0).mean()))
+    assert np.median(ratios[True]) < 2.0 < 10.0 < np.median(ratios[False])
+
+
+def test_a_part_may_lead_to_a_shorter_description_and_never_to_a_longer_one():
+    signals, saved = pendulum_like(), []
+    for seed in range(3):
+        run = swung(wild, seed, start=(0.3, 0.0))
+        found, alone = (identified([run], signals, parts=of_parts) for of_parts in (True, False))
+        saved.append(alone.energy - found.energy)
+        if saved[-1] > 1.0:
+            assert set(law(found)) >= {("sin", 0, None)}
+    assert min(saved) >= 0.0 and max(saved) > 100.0
+
+
+def test_a_part_begins_with_the_effects_that_its_commands_have_there():
+    signals, [run] = fans(1, fading=3.0)
+    whole = Actuation(((0.06, 1, None), (0.0, 2, 0.5)))
+    effects = _core.command_effects(whole.actuators, (), [1.0, 1.0], signals.dt, run.commands)[0]
+    found = parts(run, signals, whole)
+    assert [len(part.commands) for part, _ in found] == [75, 75, 105, 105]
+    for (part, begun), first in zip(found, (0, 75, 0, 45), strict=True):
+        rows = slice(first, first + len(part.commands))
+        assert same_bits(part.commands, run.commands[rows])
+        assert same_bits(part.states, run.states[first : rows.stop + 1])
+        own = _core.command_effects(begun.actuators, (), [1.0, 1.0], signals.dt, part.commands)[0]
+        # A delay of periods before the part is not in its commands; a lag goes on from where it was.
+        np.testing.assert_allclose(own[2:, 1], effects[rows][2:, 1], rtol=1e-12)
+        np.testing.assert_allclose(own[0], effects[rows][0], rtol=1e-12)
+    short = parts(run.part(0, 30), signals, whole)
+    assert [len(part.commands) for part, _ in short] == [21, 21]
+    assert parts(run.part(0, 20), signals, whole) == []
+
+
+def test_a_committee_of_one_is_the_best_model():
+    found = identified([swung(gravity, 0)], pendulum_like(), committee_size=1)
+    assert found.members == [found.model]
 
 
 def test_an_outlier_is_not_learnt_from():

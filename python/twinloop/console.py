@@ -24,6 +24,7 @@ STEPS = {
     "terms": ("selecting terms", 1.2),
     "evolution": ("growing terms", 0.7),
     "smoothed": ("selecting again, on smoothed states", 0.5),
+    "parts": ("learning from parts of the flight", 0.8),
     "committee": ("drawing a committee", 0.2),
     "gains": ("tuning gains", 0.3),
     "candidates": ("choosing the next flight", 0.1),

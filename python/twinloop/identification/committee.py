@@ -25,6 +25,7 @@ def committee(
     sums: Sequence[Sum],
     observer: Sequence[Chain],
     best: _core.Model,
+    others: Sequence[_core.Model] = (),
 ) -> list[_core.Model]:
     """The best model, draws from what the runs leave open of it, and other structures that are nearly as good.
 
@@ -34,11 +35,13 @@ def committee(
         sums: of the best model, with the other subsets of their search.
         observer: all chains, with their noise.
         best: the best model, tuned.
+        others: models that were found elsewhere, for half of the seats at most.
 
     Returns:
         At most as many as the options ask for, the best first.
     """
-    size = fitting.options.committee_size
+    others = others[: fitting.options.committee_size // 2]
+    size = fitting.options.committee_size - len(others)
     draw = stream(fitting.seed, 78, fitting.iteration)
     members = [best]
     _, base, readings, _, draws = fitting.tune(best, sums, observer, 0, size)
@@ -74,7 +77,7 @@ def committee(
             members.append(drawn[0])
     while len(members) < size and draws:
         members.append(draws.pop())
-    return members
+    return [*members, *others]
 
 
 def _other(found: Sum, draw: np.random.Generator) -> tuple[int, ...] | None:

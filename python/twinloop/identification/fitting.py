@@ -52,7 +52,6 @@ class Fitting:
         runs: recorded; replaced by copies where readings are ignored or states smoothed.
         pool: of all expressions.
         signals: of the system.
-        form: what the outputs mean.
         options: of the identification.
         seed: of the campaign.
         iteration: which streams of random numbers.
@@ -65,7 +64,6 @@ class Fitting:
         runs: Sequence[Run],
         pool: Pool,
         signals: Signals,
-        form: str,
         options: IdentificationOptions,
         seed: int,
         iteration: int,
@@ -76,7 +74,7 @@ class Fitting:
         self.runs = list(runs)
         self.pool = pool
         self.signals = signals
-        self.form = form
+        self.form = options.form_for(signals)
         self.options = options
         self.seed = seed
         self.iteration = iteration

@@ -17,24 +17,21 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.identification.actuation import Actuation
-from twinloop.identification.chains import Chain, chains
+from twinloop.identification.chains import Chain
 from twinloop.identification.committee import committee
-from twinloop.identification.evolution import evolve
 from twinloop.identification.fitting import Fitting, Tuned, described
-from twinloop.identification.formulas import parsed_term
 from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
 from twinloop.identification.identified import Identified
 from twinloop.identification.lags import search_actuators
-from twinloop.identification.libraries import rungs
-from twinloop.identification.noise import BEST_SENSOR, first_noise, unexplained
 from twinloop.identification.offsets import moved, search_offsets
+from twinloop.identification.parts import parts
 from twinloop.identification.pool import Pool
 from twinloop.identification.problem import Problem
-from twinloop.identification.records import Run, guessed_noise, stages
+from twinloop.identification.records import Run, stages
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
+from twinloop.identification.selection import Selection
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Sum, search, total
-from twinloop.identification.told import told
+from twinloop.identification.structure import Sum, total
 from twinloop.signals import Signals
 
 LAGS_AGAIN = 4
@@ -92,40 +89,37 @@ class _Learner:
     ) -> None:
         self.signals = signals
         self.options = options
-        self.form = options.form_for(signals)
         self.rests = list(rests)
-        self.seed = seed
-        self.iteration = iteration
-        self.workers = workers
+        self.stream = iteration * 1000
         self.watch = watch
-        self.scales = np.array([state.scale for state in signals.states])
-        self.known: Identified | None
-        if known is not None and known.model.form == self.form:
-            # A copy: what an interrupted attempt has entered must not change the next one.
-            self.pool, self.known = copy.deepcopy(known.pool), known
+        self.known = known if known is not None and known.model.form == options.form_for(signals) else None
+        if self.known is None:
+            self.pool = Pool(signals.n_x + signals.n_u, len(options.operators))
         else:
-            self.pool, self.known = Pool(signals.n_x + signals.n_u, len(options.operators)), None
-        every = chains(signals, self.form, guessed_noise(runs, self.scales))
-        self.driven = [self._declared_noise(chain) for chain in every if chain.output is not None]
-        self.given = [self._given_noise(chain) for chain in every if chain.output is None]
-        self.ladder = self._ladder()
-        self.told = told(options, self.pool, signals)
-        self._admit_bounded()
-        self.fitting = Fitting(
-            runs, self.pool, signals, self.form, options, seed, iteration, workers, self.told
+            # A copy: what an interrupted attempt has entered must not change the next one.
+            self.pool = copy.deepcopy(self.known.pool)
+        self.selection = Selection(
+            runs, signals, options, self.pool, self.known, seed, iteration, workers, watch
         )
-        self.stream = 0
+        self.fitting = Fitting(
+            runs, self.pool, signals, options, seed, iteration, workers, self.selection.told
+        )
 
     def learn(self) -> Identified:
         self.watch("noise")
         offsets = self._offsets()
         tuned = self._best(moved(self.fitting.runs, self.signals, offsets))
+        others: list[_core.Model] = []
+        if self.options.parts and len(self.fitting.runs) == 1:
+            self.watch("parts")
+            tuned, others = self._of_parts(tuned)
         problem = self._problem(self.fitting.actuation(tuned.model))
         model, sums, left, readings = tuned.model, tuned.sums, tuned.left, tuned.readings
         observer = self._rescaled(tuned.observer, left, readings)
         self.watch("committee")
-        members = committee(problem, self.fitting, sums, observer, model)
-        runs = self.fitting.runs
+        members = committee(problem, self.fitting, sums, observer, model, others)
+        runs, driven = self.fitting.runs, [chain.states[0] for chain in self.selection.driven]
+        bounds = self.selection.told.bounds
         return Identified(
             model=model,
             members=members,
@@ -140,9 +134,9 @@ class _Learner:
             energy=total(sums),
             remarks=[
                 *remarks(runs, self.pool, self.signals, sums, left, readings),
-                *late_sensors(offsets, [chain.states[0] for chain in self.driven], self.signals),
+                *late_sensors(offsets, driven, self.signals),
                 *other_noise(tuned.observer, self.signals),
-                *held_at_bounds(sums, self.told.bounds, self.pool, self.signals, self.form),
+                *held_at_bounds(sums, bounds, self.pool, self.signals, self.fitting.form),
             ],
         )
 
@@ -154,54 +148,56 @@ class _Learner:
         if self.known is not None and self.known.actuation.hidden:
             # What is hidden shows when terms are nearly right, and these when it shows.
             ways.append(self._renewed)
-        plain, found = self.ladder, []
+        plain, found = self.selection.ladder, []
         for way in ways:
-            self.fitting.runs, self.ladder = list(runs), plain
+            self.fitting.runs, self.selection.ladder = list(runs), plain
             tuned = self._smoothed(way())
-            found.append((described(tuned), tuned, self.fitting.runs, self.ladder))
-        _, tuned, self.fitting.runs, self.ladder = min(found, key=lambda answer: answer[0])
+            found.append((described(tuned), tuned, self.fitting.runs, self.selection.ladder))
+        _, tuned, self.fitting.runs, self.selection.ladder = min(found, key=lambda answer: answer[0])
         return tuned
 
     def _anew(self) -> Tuned:
         """Lags, hidden states, noise and terms are searched."""
-        start = self.ladder[0]
-        nothing: list[Sum | None] = [None] * len(self.driven)
+        start = self.selection.ladder[0]
+        nothing: list[Sum | None] = [None] * len(self.selection.driven)
         actuation, known = Actuation.direct(self.signals), nothing
         again = self.known is None or len(self.fitting.runs) <= LAGS_AGAIN
         if self.known is not None:
             actuation = self.known.actuation.bare()
             known = [self._without_hidden(found) for found in self.known.sums]
-        shortest, above = self._from_both_sides(self._problem(actuation), start, known)
+        shortest, above = self.selection.from_both_sides(self._problem(actuation), start, known)
         if self.options.lags and again:
             self.watch("actuators")
             before = actuation
             actuation, shortest = self._actuators(start, [found.chain for found in shortest])
             if actuation != before:
                 # The noise was that of other actuators, and a disturbance may still stand in for terms.
-                shortest, above = self._from_both_sides(self._problem(actuation), start, shortest)
+                shortest, above = self.selection.from_both_sides(self._problem(actuation), start, shortest)
         if self._may_hide():
             self.watch("hidden")
             found, sums = self._hidden(actuation, shortest, shortest)
             if found.hidden:
                 actuation = found
-                shortest, above = self._from_both_sides(self._problem(actuation), self.ladder[0], sums)
+                shortest, above = self.selection.from_both_sides(
+                    self._problem(actuation), self.selection.ladder[0], sums
+                )
         return self._lasting(actuation, shortest, above)
 
     def _renewed(self) -> Tuned:
         """What was known, tuned on all runs."""
         assert self.known is not None
-        self._admit_hidden()
+        self.selection.admit_hidden()
         sums = [replace(found, others=[]) for found in self.known.sums]
-        return self.fitting.tuned(sums, self.given, self.known.actuation)
+        return self.fitting.tuned(sums, self.selection.given, self.known.actuation)
 
     def _lasting(self, actuation: Actuation, shortest: list[Sum], above: list[Sum]) -> Tuned:
         """A tuned model of all rungs that lasts on its own runs, if there is one."""
         self.watch("terms")
         problem = self._problem(actuation)
-        tuned = self.fitting.tuned(self._climb(problem, shortest), self.given, actuation)
+        tuned = self.fitting.tuned(self.selection.climb(problem, shortest), self.selection.given, actuation)
         if not np.isfinite(tuned.left):
             # A short description that runs away is none: the one from above is more modest.
-            other = self.fitting.tuned(self._climb(problem, above), self.given, actuation)
+            other = self.fitting.tuned(self.selection.climb(problem, above), self.selection.given, actuation)
             tuned = other if np.isfinite(other.left) else tuned
         return tuned
 
@@ -216,10 +212,10 @@ class _Learner:
                 break
             self.watch("smoothed")
             actuation = self.fitting.actuation(tuned.model)
-            again = self._climb(self._problem(actuation), tuned.sums, brief=True)
+            again = self.selection.climb(self._problem(actuation), tuned.sums, brief=True)
             if number == 1 and self._may_hide():
                 actuation, again = self._hidden(actuation, tuned.sums, again)
-            tuned = self.fitting.tuned(again, self.given, actuation)
+            tuned = self.fitting.tuned(again, self.selection.given, actuation)
             # Descriptions of raw states and of smoothed ones do not compare.
             if (number == 1 and np.isfinite(tuned.left)) or described(tuned) < described(best):
                 best, runs = tuned, self.fitting.runs
@@ -228,42 +224,16 @@ class _Learner:
         self.fitting.runs = runs
         return best
 
-    def _ladder(self) -> list[list[int]]:
-        """Candidates, rung by rung."""
-        options = self.options
-        ladder = rungs(self.pool, self.signals, options.libraries, options.most_terms)
-        base = ladder or [[self.pool.one, *range(self.pool.inputs)]]
-        seeds = [parsed_term(formula, self.pool, self.signals) for formula in options.seed_terms]
-        self.pool.rungs.update(dict.fromkeys(seeds, 0))
-        # What was known is never out of reach, whatever rung it came from.
-        found = [node for node in self._known_terms() if not self.pool.is_hidden(node)]
-        return [list(dict.fromkeys([*terms, *seeds, *found])) for terms in base]
-
-    def _known_terms(self) -> list[int]:
-        return [] if self.known is None else [node for found in self.known.sums for node in found.weights]
-
-    def _admit_bounded(self) -> None:
-        """A bounded term that no rung has stands on the first one."""
-        bounded = dict.fromkeys(node for limits in self.told.bounds.values() for node in limits)
-        strangers = [node for node in bounded if node not in self.ladder[-1]]
-        self.pool.rungs.update(dict.fromkeys(strangers, 0))
-        self.ladder = [[*terms, *strangers] for terms in self.ladder]
-
-    def _admit_hidden(self) -> None:
-        """Terms of a hidden state stand on the first rung, and so do those that were known of it."""
-        terms = [*filled(self.pool), *(node for node in self._known_terms() if self.pool.is_hidden(node))]
-        for term in terms:
-            self.pool.rungs.setdefault(term, 0)
-        self.ladder = [list(dict.fromkeys([*rung, *terms])) for rung in self.ladder]
-
     def _without_hidden(self, found: Sum) -> Sum | None:
         weights = {node: w for node, w in found.weights.items() if not self.pool.is_hidden(node)}
         return None if found.weights and not weights else replace(found, weights=weights, others=[])
 
     def _problem(self, actuation: Actuation) -> Problem:
-        inputs = stages(self.fitting.runs, self.signals, actuation)
-        runs, dt = self.fitting.runs, self.signals.dt
-        return Problem(self.pool, runs, inputs, dt, self.workers, self.told)
+        return self._problem_of(self.fitting.runs, actuation)
+
+    def _problem_of(self, runs: Sequence[Run], actuation: Actuation) -> Problem:
+        selection, inputs = self.selection, stages(runs, self.signals, actuation)
+        return Problem(self.pool, runs, inputs, self.signals.dt, selection.workers, selection.told)
 
     def _offsets(self) -> Floats:
         """By how much later than those of the driven states each state's readings were taken from it (n_x,), s."""
@@ -271,83 +241,10 @@ class _Learner:
             return np.zeros(self.signals.n_x)
         if self.known is not None and len(self.fitting.runs) > LAGS_AGAIN:
             return self.known.offsets
-        every = [*self.driven, *self.given]
-        return search_offsets(self.fitting.runs, self.signals, every, self.scales, self.workers)
-
-    def _given_noise(self, chain: Chain) -> Chain:
-        """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
-        return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / self.signals.dt, 0.0, 1.0))
-
-    def _declared_noise(self, chain: Chain) -> Chain:
-        """The chain with sensors as they are declared, as far as readings allow; the estimate begins there."""
-        sensors = chain.sensors.copy()
-        for i, state in enumerate(chain.states):
-            noise = self.signals.states[state].noise
-            if noise is not None:
-                sensors[i] = np.clip(noise * noise, BEST_SENSOR**2 * chain.rough[i], chain.rough[i])
-        return chain.with_noise(sensors, chain.motion)
-
-    def _from_both_sides(
-        self, problem: Problem, terms: Sequence[int], known: Sequence[Sum | None]
-    ) -> tuple[list[Sum], list[Sum]]:
-        """The shorter description of each chain with the noise estimated from below or from above, and that from above.
-
-        From below, little noise makes many terms of few runs and stays little; from above, the strongest terms come
-        first and the noise falls as far as they explain it.
-        """
-        options = self.options
-        usable = problem.usable(terms)
-        below = [first_noise(problem, chain, usable, self.scales, options.gusts) for chain in self.driven]
-        low = self._search(problem, below, terms, known, options.moves, 2)
-        if not options.noise_from_above:
-            return low, low
-        above = [unexplained(problem, chain, self.scales, options.gusts) for chain in self.driven]
-        none: list[Sum | None] = [None] * len(self.driven)
-        high = self._search(problem, above, terms, none, options.moves, 2)
-        return [a if a.energy <= b.energy else b for a, b in zip(low, high, strict=True)], high
-
-    def _next(self) -> int:
-        self.stream += 1
-        return self.iteration * 1000 + self.stream
-
-    def _search(
-        self,
-        problem: Problem,
-        driven: Sequence[Chain],
-        terms: Sequence[int],
-        known: Sequence[Sum | None],
-        moves: int,
-        starts: int,
-        fixed_noise: bool = False,
-        iteration: int | None = None,
-    ) -> list[Sum]:
-        return search(
-            problem, driven, terms, known, self.scales,
-            moves=moves, starts=starts, largest=self.options.largest, seed=self.seed,
-            iteration=self._next() if iteration is None else iteration, fixed_noise=fixed_noise,
-        )  # fmt: skip
-
-    def _climb(self, problem: Problem, known: Sequence[Sum], brief: bool = False) -> list[Sum]:
-        """The best sums of all rungs and of evolved terms, where some are known; `brief`: of the first rung only."""
-        options, ladder = self.options, self.ladder
-        best = list(known)
-        if options.libraries:
-            for number, terms in enumerate(ladder[:1] if brief else ladder):
-                starts = options.starts if number == 0 and not brief else max(1, options.starts // 2)
-                driven = [found.chain for found in best]
-                best = self._search(problem, driven, terms, best, options.moves, starts, number > 0)
-        if options.generations and not (brief and options.libraries):
-            self.watch("evolution")
-            seeds = list(ladder[0]) if not options.libraries else [self.pool.one, *range(self.pool.inputs)]
-            seeds += [node for found in best for node in found.weights]
-            for restart in range(options.restarts):
-                best = evolve(
-                    problem, best, seeds, self.scales,
-                    operators=options.operators, generations=options.generations,
-                    population=options.population, longest=options.longest, moves=options.moves // 4,
-                    largest=options.largest, seed=self.seed, iteration=self._next() + 100_000 * restart,
-                )  # fmt: skip
-        return best
+        every = [*self.selection.driven, *self.selection.given]
+        return search_offsets(
+            self.fitting.runs, self.signals, every, self.selection.scales, self.selection.workers
+        )
 
     def _may_hide(self) -> bool:
         """Whether a hidden state is looked for: in one run it is a function of time, and that may be anything."""
@@ -366,33 +263,60 @@ class _Learner:
         Returns:
             The actuation, and the sums behind it.
         """
+        # Where nothing is hidden, what follows goes on as if nobody had looked: streams and nodes are taken back.
+        entered = len(self.pool)
         enter_directions(self._problem(actuation), start, self.signals)
         driven = [found.chain for found in start]
         own = [term for found in start for term in found.weights]
-        few, many = ([*filled(self.pool), *terms] for terms in (own, self.ladder[0]))
-        # Streams of their own: where nothing is hidden, what follows draws as if nobody had looked.
-        stream = self.iteration * 1000 + HIDDEN
+        few, many = ([*filled(self.pool), *terms] for terms in (own, self.selection.ladder[0]))
+        stream = self.stream + HIDDEN
         moves, starts = self.options.moves, max(1, self.options.starts // 2)
 
         def judge(tried: Actuation) -> list[Sum]:
-            return self._search(self._problem(tried), driven, few, start, moves // 10, 1, iteration=stream)
+            return self.selection.search(
+                self._problem(tried), few, start, driven, moves // 10, 1, iteration=stream
+            )
 
         before = actuation.hidden or (() if self.known is None else self.known.actuation.hidden)
         longest = self.signals.dt * max(len(run.commands) for run in self.fitting.runs)
         rests: Sequence[Floats | None] = self.rests or [None]
         found, sums = search_hidden(self.signals, actuation, before, rests, longest, judge)
         # Which one shows on the terms that there are; whether there is one, when all may change.
-        best = self._search(self._problem(found), driven, many, sums, moves, starts, iteration=stream + 1)
+        best = self.selection.search(
+            self._problem(found), many, sums, driven, moves, starts, iteration=stream + 1
+        )
         price = 0.0 if actuation.hidden else PRICE
         if total(best) + price >= total(plain):
+            self.pool.forget(entered)
             return actuation, list(plain)
-        self._admit_hidden()
+        self.selection.admit_hidden()
         return found, best
+
+    def _of_parts(self, tuned: Tuned) -> tuple[Tuned, list[_core.Model]]:
+        """The shortest description of the only run that itself or its parts have led to, and what parts have led to."""
+        actuation = self.fitting.actuation(tuned.model)
+        whole, found = self._problem(actuation), []
+        for run, begun in parts(self.fitting.runs[0], self.signals, actuation):
+            part = self.selection.of_part(run)
+            own = part.alone(self._problem_of([run], begun))
+            driven, terms = [sum_.chain for sum_ in own], [term for sum_ in own for term in sum_.weights]
+            sums = self.selection.search(whole, terms, own, driven, part.options.moves // 4, 1)
+            answer = self.fitting.tuned(sums, self.selection.given, actuation)
+            if np.isfinite(answer.left):
+                found.append(answer)
+        of_each = zip(tuned.sums, *(answer.sums for answer in found), strict=True)
+        shortest = [min(sums, key=lambda sum_: sum_.energy) for sums in of_each]
+        if shortest != tuned.sums:
+            mixed = self.fitting.tuned(shortest, self.selection.given, actuation)
+            tuned = min(tuned, mixed, key=described)
+        return tuned, [answer.model for answer in found]
 
     def _actuators(self, terms: Sequence[int], driven: Sequence[Chain]) -> tuple[Actuation, list[Sum]]:
         def judge(actuation: Actuation) -> list[Sum]:
             problem = self._problem(actuation)
-            return self._search(problem, driven, terms, [None] * len(driven), self.options.moves // 4, 1)
+            return self.selection.search(
+                problem, terms, [None] * len(driven), driven, self.options.moves // 4, 1
+            )
 
         return search_actuators(self.signals, [None, *self.rests], judge, self.options.longest_delay)
 

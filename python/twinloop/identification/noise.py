@@ -12,6 +12,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.identification.chains import Chain, Motion
 from twinloop.identification.problem import Problem
+from twinloop.signals import Signals
 
 GUSTS = (1e-3, 1e-1, 10.0)
 """Variances of a lasting disturbance that are tried first, in units of what the sensor's noise looks like as one."""
@@ -21,6 +22,21 @@ BEST_SENSOR = 0.1
 """Share of its readings' roughness that a sensor's standard deviation is at least."""
 RIDGE = 1e-9
 """Added to the columns' unit lengths where all terms are fitted at once."""
+
+
+def declared_noise(chain: Chain, signals: Signals) -> Chain:
+    """The chain with sensors as they are declared, as far as readings allow; the estimate begins there."""
+    sensors = chain.sensors.copy()
+    for i, state in enumerate(chain.states):
+        noise = signals.states[state].noise
+        if noise is not None:
+            sensors[i] = np.clip(noise * noise, BEST_SENSOR**2 * chain.rough[i], chain.rough[i])
+    return chain.with_noise(sensors, chain.motion)
+
+
+def given_noise(chain: Chain, dt: float) -> Chain:
+    """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
+    return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / dt, 0.0, 1.0))
 
 
 def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:

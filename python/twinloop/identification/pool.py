@@ -62,6 +62,13 @@ class Pool:
             self.nodes.append(node)
         return self._numbers[key]
 
+    def forget(self, first: int) -> None:
+        """Takes back all nodes from a number on: what is entered later gets the numbers that it would have had."""
+        del self.nodes[first - self.inputs :]
+        self._numbers = {key: number for key, number in self._numbers.items() if number < first}
+        self.rungs = {number: rung for number, rung in self.rungs.items() if number < first}
+        self.found = {number: price for number, price in self.found.items() if number < first}
+
     def node(self, number: int) -> Node | None:
         """A node by its number; None for an input."""
         return None if number < self.inputs else self.nodes[number - self.inputs]

@@ -34,6 +34,11 @@ class Run:
         """A run of which every reading counts."""
         return Run(states, commands, np.ones_like(states), states)
 
+    def part(self, first: int, last: int) -> Run:
+        """The run from one period to another."""
+        rows = slice(first, last + 1)
+        return Run(self.states[rows], self.commands[first:last], self.weights[rows], self.smooth[rows])
+
 
 @dataclass(frozen=True, eq=False)
 class Stages:

@@ -45,6 +45,7 @@ class IdentificationOptions:
         tuning_steps: at most.
         passes: how often terms are selected; from the second on with states that the model has smoothed.
         committee_size: models that judge tests, the best included.
+        parts: whether, as long as there is one run, models of its parts are members too.
         divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
     """
 
@@ -72,6 +73,7 @@ class IdentificationOptions:
     tuning_steps: int = 20
     passes: int = 2
     committee_size: int = 8
+    parts: bool = True
     divergence_factor: float = 10.0
 
     def form_for(self, signals: Signals) -> str:

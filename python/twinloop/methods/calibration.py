@@ -10,7 +10,7 @@ from twinloop.models import NINE_OF_TEN, Twin
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
-FIRST = 2.0
+FIRST = 1.5
 """Factor on a committee's spread before any of its predictions was flown."""
 SMALLEST, LARGEST = 1.0, 30.0
 LAST = 3

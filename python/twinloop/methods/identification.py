@@ -26,7 +26,18 @@ from twinloop.presets import DefaultOptions
 from twinloop.setup import Setup
 from twinloop.test import Test
 
-STEPS = ("noise", "actuators", "hidden", "terms", "evolution", "smoothed", "committee", "gains", "candidates")
+STEPS = (
+    "noise",
+    "actuators",
+    "hidden",
+    "terms",
+    "evolution",
+    "smoothed",
+    "parts",
+    "committee",
+    "gains",
+    "candidates",
+)
 """What there is to see while it works, in order."""
 FEWEST = 4
 """Members of a committee that are kept in any case."""
