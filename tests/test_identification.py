@@ -438,8 +438,8 @@ def test_a_part_begins_with_the_effects_that_its_commands_have_there():
     whole = Actuation(((0.06, 1, None), (0.0, 2, 0.5)))
     effects = _core.command_effects(whole.actuators, (), [1.0, 1.0], signals.dt, run.commands)[0]
     found = parts(run, signals, whole)
-    assert [len(part.commands) for part, _ in found] == [75, 75, 105, 105]
-    for (part, begun), first in zip(found, (0, 75, 0, 45), strict=True):
+    assert [len(part.commands) for part, _ in found] == [105, 105, 75, 75]
+    for (part, begun), first in zip(found, (0, 45, 0, 75), strict=True):
         rows = slice(first, first + len(part.commands))
         assert same_bits(part.commands, run.commands[rows])
         assert same_bits(part.states, run.states[first : rows.stop + 1])
@@ -450,6 +450,24 @@ def test_a_part_begins_with_the_effects_that_its_commands_have_there():
     short = parts(run.part(0, 30), signals, whole)
     assert [len(part.commands) for part, _ in short] == [21, 21]
     assert parts(run.part(0, 20), signals, whole) == []
+
+
+def test_exact_readings_leave_the_noise_of_rounding_and_members_as_far_apart():
+    signals = pendulum_like()
+    rough = [swung(gravity, seed, start=(0.5 + seed, 0.0)) for seed in range(3)]
+    plant = tl.Twin(identified(rough[:2], signals).model, signals)
+    runs = [
+        Run.of(plant.simulate_commands(run.states[0], run.commands).states, run.commands) for run in rough
+    ]
+    found = identified(runs[:2], signals, committee_size=8)
+    assert found.misfit < 1e-6 and (0.0 < found.sensors(2)).all() and (found.sensors(2) < 1e-10).all()
+    error = np.abs(free_runs([found.model], signals, runs[2])[0] - runs[2].states)
+    spread = free_runs(found.members, signals, runs[2]).std(axis=0)
+    expected = np.sqrt(spread**2 + found.sensors(2) ** 2)
+    assert 0.7 <= (error <= 3.0 * expected).mean()
+    # Rounded to hundredths they are noisy again, and no less noisy than that.
+    coarse = identified([Run.of(np.round(run.states, 2), run.commands) for run in runs], signals)
+    assert (coarse.sensors(2) > 0.5 * 0.01 / np.sqrt(12.0)).all()
 
 
 def test_a_committee_of_one_is_the_best_model():

@@ -257,8 +257,9 @@ def test_without_excitation_a_flight_that_is_flown_again_is_varied():
 def test_flights_for_the_model_go_no_further_than_they_are_allowed_or_than_was_flown():
     known = signals()
     committee = committee_of(known)
-    for used, most in (([0.5], 0.45), ([0.33], 0.43), ([0.33, 0.44, 0.4], 0.44), ([0.6], 0.6)):
-        planner = planner_of(known, reach_far=0.45, reach_first=0.9, reach_growth=1.3)
+    cases = (([0.5], 0.45), ([0.33], 0.43), ([0.33, 0.44, 0.4], 0.44), ([0.6], 0.6), ([0.01], 0.43))
+    for used, most in cases:
+        planner = planner_of(known, reach_far=0.45, reach_first=0.9, reach_least=0.43, reach_growth=1.3)
         found = proposed(planner, committee, goal="model", used=used)
         flown = planner.judge(
             committee.members,

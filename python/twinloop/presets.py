@@ -178,6 +178,7 @@ _DEFAULT_RANGES: dict[str, tuple[float, float]] = {
     "margin": (0, 0.99),
     "reach_first": (0.01, 1),
     "reach_far": (0.01, 1),
+    "reach_least": (0.01, 1),
     "reach_growth": (0.1, 100),
     "evaluations": (64, _MANY),
     "tuning_starts": (1, 100),

@@ -36,6 +36,10 @@ from twinloop.signals import Signals
 
 LAGS_AGAIN = 4
 """Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
+NOTHING = 0.01
+"""χ² a reading below which noise was not estimated but held at the least that is believed."""
+ROUNDING = 1e-18
+"""That of rounding alone."""
 HIDDEN = 900
 """Number of the stream of random numbers in which hidden states are searched."""
 
@@ -323,7 +327,10 @@ class _Learner:
     def _rescaled(self, observer: Sequence[Chain], left: float, readings: int) -> list[Chain]:
         """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
         factor = left / max(1, readings) if np.isfinite(left) else 1.0
-        factor = max(1.0, factor)
+        if factor > NOTHING:
+            factor = max(1.0, factor)
+        # Next to nothing is left by the least noise that the search was to believe: readings are exact.
+        factor = max(factor, ROUNDING)
         return [
             c.with_noise(c.sensors * factor, (c.motion[0] * factor, c.motion[1] * factor, c.motion[2]))
             for c in observer

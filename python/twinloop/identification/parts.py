@@ -14,8 +14,8 @@ from twinloop.identification.actuation import Actuation
 from twinloop.identification.records import Run
 from twinloop.signals import Signals
 
-SHARES = ((0.0, 0.5), (0.5, 1.0), (0.0, 0.7), (0.3, 1.0))
-"""Where parts begin and end, as shares of a run."""
+SHARES = ((0.0, 0.7), (0.3, 1.0), (0.0, 0.5), (0.5, 1.0))
+"""Where parts begin and end, as shares of a run; those that miss less of it first."""
 SHORTEST = 20
 """Periods of a part at least."""
 

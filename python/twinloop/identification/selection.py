@@ -72,7 +72,8 @@ class Selection:
 
     def of_part(self, run: Run) -> Selection:
         """A brief one on part of a run, where nothing is known."""
-        options = replace(self.options, generations=0, moves=self.options.moves // 4)
+        generations = 0 if self.options.libraries else self.options.generations
+        options = replace(self.options, generations=generations, moves=self.options.moves // 4)
         return Selection(
             [run], self.signals, options, self.pool, None, self.seed, self.iteration, self.workers
         )

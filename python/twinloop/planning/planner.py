@@ -294,7 +294,7 @@ class Planner(Judge):
         near = max(options.reach_first, options.reach_growth * most)
         # With gains far from any that were flown it may be wrong in ways that no member shows, and the more so the
         # further a flight goes: what is small on the first flight, and in no term, is not small then.
-        far = max(min(options.reach_far, options.reach_growth * first), most)
+        far = max(min(options.reach_far, options.reach_growth * first), options.reach_least, most)
         return min(1.0 - options.margin, far if goal == "model" else near)
 
     def _scatter(self, committee: Committee, tuned: Floats) -> float:

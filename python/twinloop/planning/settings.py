@@ -28,6 +28,7 @@ class PlanningOptions:
         margin: share of the envelope that a proposal keeps free on every member of the committee.
         reach_first: usage of the envelope that a proposal may always have.
         reach_far: usage at most where flights are for the model, whose gains may be far from any that were flown.
+        reach_least: usage that such flights may always have, or a first one that hardly moves would end them.
         reach_growth: factor by which its usage may exceed the largest one flown or, where flights are for the model,
             that of the first flight.
         evaluations: flights on which gains are tuned, for each member and draw.
@@ -53,6 +54,7 @@ class PlanningOptions:
     margin: float = 0.1
     reach_first: float = 0.7
     reach_far: float = 0.6
+    reach_least: float = 0.2
     reach_growth: float = 1.25
     evaluations: int = 12_000
     tuning_starts: int = 3
