@@ -300,6 +300,25 @@ def test_the_last_experiment_of_a_budget_flies_the_best_gains_as_they_are(begin,
     assert not explored.experiments[1].test.reason.startswith("The best gains")
 
 
+def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committee_with_parts(
+    begin, pendulum
+):
+    inflations = {}
+    # Of one second no part is long enough.
+    for duration in (1.0, 3.0):
+        campaign, found = begin(duration=duration), []
+        test = campaign.test(PENDULUM_GAINS)
+        for _ in range(4):
+            campaign.tell(test, pendulum.run(test))
+            test = campaign.ask()
+            found.append(campaign.twin.inflation)
+        inflations[duration] = found
+    short, long = inflations[1.0], inflations[3.0]
+    assert short[0] == 2.0 and short[1] != 2.0
+    assert long[:2] == [1.5, 2.0] and long[2] != 2.0
+    assert all(1.0 <= factor <= 30.0 for factor in short + long)
+
+
 def test_a_pendulum_is_learnt_and_flown_better_than_at_first(begin, pendulum):
     campaign = begin(options={"moves": 4000, "evaluations": 1000}).run(pendulum, 3)
     assert campaign.experiments[-1].quality <= campaign.experiments[0].quality

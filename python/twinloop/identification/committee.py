@@ -35,12 +35,11 @@ def committee(
         sums: of the best model, with the other subsets of their search.
         observer: all chains, with their noise.
         best: the best model, tuned.
-        others: models that were found elsewhere, for a quarter of the seats at most.
+        others: models that were found elsewhere, fewer than there are seats.
 
     Returns:
         At most as many as the options ask for, the best first.
     """
-    others = others[: fitting.options.committee_size // 4]
     size = fitting.options.committee_size - len(others)
     draw = stream(fitting.seed, 78, fitting.iteration)
     members = [best]

@@ -32,6 +32,7 @@ class Identified:
         readings: that counted.
         ignored: readings that were taken for outliers.
         energy: description length.
+        of_parts: whether members are there that parts of the only run have led to.
         remarks: what a person should know.
     """
 
@@ -46,6 +47,7 @@ class Identified:
     readings: int
     ignored: int
     energy: float
+    of_parts: bool = False
     remarks: list[str] = field(default_factory=list)
 
     @property

@@ -40,6 +40,8 @@ NOTHING = 0.01
 """χ² a reading below which noise was not estimated but held at the least that is believed."""
 ROUNDING = 1e-18
 """That of rounding alone."""
+SEATS = 4
+"""Of so many members one is of a part of the only run."""
 HIDDEN = 900
 """Number of the stream of random numbers in which hidden states are searched."""
 
@@ -136,6 +138,7 @@ class _Learner:
             readings=readings,
             ignored=int(sum((run.weights == 0.0).sum() for run in runs)),
             energy=total(sums),
+            of_parts=bool(others),
             remarks=[
                 *remarks(runs, self.pool, self.signals, sums, left, readings),
                 *late_sensors(offsets, driven, self.signals),
@@ -313,7 +316,7 @@ class _Learner:
         if shortest != tuned.sums:
             mixed = self.fitting.tuned(shortest, self.selection.given, actuation)
             tuned = min(tuned, mixed, key=described)
-        return tuned, [answer.model for answer in found]
+        return tuned, [answer.model for answer in found[: self.options.committee_size // SEATS]]
 
     def _actuators(self, terms: Sequence[int], driven: Sequence[Chain]) -> tuple[Actuation, list[Sum]]:
         def judge(actuation: Actuation) -> list[Sum]:

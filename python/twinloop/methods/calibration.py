@@ -10,8 +10,10 @@ from twinloop.models import NINE_OF_TEN, Twin
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
-FIRST = 1.5
+FIRST = 2.0
 """Factor on a committee's spread before any of its predictions was flown."""
+OF_PARTS = 1.5
+"""The same where parts of the only flight sit in it: they know more of what that leaves open than later ones know."""
 SMALLEST, LARGEST = 1.0, 30.0
 LAST = 3
 """Flights that the factor is the median of."""

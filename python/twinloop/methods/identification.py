@@ -16,7 +16,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.logbook import Logbook
-from twinloop.methods.calibration import factor, needed_factor
+from twinloop.methods.calibration import OF_PARTS, factor, needed_factor
 from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
@@ -232,13 +232,14 @@ class IdentifyAndPlan:
             members=self._believed,
             noise=known.noise(self.setup.signals),
             seed=self.setup.seed,
-            inflation=factor(self._needed),
+            inflation=OF_PARTS if known.of_parts else factor(self._needed),
         )
 
     def _calibrated(self, book: Logbook) -> list[float]:
         """Factors that the flights told since the last identification would have needed, after those before them."""
         needed = list(self._needed)
-        if self.identified is not None:
+        # A committee with parts in it says nothing of those that come after it.
+        if self.identified is not None and not self.identified.of_parts:
             twin = self._twin([])
             for run in book.experiments[self._learnt :]:
                 found = needed_factor(twin, run.test, run.trajectory)
