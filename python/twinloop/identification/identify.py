@@ -23,6 +23,7 @@ from twinloop.identification.fitting import Fitting, Tuned, described
 from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
 from twinloop.identification.identified import Identified
 from twinloop.identification.lags import search_actuators
+from twinloop.identification.noise import NOTHING
 from twinloop.identification.offsets import moved, search_offsets
 from twinloop.identification.parts import parts
 from twinloop.identification.pool import Pool
@@ -36,8 +37,6 @@ from twinloop.signals import Signals
 
 LAGS_AGAIN = 4
 """Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
-NOTHING = 0.01
-"""χ² a reading below which noise was not estimated but held at the least that is believed."""
 ROUNDING = 1e-18
 """That of rounding alone."""
 SEATS = 4

@@ -20,6 +20,8 @@ GUST = 1e-2
 """The same where terms have explained what they can."""
 BEST_SENSOR = 0.1
 """Share of its readings' roughness that a sensor's standard deviation is at least."""
+NOTHING = 0.01
+"""χ² a reading below which the noise was not estimated but held at the least that is believed: readings are exact."""
 RIDGE = 1e-9
 """Added to the columns' unit lengths where all terms are fitted at once."""
 

@@ -10,7 +10,7 @@ from twinloop.arrays import Floats
 from twinloop.equations import hidden_names
 from twinloop.identification.bounds import Limits
 from twinloop.identification.chains import Chain
-from twinloop.identification.noise import BEST_SENSOR
+from twinloop.identification.noise import BEST_SENSOR, NOTHING
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.structure import Sum
@@ -130,7 +130,7 @@ def remarks(
         readings: that counted.
 
     Returns:
-        Misfit, states that never moved, identities, outliers; none where there is nothing to say.
+        Misfit, exact readings, states that never moved, identities, outliers; none where there is nothing to say.
     """
     ignored = int(sum((run.weights == 0.0).sum() for run in runs))
     said = []
@@ -142,6 +142,8 @@ def remarks(
         said.append(
             f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."
         )
+    elif left < NOTHING * readings:
+        said.append("The readings are as good as exact: their noise is taken to be what the model leaves.")
     still = [
         signals.state_names[i]
         for i in range(signals.n_x)
