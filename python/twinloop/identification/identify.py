@@ -301,20 +301,26 @@ class _Learner:
     def _of_parts(self, tuned: Tuned) -> tuple[Tuned, list[_core.Model]]:
         """The shortest description of the only run that itself or its parts have led to, and what parts have led to."""
         actuation = self.fitting.actuation(tuned.model)
-        whole, found = self._problem(actuation), []
-        for run, begun in parts(self.fitting.runs[0], self.signals, actuation):
+        whole, runs, found = self._problem(actuation), self.fitting.runs, []
+        for run, begun in parts(runs[0], self.signals, actuation):
             part = self.selection.of_part(run)
             own = part.alone(self._problem_of([run], begun))
             driven, terms = [sum_.chain for sum_ in own], [term for sum_ in own for term in sum_.weights]
             sums = self.selection.search(whole, terms, own, driven, part.options.moves // 4, 1)
+            # What one of them takes for outliers is none for the others.
+            self.fitting.runs = runs
             answer = self.fitting.tuned(sums, self.selection.given, actuation)
             if np.isfinite(answer.left):
                 found.append(answer)
         of_each = zip(tuned.sums, *(answer.sums for answer in found), strict=True)
         shortest = [min(sums, key=lambda sum_: sum_.energy) for sums in of_each]
+        self.fitting.runs = runs
         if shortest != tuned.sums:
             mixed = self.fitting.tuned(shortest, self.selection.given, actuation)
-            tuned = min(tuned, mixed, key=described)
+            if described(mixed) < described(tuned):
+                tuned = mixed
+            else:
+                self.fitting.runs = runs
         return tuned, [answer.model for answer in found[: self.options.committee_size // SEATS]]
 
     def _actuators(self, terms: Sequence[int], driven: Sequence[Chain]) -> tuple[Actuation, list[Sum]]:
