@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from twinloop import _core
+from twinloop.arrays import Floats
 from twinloop.signals import Signals
 
 Actuator = tuple[float, int, "float | None"]
@@ -37,6 +40,11 @@ class Actuation:
         if not model.actuators:
             return Actuation.direct(signals)
         return Actuation(tuple(model.actuators), tuple(model.hidden))
+
+    def effects(self, signals: Signals, commands: Floats) -> list[Floats]:
+        """What arrives of commands (n, n_u), then hidden states, at the start, middle and end of each period."""
+        scales = np.array([command.size for command in signals.commands])
+        return _core.command_effects(self.actuators, self.hidden, scales, signals.dt, commands)
 
     def bare(self) -> Actuation:
         """The same without hidden states."""

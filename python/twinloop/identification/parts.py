@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from twinloop import _core
 from twinloop.identification.actuation import Actuation
 from twinloop.identification.records import Run
 from twinloop.signals import Signals
@@ -32,8 +29,7 @@ def parts(run: Run, signals: Signals, actuation: Actuation) -> list[tuple[Run, A
         Runs of their own.
     """
     steps = len(run.commands)
-    scales = np.array([command.size for command in signals.commands])
-    effects, _, _ = _core.command_effects(actuation.actuators, (), scales, signals.dt, run.commands)
+    effects, _, _ = actuation.effects(signals, run.commands)
     found = []
     for first, last in ((int(begins * steps), int(ends * steps)) for begins, ends in SHARES):
         if last - first < SHORTEST:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.identification.actuation import Actuation
 from twinloop.signals import Signals
@@ -73,9 +72,7 @@ def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stage
             if state.derivative_of is not None:
                 parent = signals.state_names.index(state.derivative_of)
                 middle[:, parent] += signals.dt / 8.0 * (before[:, i] - after[:, i])
-        effects = _core.command_effects(
-            actuation.actuators, actuation.hidden, scales, signals.dt, run.commands
-        )
+        effects = actuation.effects(signals, run.commands)
         parts.append(
             tuple(  # type: ignore[arg-type]
                 np.hstack([x, e[:, : signals.n_u] / scales, e[:, signals.n_u :]])
