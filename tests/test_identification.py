@@ -265,7 +265,8 @@ def flown_in_gusts(seed):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_from_above_gusts_are_told_from_terms_where_from_below_they_are_not(seed):
     signals, runs = flown_in_gusts(seed)
-    changes = {"libraries": ("linear", "quadratic", "damping"), "moves": 50_000, "hidden": False}
+    changes = {"libraries": ("linear", "quadratic", "damping"), "moves": 50_000}
+    changes |= {"hidden": False, "directions": False}
     both, below = (identified(runs, signals, noise_from_above=above, **changes) for above in (True, False))
     assert both.energy < below.energy - 100.0
     assert both.terms < 12 < below.terms

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 ABLATIONS: dict[str, Mapping[str, object]] = {
     "annealing": {"moves": 100, "starts": 1},
     "ladder": {"libraries": ("linear", "quadratic", "damping")},
+    "directions": {"directions": False},
     "evolution": {"generations": 0},
     "parts": {"parts": False},
     "tuning": {"tuning": False},

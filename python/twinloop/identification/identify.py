@@ -19,6 +19,7 @@ from twinloop.arrays import Floats
 from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import Chain
 from twinloop.identification.committee import committee
+from twinloop.identification.directions import directions
 from twinloop.identification.fitting import Fitting, Tuned, described
 from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
 from twinloop.identification.identified import Identified
@@ -271,7 +272,7 @@ class _Learner:
         """
         # Where nothing is hidden, what follows goes on as if nobody had looked: streams and nodes are taken back.
         entered = len(self.pool)
-        enter_directions(self._problem(actuation), start, self.signals)
+        enter_directions(self.pool, directions(self._problem(actuation), start, self.signals))
         driven = [found.chain for found in start]
         own = [term for found in start for term in found.weights]
         few, many = ([*filled(self.pool), *terms] for terms in (own, self.selection.ladder[0]))

@@ -145,8 +145,13 @@ class Pool:
         n, leaves = self.inputs, self.leaves(number)
         choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
         operation = float(np.log(self.operations))
-        further = max(0, len(leaves) - 2) * (float(np.log(n)) + operation)
+        further = max(0, len(leaves) - 2) * self.further
         return float(np.log(3.0 * choices)) + further + self.functions(number) * operation
+
+    @property
+    def further(self) -> float:
+        """What one more input or constant adds to the description length of an expression, in nats."""
+        return float(np.log(self.inputs) + np.log(self.operations))
 
     def functions(self, number: int) -> int:
         """How often an expression applies a function of one operand."""

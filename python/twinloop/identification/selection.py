@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.identification.chains import Chain, chains
+from twinloop.identification.directions import directions, terms_of, unequal
 from twinloop.identification.evolution import evolve
 from twinloop.identification.formulas import parsed_term
 from twinloop.identification.hidden import filled
@@ -103,9 +104,14 @@ class Selection:
         return [a if a.energy <= b.energy else b for a, b in zip(low, high, strict=True)], high
 
     def climb(self, problem: Problem, known: Sequence[Sum], brief: bool = False) -> list[Sum]:
-        """The best sums of all rungs and of evolved terms, where some are known; `brief`: of the first rung only."""
-        options, ladder = self.options, self.ladder
-        best = list(known)
+        """The best sums of all rungs and of evolved terms, where some are known; `brief`: of the first rung only.
+
+        Directions of commands that are read off the known sums stand on the first rung from then on.
+        """
+        options, best = self.options, list(known)
+        if options.libraries and options.directions and not brief:
+            self._admit_directions(problem, best)
+        ladder = self.ladder
         if options.libraries:
             for number, terms in enumerate(ladder[:1] if brief else ladder):
                 starts = options.starts if number == 0 and not brief else max(1, options.starts // 2)
@@ -147,7 +153,24 @@ class Selection:
 
     def admit_hidden(self) -> None:
         """Terms of a hidden state stand on the first rung, and so do those that were known of it."""
-        terms = [*filled(self.pool), *(node for node in self._known_terms() if self.pool.is_hidden(node))]
+        self._admit(
+            [*filled(self.pool), *(node for node in self._known_terms() if self.pool.is_hidden(node))]
+        )
+
+    def _admit_directions(self, problem: Problem, sums: Sequence[Sum]) -> None:
+        """Terms of directions stand on the first rung; none that would evade the bounds of a plain one."""
+        bounded = {node for limits in self.told.bounds.values() for node in limits}
+        found = directions(problem, sums, self.signals)
+        for direction in found:
+            # A direction is one of those found, and a share that is not that of all others a constant.
+            choice = float(np.log(len(found) + 1)) + self.pool.further * unequal(direction)
+            for term, plain in terms_of(self.pool, direction, self.signals).items():
+                if bounded.isdisjoint(plain):
+                    self.pool.found.setdefault(term, self.pool.length(plain[0]) + choice)
+                    self._admit([term])
+
+    def _admit(self, terms: Sequence[int]) -> None:
+        """Terms stand on the first rung."""
         for term in terms:
             self.pool.rungs.setdefault(term, 0)
         self.ladder = [list(dict.fromkeys([*rung, *terms])) for rung in self.ladder]

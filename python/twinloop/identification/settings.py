@@ -30,6 +30,8 @@ class IdentificationOptions:
         restarts: of the evolution.
         population: features that are judged at once.
         longest: description length of an evolved expression at most, nats.
+        directions: whether what alike commands do together, as read off the best model so far, is a term of its own, in
+            squares and times states, too.
         moves: of a walk over subsets of terms.
         starts: walks for each output.
         largest: terms of an output at most.
@@ -59,6 +61,7 @@ class IdentificationOptions:
     restarts: int = 1
     population: int = 120
     longest: float = 20.0
+    directions: bool = True
     moves: int = 50_000
     starts: int = 4
     largest: int = 16
