@@ -108,6 +108,14 @@ def test_terms_of_a_direction_are_it_its_squares_and_it_times_each_state(shares)
     assert together(pool, direction) == next(iter(terms))
 
 
+def test_a_direction_is_written_as_a_person_would():
+    pool, symbols = Pool(5), ["x", *(f"u{i}" for i in range(1, 5))]
+    yaw = together(pool, ((1, 1.0), (2, -1.0), (3, 1.0), (4, -0.5)))
+    assert pool.text(yaw, symbols) == "(u1 - u2 + u3 - u4 * 0.5)"
+    assert pool.text(pool.product(0, yaw), symbols) == "x * (u1 - u2 + u3 - u4 * 0.5)"
+    assert pool.text(pool.add(("-", 0, yaw)), symbols) == "(x - (u1 - u2 + u3 - u4 * 0.5))"
+
+
 # Chosen
 
 

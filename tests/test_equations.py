@@ -66,6 +66,14 @@ def test_functions_are_written_by_their_names(program):
     np.testing.assert_allclose(read(text, inputs), program.run(inputs), rtol=1e-6, atol=1e-6)
 
 
+def test_sums_are_written_without_brackets_where_the_order_may_be_turned():
+    lines = ["r6 = r0 - r1", "r6 = r2 + r6", "r4 = r6 - r3", "r7 = r0 + r1", "r8 = r2 + r3", "r5 = r7 + r8"]
+    program = _core.Program.parse(program_text(4, 2, 9, [lines]))
+    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS)
+    assert "x[k+1] = x - v + u_scaled - t1" in text
+    assert "v[k+1] = x + v + (u_scaled + t1)" in text  # which rounds otherwise than from left to right
+
+
 def test_an_increment_is_written_as_the_state_and_what_is_added():
     program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r0 * 0.5", "r5 = r1 / r2"]]))
     model = _core.Model(program, "increment", SIGNALS.engine)

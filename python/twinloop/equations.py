@@ -182,12 +182,17 @@ class Writer:
         if operation in "+-" and right is not None and right < 0.0:
             sign = "-" if operation == "+" else "+"
             return f"{self._bracketed(first, SUM)} {sign} {self.number(-right)}", SUM
+        if operation == "+" and self._is_sum(second) and not self._is_sum(first):
+            first, second = second, first  # a sum commutes to the bit: a - b + c for c + (a - b)
         level = SUM if operation in "+-" else PRODUCT
         symbol = operation
         if operation == "/" and right is None:
             symbol, self.protected = "÷", True
         # The right operand keeps its brackets even where algebra would not need them: rounding does.
         return f"{self._bracketed(first, level)} {symbol} {self._bracketed(second, level + 1)}", level
+
+    def _is_sum(self, number: int) -> bool:
+        return number not in self.names and self.graph.nodes[number][0] in ("+", "-")
 
     def _bracketed(self, number: int, level: int) -> str:
         text, own = self._text(number)

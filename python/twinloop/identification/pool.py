@@ -167,13 +167,22 @@ class Pool:
         operation, a, b = node
         if node == ONE:
             return "1"
+        if operation == "+" and isinstance(b, int) and self._is_sum(b) and not self._is_sum(a):
+            a, b = b, a
         first = self.text(a, symbols)
         if operation in UNARY:
             return f"{operation}({first})"
         second = self.text(b, symbols) if isinstance(b, int) else f"{b:.4g}"
         if operation in ("min", "max"):
             return f"{operation}({first}, {second})"
-        return f"{first} {operation} {second}" if operation == "*" else f"({first} {operation} {second})"
+        if operation == "*":
+            return f"{first} * {second}"
+        first = first[1:-1] if operation in "+-" and self._is_sum(a) else first
+        return f"({first} {operation} {second})"
+
+    def _is_sum(self, number: int) -> bool:
+        node = self.node(number)
+        return node is not None and node[0] in ("+", "-")
 
     def values(self, numbers: Sequence[int], rows: Floats) -> Floats:
         """Nodes evaluated.
