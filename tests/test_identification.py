@@ -138,10 +138,14 @@ def test_longer_expressions_cost_more_and_what_is_known_elsewhere_its_own_price(
     # A function is a choice of its own: where rates have one sign only, |rate| says what -rate does.
     for node in (pool.add(("abs", 0, None)), pool.product(pool.add(("abs", 0, None)), 0)):
         assert pool.length(node) == pytest.approx(lengths[1] + np.log(pool.operations))
-    found = prices(pool, terms, 1000, {terms[4]: 1.25})
+    found = prices(pool, terms, 1000, 1, {terms[4]: 1.25})
     expected = np.log(1000.0) + 2.0 * np.array([*lengths[:4], 1.25])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
-    assert (prices(pool, terms, 0, {}) > 0.0).all()
+    assert (prices(pool, terms, 0, 1) > 0.0).all()
+    # From the sixth run on they rise, and slower than evidence does; up to then each tells something of its own.
+    few, many = (prices(pool, terms, 1000, runs, {terms[4]: 1.25}) for runs in (5, 20))
+    np.testing.assert_allclose(few, found)
+    np.testing.assert_allclose(many, 8.0**0.5 * found)
 
 
 def pendulum_like():

@@ -16,7 +16,7 @@ from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Sum, Weights, total
+from twinloop.identification.structure import Sum, Weights, prices, total
 from twinloop.identification.told import Told
 from twinloop.signals import Bounds, Signals
 
@@ -182,10 +182,10 @@ class Fitting:
         saved, kept = 0.0, []
         for found, at in zip(tuned.sums, places, strict=True):
             must = {term for term, bounds in self._bounds(found).items() if excludes_zero(bounds)}
-            price = np.log(max(2, sum(int(run.weights[:, found.chain.states[0]].sum()) for run in self.runs)))
+            readings = sum(int(run.weights[:, found.chain.states[0]].sum()) for run in self.runs)
+            costs = prices(self.pool, list(found.weights), readings, len(self.runs)).tolist()
             weights: Weights = {}
-            for place, (term, weight) in zip(at, found.weights.items(), strict=True):
-                cost = price + 2.0 * self.pool.length(term)
+            for place, cost, (term, weight) in zip(at, costs, found.weights.items(), strict=True):
                 # A constant at its bound has no variance, but is no term if that bound is 0.
                 pays = weight != 0.0 and weight * weight >= cost * variances[place]
                 if pays or term in must or len(found.weights) == 1:

@@ -22,6 +22,10 @@ Judged = tuple[tuple[int, ...], float, float, Floats]
 """A subset of features, its energy, what it leaves, its coefficients."""
 NOISE_ROUNDS = 5
 """Times at most that terms are searched and the noise that they leave is estimated."""
+FEW_RUNS = 5
+"""Runs up to which each is taken to tell something of its own."""
+RESEMBLANCE = 0.75
+"""Power with which prices rise from there on; with 1, no weak term that is true would be found by flying on."""
 RUNG = 20.0
 """What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
 
@@ -45,21 +49,25 @@ class Sum:
     others: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
 
 
-def prices(pool: Pool, terms: Sequence[int], readings: int, favoured: Mapping[int, float]) -> Floats:
+def prices(
+    pool: Pool, terms: Sequence[int], readings: int, runs: int, favoured: Mapping[int, float] | None = None
+) -> Floats:
     """What each term costs, in units of χ²: a coefficient, and the description of its expression.
 
     Args:
         pool: of the terms.
         terms: to be priced.
         readings: whose number gives a coefficient's precision.
+        runs: that they are of. Many resemble one another: what a law that is not quite right leaves on one it leaves on
+            all, and what explains it gains with each without being any truer. So prices rise with their number.
         favoured: description lengths in nats of terms that are known from elsewhere.
 
     Returns:
         Prices (terms,).
     """
-    lengths = [favoured.get(term, pool.length(term)) for term in terms]
+    lengths = [(favoured or {}).get(term, pool.length(term)) for term in terms]
     costs: Floats = np.log(max(readings, 2)) + 2.0 * np.array(lengths)
-    return costs
+    return costs * max(1.0, runs / FEW_RUNS) ** RESEMBLANCE
 
 
 def search(
@@ -101,7 +109,7 @@ def search(
     usable = problem.usable(list(dict.fromkeys([*terms, *(t for s in known if s for t in s.weights)])))
     known_elsewhere = favoured or [{}] * len(chains)
     costs = [
-        prices(problem.pool, usable, problem.readings(chain), elsewhere)
+        prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere)
         for chain, elsewhere in zip(chains, known_elsewhere, strict=True)
     ]
     place = {term: i for i, term in enumerate(usable)}
