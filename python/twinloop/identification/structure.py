@@ -67,7 +67,7 @@ def prices(
     """
     lengths = [(favoured or {}).get(term, pool.length(term)) for term in terms]
     costs: Floats = np.log(max(readings, 2)) + 2.0 * np.array(lengths)
-    return costs * max(1.0, runs / FEW_RUNS) ** RESEMBLANCE
+    return costs * float(max(1.0, runs / FEW_RUNS) ** RESEMBLANCE)
 
 
 def search(
