@@ -19,7 +19,7 @@ from twinloop.identification.libraries import rungs
 from twinloop.identification.parts import parts
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.identification.structure import all_judged, prices
 from twinloop.presets import options_of
 
@@ -436,6 +436,11 @@ def test_a_part_may_lead_to_a_shorter_description_and_never_to_a_longer_one():
         if saved[-1] > 1.0:
             assert set(law(found)) >= {("sin", 0, None)}
     assert min(saved) >= 0.0 and max(saved) > 100.0
+
+
+def test_parts_are_searched_with_the_fewest_moves_too():
+    found = identified([swung(gravity, 0)], pendulum_like(), moves=LEAST_MOVES, committee_size=8)
+    assert found.of_parts and np.isfinite(found.energy)
 
 
 def test_a_part_begins_with_the_effects_that_its_commands_have_there():

@@ -12,7 +12,7 @@ import numpy as np
 from twinloop.errors import InvalidInput, unknown
 from twinloop.identification.libraries import LIBRARIES
 from twinloop.identification.settings import FORMS as ALL_FORMS
-from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.planning.settings import TESTS, PlanningOptions
 
 FORMS = ("absolute", "increment", "acceleration")
@@ -159,7 +159,7 @@ _DEFAULT_RANGES: dict[str, tuple[float, float]] = {
     "restarts": (1, 1000),
     "population": (10, 3000),
     "longest": (1, 1000),
-    "moves": (100, _MANY),
+    "moves": (LEAST_MOVES, _MANY),
     "starts": (1, 1000),
     "largest": (1, 200),
     "most_terms": (1, 3000),

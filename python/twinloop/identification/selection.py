@@ -19,7 +19,7 @@ from twinloop.identification.noise import declared_noise, first_noise, given_noi
 from twinloop.identification.pool import Pool
 from twinloop.identification.problem import Problem
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.identification.structure import Sum, search
 from twinloop.identification.told import told
 from twinloop.signals import Signals
@@ -74,7 +74,8 @@ class Selection:
     def of_part(self, run: Run) -> Selection:
         """A brief one on part of a run, where nothing is known."""
         generations = 0 if self.options.libraries else self.options.generations
-        options = replace(self.options, generations=generations, moves=self.options.moves // 4)
+        moves = max(LEAST_MOVES, self.options.moves // 4)
+        options = replace(self.options, generations=generations, moves=moves)
         return Selection(
             [run], self.signals, options, self.pool, None, self.seed, self.iteration, self.workers
         )

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from twinloop.signals import Signals
 
 FORMS = ("auto", "absolute", "increment", "acceleration")
+LEAST_MOVES = 100
+"""Of a walk; a shorter one hardly leaves its start."""
 
 
 @dataclass(frozen=True)
