@@ -110,11 +110,10 @@ class Selection:
         Directions of commands that are read off the known sums stand on the first rung from then on.
         """
         options, best = self.options, list(known)
-        if options.libraries and options.directions and not brief:
-            self._admit_directions(problem, best)
-        ladder = self.ladder
         if options.libraries:
-            for number, terms in enumerate(ladder[:1] if brief else ladder):
+            if options.directions and not brief:
+                self._admit_directions(problem, best)
+            for number, terms in enumerate(self.ladder[:1] if brief else self.ladder):
                 starts = options.starts if number == 0 and not brief else max(1, options.starts // 2)
                 driven = [found.chain for found in best]
                 best = self.search(
@@ -122,7 +121,9 @@ class Selection:
                 )
         if options.generations and not (brief and options.libraries):
             self.watch("evolution")
-            seeds = list(ladder[0]) if not options.libraries else [self.pool.one, *range(self.pool.inputs)]
+            seeds = (
+                list(self.ladder[0]) if not options.libraries else [self.pool.one, *range(self.pool.inputs)]
+            )
             seeds += [node for found in best for node in found.weights]
             for restart in range(options.restarts):
                 best = evolve(
@@ -161,14 +162,15 @@ class Selection:
     def _admit_directions(self, problem: Problem, sums: Sequence[Sum]) -> None:
         """Terms of directions stand on the first rung; none that would evade the bounds of a plain one."""
         bounded = {node for limits in self.told.bounds.values() for node in limits}
-        found = directions(problem, sums, self.signals)
+        found, admitted = directions(problem, sums, self.signals), []
         for direction in found:
             # A direction is one of those found, and a share that is not that of all others a constant.
             choice = float(np.log(len(found) + 1)) + self.pool.further * unequal(direction)
             for term, plain in terms_of(self.pool, direction, self.signals).items():
                 if bounded.isdisjoint(plain):
                     self.pool.found.setdefault(term, self.pool.length(plain[0]) + choice)
-                    self._admit([term])
+                    admitted.append(term)
+        self._admit(admitted)
 
     def _admit(self, terms: Sequence[int]) -> None:
         """Terms stand on the first rung."""
