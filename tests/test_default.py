@@ -6,6 +6,7 @@ import pytest
 import twinloop as tl
 from conftest import PENDULUM_GAINS
 from oracles import same_bits
+from twinloop.models import Noise
 
 SMALL = {
     "moves": 1500, "starts": 1, "generations": 0, "lags": False, "evaluations": 256, "candidates": 32,
@@ -317,6 +318,50 @@ def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committ
     assert short[0] == 2.0 and short[1] != 2.0
     assert long[:2] == [1.5, 2.0] and long[2] != 2.0
     assert all(1.0 <= factor <= 30.0 for factor in short + long)
+
+
+def runge_kutta_pendulum(x, u):
+    """One period of a pendulum, integrated as a twin is: nothing but rounding is between the two."""
+    h, (angle, rate) = SIGNALS.dt, x
+
+    def pull(at):
+        return 6.0 * u[0] - 12.0 * np.sin(at)
+
+    first = pull(angle)
+    second = pull(angle + h / 2 * rate)
+    third = pull(angle + h / 2 * (rate + h / 2 * first))
+    fourth = pull(angle + h * (rate + h / 2 * second))
+    turned = angle + h * rate + h * h / 6 * (first + second + third)
+    return turned, rate + h / 6 * (first + 2 * second + 2 * third + fourth)
+
+
+def test_the_band_of_exact_readings_is_that_of_what_the_twin_leaves_of_the_flights_it_knows(begin):
+    plant = tl.systems.Simulated(SIGNALS, runge_kutta_pendulum)
+    campaign, shares = begin(duration=3.0, options={"moves": 4000}), []
+    test = campaign.test(PENDULUM_GAINS)
+    for number in range(3):
+        flight = plant.run(test)
+        if number:
+            low, high = campaign.twin.simulate(test).band[:, 1:]
+            shares.append(np.mean((low <= flight.states[1:]) & (flight.states[1:] <= high)))
+        campaign.tell(test, flight)
+        test = campaign.ask()
+        twin = campaign.twin
+        left = [run.trajectory.states - twin.simulate(run.test).states for run in campaign.experiments]
+        nine_of_ten = np.quantile(np.abs(np.concatenate(left)), 0.9, axis=0)
+        np.testing.assert_array_equal(twin.noise.sensors, nine_of_ten / 1.645)
+        assert twin.inflation == 1.0 and 0.0 < twin.noise.sensors.max() < 1e-12
+    assert min(shares) > 0.5
+
+
+def test_members_that_are_one_spread_by_nothing_not_by_the_rounding_of_their_mean(begin, pendulum):
+    campaign = begin().run(pendulum, 1)
+    model, test = campaign.twin.model, campaign.experiments[0].test
+    silent = Noise(np.zeros(2), np.zeros(2))
+    twin = tl.Twin(model, SIGNALS, members=[model] * 7, noise=silent)
+    mean, variance = twin.spread(test)
+    np.testing.assert_array_equal(mean, twin.simulate(test).states)
+    np.testing.assert_array_equal(variance, np.zeros_like(mean))
 
 
 def test_a_pendulum_is_learnt_and_flown_better_than_at_first(begin, pendulum):

@@ -209,9 +209,12 @@ class Twin:
         states = np.concatenate(runs)
         lasted = np.isfinite(states)
         count = np.maximum(1, lasted.sum(axis=0))
-        mean = np.where(lasted, states, 0.0).sum(axis=0) / count
-        variance = np.where(lasted, (states - mean) ** 2, 0.0).sum(axis=0) / count
-        return mean, variance
+        # From one of the runs: sums of whole states round by more than runs may differ.
+        origin = np.where(lasted[0], states[0], 0.0)
+        off = np.where(lasted, states - origin, 0.0)
+        middle = off.sum(axis=0) / count
+        variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
+        return origin + middle, variance
 
     def predict(self, states: ArrayLike, commands: ArrayLike) -> Floats:
         """One step.

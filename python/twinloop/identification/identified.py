@@ -10,6 +10,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import Chain
+from twinloop.identification.noise import NOTHING
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum
 from twinloop.models import Noise
@@ -59,6 +60,11 @@ class Identified:
     def misfit(self) -> float:
         """χ² for each reading; 1 where only noise is left."""
         return self.left / max(1, self.readings)
+
+    @property
+    def exact(self) -> bool:
+        """Whether next to nothing is left by the least noise that the search believes."""
+        return self.misfit < NOTHING
 
     def noise(self, signals: Signals) -> Noise:
         """Of the sensors, and of what moves the states from one period to the next."""

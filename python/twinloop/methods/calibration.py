@@ -1,11 +1,16 @@
-"""Calibration: by how much a committee was too sure of the flights that it predicted."""
+"""Calibration: by how much a committee was too sure of the flights that it predicted, and what exact readings leave."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.flight import fly
+from twinloop.history import Experiment
 from twinloop.models import NINE_OF_TEN, Twin
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -53,3 +58,26 @@ def factor(needed: Sequence[float]) -> float:
         The median of the last ones, with the first guess among them while there are few.
     """
     return float(np.median([FIRST, *needed][-LAST:]))
+
+
+def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergence_factor: float) -> Floats:
+    """What free runs of a model leave of flights that it was learnt from.
+
+    From one reading to the next, exact readings leave their own rounding; over a flight, that of the twin adds up.
+
+    Args:
+        model: that follows the flights to the end.
+        flights: at least one.
+        divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
+
+    Returns:
+        Standard deviations (n_x,) of normal numbers, nine of ten of which would be as small as nine of ten errors.
+    """
+    left = []
+    for flight in flights:
+        states = flight.trajectory.states
+        test = dataclasses.replace(flight.test, initial_state=states[0])
+        free = fly(model, test, divergence_factor=divergence_factor).states
+        rows = min(len(states), len(free))
+        left.append(np.abs(states[:rows] - free[:rows]))
+    return np.asarray(np.quantile(np.concatenate(left), 0.9, axis=0) / NINE_OF_TEN, dtype=np.float64)

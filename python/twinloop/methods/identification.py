@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.logbook import Logbook
-from twinloop.methods.calibration import OF_PARTS, factor, needed_factor
+from twinloop.methods.calibration import OF_PARTS, factor, left_of_flights, needed_factor
 from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
@@ -220,19 +221,25 @@ class IdentifyAndPlan:
 
     def twin(self, book: Logbook) -> Twin:
         """The best model, with the committee and the sensors' noise for its band."""
-        return self._twin(errors(self._known().model, book, self.workers))
+        return self._twin(book, errors(self._known().model, book, self.workers))
 
-    def _twin(self, rows: Sequence[TestErrors]) -> Twin:
-        known = self._known()
+    def _twin(self, book: Logbook, rows: Sequence[TestErrors]) -> Twin:
+        known, divergence = self._known(), self.options.divergence_factor
+        noise = known.noise(self.setup.signals)
+        inflation = OF_PARTS if known.of_parts else factor(self._needed)
+        if known.exact:
+            # What follows exact readings to rounding is the law: its members are too sure of nothing.
+            left = left_of_flights(known.model, book.experiments[: self._learnt], divergence)
+            noise, inflation = replace(noise, sensors=left), 1.0
         return Twin(
             known.model,
             self.setup.signals,
             rows,
-            self.options.divergence_factor,
+            divergence,
             members=self._believed,
-            noise=known.noise(self.setup.signals),
+            noise=noise,
             seed=self.setup.seed,
-            inflation=OF_PARTS if known.of_parts else factor(self._needed),
+            inflation=inflation,
         )
 
     def _calibrated(self, book: Logbook) -> list[float]:
@@ -240,7 +247,7 @@ class IdentifyAndPlan:
         needed = list(self._needed)
         # A committee with parts in it says nothing of those that come after it.
         if self.identified is not None and not self.identified.of_parts:
-            twin = self._twin([])
+            twin = self._twin(book, [])
             for run in book.experiments[self._learnt :]:
                 found = needed_factor(twin, run.test, run.trajectory)
                 needed += [] if found is None else [found]
