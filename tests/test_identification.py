@@ -15,7 +15,7 @@ from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import chains
 from twinloop.identification.fitting import Fitting
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.libraries import rungs
+from twinloop.identification.libraries import LIBRARIES, rungs
 from twinloop.identification.parts import parts
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, guessed_noise
@@ -158,8 +158,7 @@ def pendulum_like():
 
 def test_each_rung_has_the_terms_of_those_below_and_a_stranger_stands_above_all():
     pool = Pool(INPUTS)
-    libraries = ("linear", "quadratic", "damping", "friction", "trigonometric", "cubic")
-    ladder = rungs(pool, pendulum_like(), libraries, 450)
+    ladder = rungs(pool, pendulum_like(), LIBRARIES, 450)
     assert len(ladder) == 3
     drag = pool.product(pool.add(("abs", 1, None)), 1)
     assert drag in ladder[0] and pool.rung([drag]) == 0
@@ -171,6 +170,64 @@ def test_each_rung_has_the_terms_of_those_below_and_a_stranger_stands_above_all(
     assert pool.rung([pool.add(("tanh", 0, None))]) == len(ladder)
     assert rungs(Pool(INPUTS), pendulum_like(), (), 450) == []
     assert len(rungs(Pool(INPUTS), pendulum_like(), ("linear", "cubic"), 4)) == 1
+
+
+def tanks_like(*more):
+    levels = [tl.State(name, "m", 0.5) for name in ("upper", "lower")]
+    return tl.Signals([*levels, *more], [tl.Command("pump", "V", (0.0, 10.0), scale=10.0)], 2.0)
+
+
+def test_roots_are_of_levels_and_of_nothing_that_moves():
+    pool, motion = (
+        Pool(6),
+        (
+            tl.State("place", "m", 1.0),
+            tl.State("speed", "m/s", 1.0, derivative_of="place"),
+            tl.State("turn", "rad", 1.0),
+        ),
+    )
+    found = rungs(pool, tanks_like(*motion), ("roots",), 450)[0]
+    upper, lower = (pool.add(("sqrt", i, None)) for i in range(2))
+    above = pool.add(("-", 0, 1))
+    signed = pool.add(("/", above, pool.add(("sqrt", pool.add(("abs", above, None)), None))))
+    assert set(found) == {upper, lower, pool.product(5, upper), pool.product(5, lower), signed}
+    assert rungs(Pool(INPUTS), pendulum_like(), ("roots",), 450) == []
+    body = tl.RigidBody(("a", "b", "c"), ("p", "q", "r"))
+    six = [tl.State(name, "rad", 1.0) for name in "abc"] + [tl.State(name, "1/s", 1.0) for name in "pqr"]
+    flying = tl.Signals(six, [tl.Command("u", "V", (0.0, 1.0))], 0.02, kinematics=body)
+    assert rungs(Pool(7), flying, ("roots",), 450) == []
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_the_law_of_two_tanks_is_found(joined):
+    """One runs into the other, which leaks; joined at the bottom water runs both ways."""
+
+    def rates(x, u):
+        between = np.sign(x[0] - x[1]) * np.sqrt(abs(x[0] - x[1])) if joined else np.sqrt(x[0])
+        return np.array([0.02 * u - 0.016 * between, 0.016 * between - 0.012 * np.sqrt(x[1])])
+
+    runs = []
+    for seed in range(2):
+        stream = np.random.default_rng(seed)
+        commands = np.repeat(stream.uniform(0.1, 1.0, 30), 5)
+        x, states = np.array([0.1, 0.2 + 0.2 * seed]), [np.array([0.1, 0.2 + 0.2 * seed])]
+        for u in commands:
+            x = x + rates(x, u)
+            states.append(x)
+        noisy = np.array(states) + 5e-4 * stream.normal(size=(151, 2))
+        runs.append(Run.of(noisy, 10.0 * commands[:, np.newaxis]))
+    found = identified(runs, tanks_like(), moves=8000)
+    pool = found.pool
+    above = pool.add(("-", 0, 1))
+    way = pool.add(("/", above, pool.add(("sqrt", pool.add(("abs", above, None)), None))))
+    between = way if joined else pool.add(("sqrt", 0, None))
+    leak = pool.add(("sqrt", 1, None))
+    for sum_, expected in zip(
+        found.sums, ({2: 0.02, between: -0.016}, {between: 0.016, leak: -0.012}), strict=True
+    ):
+        assert set(sum_.weights) == set(expected)
+        for term, weight in expected.items():
+            assert sum_.weights[term] == pytest.approx(weight, rel=0.02)
 
 
 def test_driven_states_are_those_that_no_other_gives():

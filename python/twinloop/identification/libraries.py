@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import combinations_with_replacement
+from itertools import combinations, combinations_with_replacement
 
 from twinloop.identification.pool import Pool
 from twinloop.signals import Signals
@@ -28,6 +28,23 @@ def damping(pool: Pool, signals: Signals) -> Terms:
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
     return [pool.product(pool.add(("abs", i, None)), i) for i in signed]
+
+
+def roots(pool: Pool, signals: Signals) -> Terms:
+    """Square roots of levels, alone and times every command, and of what one level is above another, with its sign.
+
+    What runs out of a vessel, or from one into another, is as their pressures say (Torricelli 1643).
+    """
+    terms: Terms = []
+    for i in levels(signals):
+        root = pool.add(("sqrt", i, None))
+        terms += [root, *(pool.product(j, root) for j in range(signals.n_x, pool.inputs))]
+    for i, j in combinations(levels(signals), 2):
+        if signals.states[i].unit == signals.states[j].unit:
+            above = pool.add(("-", i, j))
+            size = pool.add(("sqrt", pool.add(("abs", above, None)), None))
+            terms.append(pool.add(("/", above, size)))
+    return terms
 
 
 def friction(pool: Pool, signals: Signals) -> Terms:
@@ -65,17 +82,14 @@ def cubic(pool: Pool, signals: Signals) -> Terms:
     return [pool.product(*triple) for triple in combinations_with_replacement(range(pool.inputs), 3)]
 
 
-LIBRARIES: dict[str, Callable[[Pool, Signals], Terms]] = {
-    "linear": linear,
-    "quadratic": quadratic,
-    "damping": damping,
-    "friction": friction,
-    "trigonometric": trigonometric,
-    "cubic": cubic,
-}
-"""Libraries by name, in the order in which they are tried."""
-TOGETHER = {"quadratic": "linear", "damping": "quadratic", "trigonometric": "friction"}
-"""Libraries that share a rung with the one before them."""
+RUNGS: tuple[dict[str, Callable[[Pool, Signals], Terms]], ...] = (
+    {"linear": linear, "quadratic": quadratic, "damping": damping, "roots": roots},
+    {"friction": friction, "trigonometric": trigonometric},
+    {"cubic": cubic},
+)
+"""Libraries by name, in the order in which they are tried; those of one rung together."""
+LIBRARIES = tuple(name for rung in RUNGS for name in rung)
+"""Their names."""
 
 
 def angles(signals: Signals) -> set[int]:
@@ -97,34 +111,39 @@ def speeds(signals: Signals) -> list[list[int]]:
     return list(groups.values())
 
 
+def levels(signals: Signals) -> list[int]:
+    """States that neither are angles nor have to do with derivatives: levels, pressures, temperatures."""
+    if signals.kinematics is not None:
+        return []
+    moving = {state.derivative_of for state in signals.states}
+    return [
+        i
+        for i, state in enumerate(signals.states)
+        if state.unit != "rad" and state.derivative_of is None and state.name not in moving
+    ]
+
+
 def rungs(pool: Pool, signals: Signals, names: Sequence[str], most: int) -> list[Terms]:
     """Growing sets of terms: each rung has the terms of those below it.
 
-    Linear, quadratic and damping terms are one rung, and so are friction and trigonometric ones.
-
     Args:
         pool: where the terms are entered.
-        signals: they say which states are angles and speeds.
+        signals: they say which states are angles, speeds and levels.
         names: of the libraries.
-        most: a rung of more terms than this is left out.
+        most: a library with which a rung would have more terms than this is left out.
 
     Returns:
         Terms of each rung, without repetition.
     """
     ladder: list[Terms] = []
-    below: Terms = []
-    last = ""
-    for name in LIBRARIES:
-        if name not in names:
-            continue
-        terms = list(dict.fromkeys([*below, *LIBRARIES[name](pool, signals)]))
-        if len(terms) > most or len(terms) == len(below):
-            continue
-        if last == TOGETHER.get(name):
-            ladder.pop()
-        ladder.append(terms)
-        below, last = terms, name
-    for number, terms in enumerate(ladder):
-        for term in terms:
-            pool.rungs.setdefault(term, number)
+    terms: Terms = []
+    for rung in RUNGS:
+        below = len(terms)
+        for library in (library for name, library in rung.items() if name in names):
+            more = list(dict.fromkeys([*terms, *library(pool, signals)]))
+            terms = terms if len(more) > most else more
+        if len(terms) > below:
+            ladder.append(terms)
+            for term in terms:
+                pool.rungs.setdefault(term, len(ladder) - 1)
     return ladder

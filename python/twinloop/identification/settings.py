@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from twinloop.identification.libraries import LIBRARIES
 from twinloop.signals import Signals
 
 FORMS = ("auto", "absolute", "increment", "acceleration")
@@ -18,8 +19,8 @@ class IdentificationOptions:
     Args:
         form: what a program's outputs mean; "auto": accelerations where the signals declare derivatives or a rigid
             body, else increments.
-        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "friction", "trigonometric",
-            "cubic"; none: evolved programs only.
+        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "roots", "friction",
+            "trigonometric", "cubic"; none: evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
             the first rung of the ladder.
         fixed_terms: what is known of the law, such as "rate: -9.81 * sin(angle)": a state that an output drives, and a
@@ -54,7 +55,7 @@ class IdentificationOptions:
     """
 
     form: str = "auto"
-    libraries: tuple[str, ...] = ("linear", "quadratic", "damping", "friction", "trigonometric", "cubic")
+    libraries: tuple[str, ...] = LIBRARIES
     seed_terms: tuple[str, ...] = ()
     fixed_terms: tuple[str, ...] = ()
     bounded_terms: tuple[str, ...] = ()
