@@ -177,6 +177,10 @@ def tanks_like(*more):
     return tl.Signals([*levels, *more], [tl.Command("pump", "V", (0.0, 10.0), scale=10.0)], 2.0)
 
 
+def signed_root(pool, node):
+    return pool.add(("/", node, pool.add(("sqrt", node, None))))
+
+
 def test_roots_are_of_levels_and_of_nothing_that_moves():
     pool, motion = (
         Pool(6),
@@ -187,10 +191,11 @@ def test_roots_are_of_levels_and_of_nothing_that_moves():
         ),
     )
     found = rungs(pool, tanks_like(*motion), ("roots",), 450)[0]
-    upper, lower = (pool.add(("sqrt", i, None)) for i in range(2))
-    above = pool.add(("-", 0, 1))
-    signed = pool.add(("/", above, pool.add(("sqrt", pool.add(("abs", above, None)), None))))
-    assert set(found) == {upper, lower, pool.product(5, upper), pool.product(5, lower), signed}
+    upper, lower = (signed_root(pool, i) for i in range(2))
+    between = signed_root(pool, pool.add(("-", 0, 1)))
+    assert set(found) == {upper, lower, pool.product(5, upper), pool.product(5, lower), between}
+    # As short as the root without its sign.
+    assert pool.length(upper) == pool.length(pool.add(("sqrt", 0, None)))
     assert rungs(Pool(INPUTS), pendulum_like(), ("roots",), 450) == []
     body = tl.RigidBody(("a", "b", "c"), ("p", "q", "r"))
     six = [tl.State(name, "rad", 1.0) for name in "abc"] + [tl.State(name, "1/s", 1.0) for name in "pqr"]
@@ -218,10 +223,7 @@ def test_the_law_of_two_tanks_is_found(joined):
         runs.append(Run.of(noisy, 10.0 * commands[:, np.newaxis]))
     found = identified(runs, tanks_like(), moves=8000)
     pool = found.pool
-    above = pool.add(("-", 0, 1))
-    way = pool.add(("/", above, pool.add(("sqrt", pool.add(("abs", above, None)), None))))
-    between = way if joined else pool.add(("sqrt", 0, None))
-    leak = pool.add(("sqrt", 1, None))
+    between, leak = signed_root(pool, pool.add(("-", 0, 1)) if joined else 0), signed_root(pool, 1)
     for sum_, expected in zip(
         found.sums, ({2: 0.02, between: -0.016}, {between: 0.016, leak: -0.012}), strict=True
     ):

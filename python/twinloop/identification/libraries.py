@@ -31,20 +31,23 @@ def damping(pool: Pool, signals: Signals) -> Terms:
 
 
 def roots(pool: Pool, signals: Signals) -> Terms:
-    """Square roots of levels, alone and times every command, and of what one level is above another, with its sign.
+    """Square roots of levels, alone and times every command, and of what one level is above another, with their signs.
 
     What runs out of a vessel, or from one into another, is as their pressures say (Torricelli 1643).
     """
     terms: Terms = []
     for i in levels(signals):
-        root = pool.add(("sqrt", i, None))
+        root = _signed_root(pool, i)
         terms += [root, *(pool.product(j, root) for j in range(signals.n_x, pool.inputs))]
     for i, j in combinations(levels(signals), 2):
         if signals.states[i].unit == signals.states[j].unit:
-            above = pool.add(("-", i, j))
-            size = pool.add(("sqrt", pool.add(("abs", above, None)), None))
-            terms.append(pool.add(("/", above, size)))
+            terms.append(_signed_root(pool, pool.add(("-", i, j))))
     return terms
+
+
+def _signed_root(pool: Pool, node: int) -> int:
+    """The root of a size, with its sign: below zero, where only noise or a wrong model leads, it still pulls back."""
+    return pool.add(("/", node, pool.add(("sqrt", node, None))))
 
 
 def friction(pool: Pool, signals: Signals) -> Terms:
