@@ -232,6 +232,45 @@ def test_the_law_of_two_tanks_is_found(joined):
             assert sum_.weights[term] == pytest.approx(weight, rel=0.02)
 
 
+def test_quotients_are_of_what_may_be_a_distance():
+    pool = Pool(INPUTS)
+    moving = tl.Signals(
+        [tl.State("gap", "m", 1.0), tl.State("speed", "m/s", 1.0, derivative_of="gap")],
+        [tl.Command("current", "A", (0.0, 3.0), scale=1.0)],
+        0.02,
+    )
+    found = rungs(pool, moving, ("quotients",), 450)[0]
+    square = pool.product(0, 0)
+    above = (pool.one, 2, pool.product(2, 2))
+    assert set(found) == {pool.add(("/", a, below)) for below in (0, square) for a in above}
+    assert rungs(Pool(INPUTS), pendulum_like(), ("quotients",), 450) == []
+
+
+def test_the_law_of_a_magnet_is_found():
+    """It holds a body up with the square of current over distance."""
+    signals = tl.Signals(
+        [tl.State("gap", "m", 1.0), tl.State("speed", "m/s", 3.0, derivative_of="gap")],
+        [tl.Command("current", "A", (0.0, 3.0), scale=1.0)],
+        0.02,
+    )
+
+    def lifted(gap, speed, current):
+        return -9.81 + 3.0 * (2.0 + current) ** 2 / gap**2 - 0.8 * speed
+
+    runs = []
+    for seed in range(2):
+        run = swung(lifted, seed, start=(1.2 + 0.3 * seed, 0.0), noise=1e-3, amplitude=1.0)
+        runs.append(Run.of(run.states, run.commands + 2.0))
+    found = identified(runs, signals, moves=8000)
+    (weights,) = (found_sum.weights for found_sum in found.sums)
+    pool = found.pool
+    pull = pool.add(("/", pool.product(2, 2), pool.product(0, 0)))
+    expected = {pool.one: -9.81, pull: 3.0, 1: -0.8}
+    assert set(weights) == set(expected)
+    for term, weight in expected.items():
+        assert weights[term] == pytest.approx(weight, rel=0.03)
+
+
 def test_driven_states_are_those_that_no_other_gives():
     names = ("roll", "pitch", "yaw", "p", "q", "r")
     states = [tl.State(name, "rad", 1.0) for name in names]

@@ -78,6 +78,17 @@ def trigonometric(pool: Pool, signals: Signals) -> Terms:
     return terms
 
 
+def quotients(pool: Pool, signals: Signals) -> Terms:
+    """Inverses of distances and levels, and of their squares, alone and times every command and its square."""
+    terms: Terms = []
+    for i in range(signals.n_x):
+        if signals.states[i].unit != "rad" and signals.states[i].derivative_of is None:
+            squares = [pool.product(j, j) for j in range(signals.n_x, pool.inputs)]
+            above = [pool.one, *range(signals.n_x, pool.inputs), *squares]
+            terms += [pool.add(("/", a, below)) for below in (i, pool.product(i, i)) for a in above]
+    return terms
+
+
 def cubic(pool: Pool, signals: Signals) -> Terms:
     """Products of three inputs; none where there would be more than 600 of them."""
     if pool.inputs > 13:
@@ -87,7 +98,7 @@ def cubic(pool: Pool, signals: Signals) -> Terms:
 
 RUNGS: tuple[dict[str, Callable[[Pool, Signals], Terms]], ...] = (
     {"linear": linear, "quadratic": quadratic, "damping": damping, "roots": roots},
-    {"friction": friction, "trigonometric": trigonometric},
+    {"friction": friction, "trigonometric": trigonometric, "quotients": quotients},
     {"cubic": cubic},
 )
 """Libraries by name, in the order in which they are tried; those of one rung together."""

@@ -20,7 +20,7 @@ class IdentificationOptions:
         form: what a program's outputs mean; "auto": accelerations where the signals declare derivatives or a rigid
             body, else increments.
         libraries: that terms are taken from, any of "linear", "quadratic", "damping", "roots", "friction",
-            "trigonometric", "cubic"; none: evolved programs only.
+            "trigonometric", "quotients", "cubic"; none: evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
             the first rung of the ladder.
         fixed_terms: what is known of the law, such as "rate: -9.81 * sin(angle)": a state that an output drives, and a
