@@ -182,25 +182,33 @@ def signed_root(pool, node):
 
 
 def test_roots_are_of_levels_and_of_nothing_that_moves():
-    pool, motion = (
-        Pool(6),
-        (
-            tl.State("place", "m", 1.0),
-            tl.State("speed", "m/s", 1.0, derivative_of="place"),
-            tl.State("turn", "rad", 1.0),
-        ),
+    pool = Pool(6)
+    motion = tanks_like(
+        tl.State("place", "m", 1.0),
+        tl.State("speed", "m/s", 1.0, derivative_of="place"),
+        tl.State("turn", "rad", 1.0),
     )
-    found = rungs(pool, tanks_like(*motion), ("roots",), 450)[0]
+    found = rungs(pool, motion, ("roots",), 450)[0]
     upper, lower = (signed_root(pool, i) for i in range(2))
     between = signed_root(pool, pool.add(("-", 0, 1)))
     assert set(found) == {upper, lower, pool.product(5, upper), pool.product(5, lower), between}
     # As short as the root without its sign.
     assert pool.length(upper) == pool.length(pool.add(("sqrt", 0, None)))
-    assert rungs(Pool(INPUTS), pendulum_like(), ("roots",), 450) == []
+
+
+@pytest.mark.parametrize("libraries", [("roots",), ("quotients",)])
+def test_angles_and_rates_have_no_roots_and_no_quotients(libraries):
     body = tl.RigidBody(("a", "b", "c"), ("p", "q", "r"))
-    six = [tl.State(name, "rad", 1.0) for name in "abc"] + [tl.State(name, "1/s", 1.0) for name in "pqr"]
+    six = [tl.State(name, "rad", 1.0) for name in "abc"] + [tl.State(name, "rad/s", 1.0) for name in "pqr"]
     flying = tl.Signals(six, [tl.Command("u", "V", (0.0, 1.0))], 0.02, kinematics=body)
-    assert rungs(Pool(7), flying, ("roots",), 450) == []
+    assert rungs(Pool(7), flying, libraries, 450) == []
+    assert rungs(Pool(INPUTS), pendulum_like(), libraries, 450) == []
+    # Whatever else a body carries has them.
+    tank = tl.State("tank", "l", 1.0)
+    carrying = tl.Signals([*six, tank], [tl.Command("u", "V", (0.0, 1.0))], 0.02, kinematics=body)
+    pool = Pool(8)
+    (terms,) = rungs(pool, carrying, libraries, 450)
+    assert {6} <= {leaf for term in terms for leaf in pool.leaves(term)} <= {6, 7, None}
 
 
 @pytest.mark.parametrize("joined", [False, True])
@@ -232,27 +240,24 @@ def test_the_law_of_two_tanks_is_found(joined):
             assert sum_.weights[term] == pytest.approx(weight, rel=0.02)
 
 
-def test_quotients_are_of_what_may_be_a_distance():
-    pool = Pool(INPUTS)
-    moving = tl.Signals(
-        [tl.State("gap", "m", 1.0), tl.State("speed", "m/s", 1.0, derivative_of="gap")],
-        [tl.Command("current", "A", (0.0, 3.0), scale=1.0)],
-        0.02,
-    )
-    found = rungs(pool, moving, ("quotients",), 450)[0]
-    square = pool.product(0, 0)
-    above = (pool.one, 2, pool.product(2, 2))
-    assert set(found) == {pool.add(("/", a, below)) for below in (0, square) for a in above}
-    assert rungs(Pool(INPUTS), pendulum_like(), ("quotients",), 450) == []
-
-
-def test_the_law_of_a_magnet_is_found():
-    """It holds a body up with the square of current over distance."""
-    signals = tl.Signals(
+def magnet_like():
+    return tl.Signals(
         [tl.State("gap", "m", 1.0), tl.State("speed", "m/s", 3.0, derivative_of="gap")],
         [tl.Command("current", "A", (0.0, 3.0), scale=1.0)],
         0.02,
     )
+
+
+def test_quotients_are_of_what_may_be_a_distance():
+    pool = Pool(INPUTS)
+    found = rungs(pool, magnet_like(), ("quotients",), 450)[0]
+    square = pool.product(0, 0)
+    above = (pool.one, 2, pool.product(2, 2))
+    assert set(found) == {pool.add(("/", a, below)) for below in (0, square) for a in above}
+
+
+def test_the_law_of_a_magnet_is_found():
+    """It holds a body up with the square of current over distance."""
 
     def lifted(gap, speed, current):
         return -9.81 + 3.0 * (2.0 + current) ** 2 / gap**2 - 0.8 * speed
@@ -261,9 +266,8 @@ def test_the_law_of_a_magnet_is_found():
     for seed in range(2):
         run = swung(lifted, seed, start=(1.2 + 0.3 * seed, 0.0), noise=1e-3, amplitude=1.0)
         runs.append(Run.of(run.states, run.commands + 2.0))
-    found = identified(runs, signals, moves=8000)
-    (weights,) = (found_sum.weights for found_sum in found.sums)
-    pool = found.pool
+    found = identified(runs, magnet_like(), moves=8000)
+    pool, weights = found.pool, found.sums[0].weights
     pull = pool.add(("/", pool.product(2, 2), pool.product(0, 0)))
     expected = {pool.one: -9.81, pull: 3.0, 1: -0.8}
     assert set(weights) == set(expected)

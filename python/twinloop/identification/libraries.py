@@ -80,13 +80,10 @@ def trigonometric(pool: Pool, signals: Signals) -> Terms:
 
 def quotients(pool: Pool, signals: Signals) -> Terms:
     """Inverses of distances and levels, and of their squares, alone and times every command and its square."""
-    terms: Terms = []
-    for i in range(signals.n_x):
-        if signals.states[i].unit != "rad" and signals.states[i].derivative_of is None:
-            squares = [pool.product(j, j) for j in range(signals.n_x, pool.inputs)]
-            above = [pool.one, *range(signals.n_x, pool.inputs), *squares]
-            terms += [pool.add(("/", a, below)) for below in (i, pool.product(i, i)) for a in above]
-    return terms
+    commands = range(signals.n_x, pool.inputs)
+    above = [pool.one, *commands, *(pool.product(j, j) for j in commands)]
+    below = [size for i in distances(signals) for size in (i, pool.product(i, i))]
+    return [pool.add(("/", a, size)) for size in below for a in above]
 
 
 def cubic(pool: Pool, signals: Signals) -> Terms:
@@ -111,30 +108,32 @@ def angles(signals: Signals) -> set[int]:
     return {i for i, state in enumerate(signals.states) if state.unit == "rad"}
 
 
+def rates(signals: Signals) -> set[int]:
+    """States that are declared derivatives or body rates."""
+    body = () if signals.kinematics is None else signals.kinematics.rates
+    return {
+        i for i, state in enumerate(signals.states) if state.derivative_of is not None or state.name in body
+    }
+
+
 def speeds(signals: Signals) -> list[list[int]]:
-    """States that are derivatives or body rates, by their unit."""
-    names = {state.derivative_of for state in signals.states} - {None}
-    rates = [i for i, state in enumerate(signals.states) if state.derivative_of is not None]
-    if signals.kinematics is not None:
-        rates += [signals.state_names.index(name) for name in signals.kinematics.rates]
-    if not rates and not names:
-        rates = list(range(signals.n_x))
+    """Rates by their unit; where none are declared every state may be one."""
     groups: dict[str, list[int]] = {}
-    for i in sorted(set(rates)):
+    for i in sorted(rates(signals) or range(signals.n_x)):
         groups.setdefault(signals.states[i].unit, []).append(i)
     return list(groups.values())
 
 
+def distances(signals: Signals) -> list[int]:
+    """States that are neither angles nor rates: places, levels, pressures, temperatures."""
+    moving = angles(signals) | rates(signals)
+    return [i for i in range(signals.n_x) if i not in moving]
+
+
 def levels(signals: Signals) -> list[int]:
-    """States that neither are angles nor have to do with derivatives: levels, pressures, temperatures."""
-    if signals.kinematics is not None:
-        return []
+    """Distances of which no rate is declared."""
     moving = {state.derivative_of for state in signals.states}
-    return [
-        i
-        for i, state in enumerate(signals.states)
-        if state.unit != "rad" and state.derivative_of is None and state.name not in moving
-    ]
+    return [i for i in distances(signals) if signals.states[i].name not in moving]
 
 
 def rungs(pool: Pool, signals: Signals, names: Sequence[str], most: int) -> list[Terms]:
@@ -142,7 +141,7 @@ def rungs(pool: Pool, signals: Signals, names: Sequence[str], most: int) -> list
 
     Args:
         pool: where the terms are entered.
-        signals: they say which states are angles, speeds and levels.
+        signals: they say which states are angles, rates and distances.
         names: of the libraries.
         most: a library with which a rung would have more terms than this is left out.
 
