@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import warnings
 from collections.abc import Callable, Sequence
 
@@ -48,11 +47,6 @@ def from_unit(family: Family, places: ArrayLike) -> Floats:
     return genes
 
 
-def load_search() -> None:
-    """Imports CMA-ES, which takes a second or two: not what somebody should wait for between two flights."""
-    importlib.import_module("cmaes")
-
-
 def tune_gains(
     family: Family,
     score: Score,
@@ -77,7 +71,7 @@ def tune_gains(
     Returns:
         The genes, and their score.
     """
-    from cmaes import CMA  # imported here: `import twinloop` should be quick
+    from cmaes import CMA  # imported here: it takes a while
 
     best_genes, best = np.asarray(starts[0], dtype=np.float64), float(score(np.atleast_2d(starts[0]))[0])
     for number, start in enumerate(starts):

@@ -12,7 +12,7 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.flights import disagreements
 from twinloop.planning.excitation import binary, chirps
-from twinloop.planning.gains import from_unit, load_search, to_unit, tune_gains
+from twinloop.planning.gains import from_unit, to_unit, tune_gains
 from twinloop.planning.judging import DIVERGED, Committee, Ends, Judge, Task, expected
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
@@ -82,7 +82,6 @@ class Planner(Judge):
         )
         self.options = options
         self.watch = watch
-        load_search()
 
     def tune(self, committee: Committee, starts: Sequence[Floats], number: int) -> tuple[Floats, float]:
         """Gains of the best quality on the committee, inside the envelope with its margin.
