@@ -5,7 +5,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
-from oracles import same_bits
+from oracles import rk4, same_bits
 from twinloop.models import Noise
 
 SMALL = {
@@ -322,17 +322,7 @@ def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committ
 
 def runge_kutta_pendulum(x, u):
     """One period of a pendulum, integrated as a twin is: nothing but rounding is between the two."""
-    h, (angle, rate) = SIGNALS.dt, x
-
-    def pull(at):
-        return 6.0 * u[0] - 12.0 * np.sin(at)
-
-    first = pull(angle)
-    second = pull(angle + h / 2 * rate)
-    third = pull(angle + h / 2 * (rate + h / 2 * first))
-    fourth = pull(angle + h * (rate + h / 2 * second))
-    turned = angle + h * rate + h * h / 6 * (first + second + third)
-    return turned, rate + h / 6 * (first + 2 * second + 2 * third + fourth)
+    return rk4(lambda now: np.array([now[1], 6.0 * u[0] - 12.0 * np.sin(now[0])]), np.asarray(x), SIGNALS.dt)
 
 
 def test_the_band_of_exact_readings_is_that_of_what_the_twin_leaves_of_the_flights_it_knows(begin):

@@ -10,7 +10,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import Chain
-from twinloop.identification.noise import NOTHING
+from twinloop.identification.noise import exact
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum
 from twinloop.models import Noise
@@ -63,8 +63,8 @@ class Identified:
 
     @property
     def exact(self) -> bool:
-        """Whether next to nothing is left by the least noise that the search believes."""
-        return self.misfit < NOTHING
+        """Whether the readings are as good as exact."""
+        return exact(self.left, self.readings)
 
     def noise(self, signals: Signals) -> Noise:
         """Of the sensors, and of what moves the states from one period to the next."""

@@ -24,7 +24,7 @@ from twinloop.identification.fitting import Fitting, Tuned, described
 from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
 from twinloop.identification.identified import Identified
 from twinloop.identification.lags import search_actuators
-from twinloop.identification.noise import NOTHING
+from twinloop.identification.noise import exact
 from twinloop.identification.offsets import moved, search_offsets
 from twinloop.identification.parts import parts
 from twinloop.identification.pool import Pool
@@ -336,10 +336,7 @@ class _Learner:
     def _rescaled(self, observer: Sequence[Chain], left: float, readings: int) -> list[Chain]:
         """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
         factor = left / max(1, readings) if np.isfinite(left) else 1.0
-        if factor > NOTHING:
-            factor = max(1.0, factor)
-        # Next to nothing is left by the least noise that the search was to believe: readings are exact.
-        factor = max(factor, ROUNDING)
+        factor = max(factor, ROUNDING if exact(left, readings) else 1.0)
         return [
             c.with_noise(c.sensors * factor, (c.motion[0] * factor, c.motion[1] * factor, c.motion[2]))
             for c in observer

@@ -26,6 +26,11 @@ RIDGE = 1e-9
 """Added to the columns' unit lengths where all terms are fitted at once."""
 
 
+def exact(left: float, readings: int) -> bool:
+    """Whether a χ² says that the readings are exact: next to nothing is left by the least noise that is believed."""
+    return left < NOTHING * max(1, readings)
+
+
 def declared_noise(chain: Chain, signals: Signals) -> Chain:
     """The chain with sensors as they are declared, as far as readings allow; the estimate begins there."""
     sensors = chain.sensors.copy()

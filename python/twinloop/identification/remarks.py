@@ -10,7 +10,7 @@ from twinloop.arrays import Floats
 from twinloop.equations import hidden_names
 from twinloop.identification.bounds import Limits
 from twinloop.identification.chains import Chain
-from twinloop.identification.noise import BEST_SENSOR, NOTHING
+from twinloop.identification.noise import BEST_SENSOR, exact
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.structure import Sum
@@ -142,7 +142,7 @@ def remarks(
         said.append(
             f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."
         )
-    elif left < NOTHING * readings:
+    elif exact(left, readings):
         said.append("The readings are as good as exact: their noise is taken to be what the model leaves.")
     still = [
         signals.state_names[i]
