@@ -179,7 +179,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
             }
             for commands, squared, rest, time in lesson.hidden
         ],
-        "disturbances": _disturbances(campaign, twin),
+        "disturbances": _disturbances(campaign, twin, lesson),
         "remarks": list(lesson.remarks),
     }
     result["controller"] |= {
@@ -192,7 +192,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
     result["advice"] = _advice(campaign, twin, best)
 
 
-def _disturbances(campaign: Campaign, twin: Twin) -> list[dict[str, object]]:
+def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[str, object]]:
     """What moves the states beside the commands: white, and lasting with a memory; those that are felt at all."""
     if twin.noise is None:
         return []
@@ -200,8 +200,8 @@ def _disturbances(campaign: Campaign, twin: Twin) -> list[dict[str, object]]:
     found: list[dict[str, object]] = []
     for i, (state, white) in enumerate(zip(campaign.signals.states, twin.noise.moves.tolist(), strict=True)):
         size, memory = lasting.get(i, (0.0, 0.0))
-        # What is far below the sensor's noise within its memory cannot be told from nothing.
-        least = 0.01 * float(twin.noise.sensors[i])
+        # What is far below the sensor's noise, estimated beside it, within its memory cannot be told from nothing.
+        least = 0.01 * lesson.sensors[i]
         white = white if white > least else 0.0
         size = size if size * max(memory, campaign.signals.dt) > least else 0.0
         if white or size:
