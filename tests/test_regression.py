@@ -185,7 +185,8 @@ def test_the_noise_that_made_a_record_is_found(states, integrated, sensors, whit
     regression = _core.Regression(states, DT, integrated, [record])
     low, none = np.full(states, 1e-12), (1e-12, 0.0, 1.0)
     start = (30.0 * white, 0.0, 1.0)
-    found, motion, score = regression.most_likely_noise([0.0], np.full(states, 1e-3), start, low, none)
+    problem = (regression, [0.0], np.full(states, 1e-3), start, low, none)
+    ((found, motion, score),) = _core.most_likely_noises([problem])
     np.testing.assert_allclose(found, sensors, rtol=0.25)
     assert motion[0] == pytest.approx(white, rel=0.35)
     assert score == pytest.approx(regression.likelihood([0.0], found, motion), rel=1e-12)
@@ -196,7 +197,8 @@ def test_no_variance_falls_below_its_floor():
     dense = Dense(1, True)
     record = wandering(dense, np.array([1e-4]), (1e-2, 0.0, 1.0), 300, 6)
     regression = _core.Regression(1, DT, True, [record])
-    found, motion, _ = regression.most_likely_noise([0.0], [1.0], (1.0, 0.0, 1.0), [0.5], (0.25, 0.0, 1.0))
+    problem = (regression, [0.0], [1.0], (1.0, 0.0, 1.0), [0.5], (0.25, 0.0, 1.0))
+    ((found, motion, _),) = _core.most_likely_noises([problem])
     assert found[0] == 0.5 and motion[0] == 0.25
 
 

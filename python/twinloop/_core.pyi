@@ -50,6 +50,7 @@ __all__ = [
     "final_distances",
     "ideal_point",
     "instability",
+    "most_likely_noises",
     "open_loop",
     "predictions",
     "qualities",
@@ -409,15 +410,6 @@ class Regression:
         """Readings less what coefficients (p,) explain, (n + 1, states) for each record."""
     def likelihood(self, coefficients: ArrayLike, sensors: ArrayLike, motion: _Motion) -> float:
         """−2 log of the likelihood of the residuals, up to a constant."""
-    def most_likely_noise(
-        self,
-        coefficients: ArrayLike,
-        sensors: ArrayLike,
-        motion: _Motion,
-        smallest_sensors: ArrayLike,
-        smallest_motion: _Motion,
-    ) -> tuple[_Floats, _Motion, float]:
-        """Sensors' variances and motion under which residuals are most likely, and −2 log of that."""
     def gram(self, sensors: ArrayLike, motion: _Motion, workers: Workers | None = None) -> Gram:
         """Inner products under sensors' variances (states,) and disturbances of the motion."""
 
@@ -434,6 +426,15 @@ class Gram:
         """Sum of squares of the whitened readings."""
     def solve(self, subset: Sequence[int], ridge: float = 0.0) -> tuple[_Floats, _Floats, float] | None:
         """Coefficients (k,), their covariance (k, k) and χ²; None where the features are collinear."""
+
+def most_likely_noises(
+    problems: Sequence[tuple[Regression, ArrayLike, ArrayLike, _Motion, ArrayLike, _Motion]],
+    workers: Workers | None = None,
+) -> list[tuple[_Floats, _Motion, float]]:
+    """For each problem, sensors' variances and motion under which residuals are most likely, and −2 log of that.
+
+    problems: a regression, coefficients (p,), sensors' variances and motion to start from, and the least of both.
+    """
 
 def search_subsets(
     grams: Sequence[Gram],

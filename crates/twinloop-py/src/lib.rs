@@ -39,7 +39,7 @@ mod _core {
     #[pymodule_export]
     use crate::program::{PyGrammar, PyProgram};
     #[pymodule_export]
-    use crate::regression::{PyGram, PyRegression, search_subsets};
+    use crate::regression::{PyGram, PyRegression, most_likely_noises, search_subsets};
     #[pymodule_export]
     use crate::rollout::{PyRuns, PyTask, rollout};
     #[pymodule_export]

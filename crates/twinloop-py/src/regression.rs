@@ -87,24 +87,6 @@ impl PyRegression {
         Ok(likelihood(&self.chain, &self.records, &residuals, &self.noise(&sensors, motion)?))
     }
 
-    #[pyo3(signature = (coefficients, sensors, motion, smallest_sensors, smallest_motion))]
-    fn most_likely_noise<'py>(
-        &self,
-        py: Python<'py>,
-        coefficients: Vector<'py>,
-        sensors: Vector<'py>,
-        motion: Motion,
-        smallest_sensors: Vector<'py>,
-        smallest_motion: Motion,
-    ) -> Result<(Bound<'py, PyArray1<f64>>, Motion, f64)> {
-        let residuals = self.leftovers(&coefficients)?;
-        let start = self.noise(&sensors, motion)?;
-        let smallest = self.noise(&smallest_sensors, smallest_motion)?;
-        let (noise, score) =
-            py.detach(|| most_likely_noise(&self.chain, &self.records, &residuals, &start, &smallest));
-        Ok((to_vector(py, noise.sensors), (noise.process, noise.gust, noise.memory), score))
-    }
-
     #[pyo3(signature = (sensors, motion, workers = None))]
     fn gram(
         &self,
@@ -151,6 +133,38 @@ impl PyRegression {
         }
         Ok(Noise { sensors, process, gust, memory })
     }
+}
+
+/// A regression with coefficients, the sensors' variances and the motion to start from, and the least of both.
+type Left<'py> = (Bound<'py, PyRegression>, Vector<'py>, Vector<'py>, Motion, Vector<'py>, Motion);
+
+/// For each of the problems the noise under which what its coefficients leave is most likely, and −2 log of that.
+#[pyfunction]
+#[pyo3(signature = (problems, workers = None))]
+#[expect(clippy::type_complexity, reason = "sensors' variances, motion, −2 log of the likelihood")]
+pub fn most_likely_noises<'py>(
+    py: Python<'py>,
+    problems: Vec<Left<'py>>,
+    workers: Option<&PyWorkers>,
+) -> Result<Vec<(Bound<'py, PyArray1<f64>>, Motion, f64)>> {
+    let workers = or_default(workers)?;
+    let mut posed = Vec::with_capacity(problems.len());
+    for (regression, coefficients, sensors, motion, smallest_sensors, smallest_motion) in &problems {
+        let regression = regression.get();
+        let residuals = regression.leftovers(coefficients)?;
+        let start = regression.noise(sensors, *motion)?;
+        posed.push((regression, residuals, start, regression.noise(smallest_sensors, *smallest_motion)?));
+    }
+    let found = py.detach(|| {
+        workers.map(posed.len(), |i| {
+            let (regression, residuals, start, smallest) = &posed[i];
+            most_likely_noise(&regression.chain, &regression.records, residuals, start, smallest)
+        })
+    });
+    let told = |(noise, score): (Noise, f64)| {
+        (to_vector(py, noise.sensors), (noise.process, noise.gust, noise.memory), score)
+    };
+    Ok(found.into_iter().map(told).collect())
 }
 
 /// Inner products of whitened features and readings.
@@ -225,7 +239,7 @@ pub fn search_subsets(
             let problem = unit / starts;
             let mut stream =
                 Stream::new(seed, Purpose::Subsets, iteration, problem as u64, (unit % starts) as u64);
-            search(&choices[problem], &annealing, &mut stream)
+            search(&choices[problem], &annealing, &mut stream, workers.width())
         })
     });
     let merged = walks.chunks(starts).map(|walks| {

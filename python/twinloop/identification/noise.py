@@ -9,7 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.errors import engine_input
 from twinloop.identification.chains import Chain, Motion
 from twinloop.identification.problem import Problem
 from twinloop.signals import Signals
@@ -73,7 +75,10 @@ def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = Tr
     low, slow = floor_of(chain, scales, problem.dt)
     # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
     begun = [_begun(chain, low, slow, problem.dt, size) for size in (GUSTS if gusts else (0.0,))]
-    found = [regression.most_likely_noise(np.zeros(1), *start, low, slow) for start in begun]
+    with engine_input():
+        found = _core.most_likely_noises(
+            [(regression, [0.0], *start, low, slow) for start in begun], problem.workers
+        )
     sensors, motion, _ = min(found, key=lambda answer: answer[2])
     return chain.with_noise(sensors, motion)
 
@@ -102,9 +107,10 @@ def first_noise(
         solved = gram.solve(list(range(len(terms))), RIDGE)
         if solved is None:
             break
-        sensors, motion, _ = regression.most_likely_noise(
-            solved[0], sensors, motion, smallest_sensors=low, smallest_motion=slow
-        )
+        with engine_input():
+            ((sensors, motion, _),) = _core.most_likely_noises(
+                [(regression, solved[0], sensors, motion, low, slow)]
+            )
         used = min(len(terms), 0.7 * readings)
         sensors = sensors * readings / (readings - used)
     return chain.with_noise(sensors, motion)

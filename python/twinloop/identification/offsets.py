@@ -170,17 +170,19 @@ class _Group:
 
     def _believed(self, size: float) -> list[Chain]:
         """The chains with the noise under which that is most likely."""
-        dt, found = self.signals.dt, []
+        dt, problems = self.signals.dt, []
         for chain, regression in zip(self.chains, self._regressions(size, self.chains), strict=True):
             low, slow = floor_of(chain, self.scales, dt)
             first = float(chain.rough[0])
             gust = 0.0 if chain.output is None else max(first / dt**2, slow[1])
             start = (max(first / dt, slow[0]), gust, 10.0 * dt)
-            sensors, motion, _ = regression.most_likely_noise(
-                [0.0], np.maximum(chain.rough, low), start, smallest_sensors=low, smallest_motion=slow
-            )
-            found.append(chain.with_noise(sensors, motion))
-        return found
+            problems.append((regression, [0.0], np.maximum(chain.rough, low), start, low, slow))
+        with engine_input():
+            found = _core.most_likely_noises(problems, self.workers)
+        return [
+            chain.with_noise(sensors, motion)
+            for chain, (sensors, motion, _) in zip(self.chains, found, strict=True)
+        ]
 
 
 def _unexplained(runs: Sequence[Run], signals: Signals, chain: Chain) -> _core.Regression:

@@ -39,6 +39,7 @@ class Pool:
         self._numbers: dict[tuple[Node, bool], int] = {}
         self.rungs: dict[int, int] = {}
         self.found: dict[int, float] = {}
+        self._lengths: dict[int, float] = {}
         self.one = self.add(ONE)
 
     def __len__(self) -> int:
@@ -68,6 +69,7 @@ class Pool:
         self._numbers = {key: number for key, number in self._numbers.items() if number < first}
         self.rungs = {number: rung for number, rung in self.rungs.items() if number < first}
         self.found = {number: price for number, price in self.found.items() if number < first}
+        self._lengths = {number: length for number, length in self._lengths.items() if number < first}
 
     def node(self, number: int) -> Node | None:
         """A node by its number; None for an input."""
@@ -142,6 +144,11 @@ class Pool:
         """
         if number in self.found:
             return self.found[number]
+        if number not in self._lengths:
+            self._lengths[number] = self._written(number)
+        return self._lengths[number]
+
+    def _written(self, number: int) -> float:
         n, leaves = self.inputs, self.leaves(number)
         choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
         operation = float(np.log(self.operations))

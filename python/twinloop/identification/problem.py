@@ -44,6 +44,7 @@ class Problem:
         self.dt = dt
         self.workers = workers
         self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
+        self._usable: set[int] = set()
 
     def usable(self, terms: Sequence[int]) -> list[int]:
         """Terms whose values are finite on all rows, evaluated; none of a hidden state where there is none."""
@@ -57,8 +58,9 @@ class Problem:
             for i, term in enumerate(new):
                 columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
                 self._values[term] = columns  # type: ignore[assignment]
-        there = [term for term in terms if term in self._values]
-        return [term for term in there if all(np.abs(column).max() < 1e100 for column in self._values[term])]
+                if all(np.abs(column).max() < 1e100 for column in columns):
+                    self._usable.add(term)
+        return [term for term in terms if term in self._usable]
 
     def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
         """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""

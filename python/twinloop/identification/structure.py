@@ -133,49 +133,88 @@ def search(
                 iteration=iteration * NOISE_ROUNDS + round_,
                 workers=problem.workers,
             )
+        subsets = [
+            _best_subsets(problem, usable, place, *of_chain)
+            for of_chain in zip(chains, known, grams, walks, costs, strict=True)
+        ]
+        coefficients = [_spread(judged[0], len(usable)) for judged in subsets]
+        noisy, changed = current, False
+        if not fixed_noise:
+            used = [len(judged[0][0]) for judged in subsets]
+            noisy = _noisy(problem, regressions, coefficients, current, used, scales)
+            changed = any(_differ(*pair, scales, problem.dt) for pair in zip(noisy, current, strict=True))
         best = []
-        changed = False
-        for i, (gram, walk, chain) in enumerate(zip(grams, walks, current, strict=True)):
-            previous = known[i]
-            subsets = [tuple(subset) for subset, _ in walk]
-            if previous is not None and all(t in place for t in previous.weights):
-                subsets.append(tuple(sorted(place[t] for t in previous.weights)))
-            limits = problem.limits(chain, usable)
-            subsets = _with_what_must_be(subsets, gram, costs[i], limits)
-            judged = sorted(
-                all_judged(gram, subsets, costs[i], limits),
-                key=lambda found: (
-                    found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]),
-                    found[0],
-                ),
-            )
+        for i, (judged, chain) in enumerate(zip(subsets, noisy, strict=True)):
             subset, energy, left, weights = judged[0]
             others = [(tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _, _ in judged[1:40]]
-            coefficients = np.zeros(len(usable))
-            coefficients[list(subset)] = weights
-            noisy = chain
-            if not fixed_noise:
-                low, slow = floor_of(chain, scales, problem.dt)
-                sensors, motion, _ = regressions[i].most_likely_noise(
-                    coefficients, chain.sensors, chain.motion, low, slow
-                )
-                readings = problem.readings(chain)
-                sensors = sensors * readings / max(1.0, readings - len(subset))
-                changed |= bool(
-                    np.any(np.abs(np.log(sensors / chain.sensors)) > 0.3)
-                    or abs(np.log((motion[0] + slow[0]) / (chain.motion[0] + slow[0]))) > 1.0
-                    or abs(np.log((motion[1] + slow[1]) / (chain.motion[1] + slow[1]))) > 1.0
-                )
-                noisy = chain.with_noise(sensors, motion)
-            score = regressions[i].likelihood(coefficients, noisy.sensors, noisy.motion)
+            score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
             rung = RUNG * problem.pool.rung(usable[j] for j in subset)
             total = rung + score + float(costs[i][list(subset)].sum())
             chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}
-            best.append(Sum(chosen, total, noisy, left, others))
-        current = [found.chain for found in best]
+            best.append(Sum(chosen, total, chain, left, others))
+        current = noisy
         if not changed:
             break
     return best
+
+
+def _best_subsets(
+    problem: Problem,
+    usable: Sequence[int],
+    place: Mapping[int, int],
+    chain: Chain,
+    known: Sum | None,
+    gram: _core.Gram,
+    walked: Sequence[tuple[Sequence[int], float]],
+    costs: Floats,
+) -> list[Judged]:
+    """What a chain's walks have found, and what was known of it, the best first."""
+    subsets = [tuple(subset) for subset, _ in walked]
+    if known is not None and all(term in place for term in known.weights):
+        subsets.append(tuple(sorted(place[term] for term in known.weights)))
+    limits = problem.limits(chain, usable)
+    subsets = _with_what_must_be(subsets, gram, costs, limits)
+    return sorted(
+        all_judged(gram, subsets, costs, limits),
+        key=lambda found: (found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]), found[0]),
+    )
+
+
+def _spread(judged: Judged, features: int) -> Floats:
+    """The coefficients of all features, 0 for those outside the subset."""
+    subset, _, _, weights = judged
+    coefficients = np.zeros(features)
+    coefficients[list(subset)] = weights
+    return coefficients
+
+
+def _noisy(
+    problem: Problem,
+    regressions: Sequence[_core.Regression],
+    coefficients: Sequence[Floats],
+    chains: Sequence[Chain],
+    used: Sequence[int],
+    scales: Floats,
+) -> list[Chain]:
+    """The chains with the noise under which what is left is most likely, and the freedom that was used given back."""
+    posed = [
+        (regression, found, chain.sensors, chain.motion, *floor_of(chain, scales, problem.dt))
+        for regression, found, chain in zip(regressions, coefficients, chains, strict=True)
+    ]
+    with engine_input():
+        noises = _core.most_likely_noises(posed, problem.workers)
+    noisy = []
+    for chain, terms, (sensors, motion, _) in zip(chains, used, noises, strict=True):
+        readings = problem.readings(chain)
+        noisy.append(chain.with_noise(sensors * readings / max(1.0, readings - terms), motion))
+    return noisy
+
+
+def _differ(new: Chain, old: Chain, scales: Floats, dt: float) -> bool:
+    """Whether a chain's noise is so much another one that its terms may be."""
+    _, slow = floor_of(old, scales, dt)
+    moved = (abs(np.log((new.motion[i] + slow[i]) / (old.motion[i] + slow[i]))) > 1.0 for i in range(2))
+    return bool(np.any(np.abs(np.log(new.sensors / old.sensors)) > 0.3)) or any(moved)
 
 
 def _with_what_must_be(

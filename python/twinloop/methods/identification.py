@@ -21,6 +21,7 @@ from twinloop.methods.calibration import OF_PARTS, factor, left_of_flights, need
 from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
+from twinloop.planning.gains import load_ahead
 from twinloop.planning.judging import Committee, Task, expected
 from twinloop.planning.planner import Planner
 from twinloop.presets import DefaultOptions
@@ -93,6 +94,7 @@ class IdentifyAndPlan:
         told = len(book.experiments)
         if told == self._learnt or (at_once and self.identified is not None):
             return
+        load_ahead()
         self._told = tuple(run.test.number for run in book.experiments)
         needed = self._calibrated(book)
         runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in book.experiments]

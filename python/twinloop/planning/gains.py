@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Sequence
+from importlib import import_module
+from threading import Thread
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,6 +50,12 @@ def from_unit(family: Family, places: ArrayLike) -> Floats:
     return genes
 
 
+def load_ahead() -> None:
+    """Begins to import CMA-ES beside other work: it takes a second or two, and while the engine learns Python waits."""
+    if "cmaes" not in sys.modules:
+        Thread(target=import_module, args=("cmaes",), daemon=True).start()
+
+
 def tune_gains(
     family: Family,
     score: Score,
@@ -71,7 +80,7 @@ def tune_gains(
     Returns:
         The genes, and their score.
     """
-    from cmaes import CMA  # imported here: it takes a while
+    from cmaes import CMA  # imported here, or waited for: it takes a while
 
     best_genes, best = np.asarray(starts[0], dtype=np.float64), float(score(np.atleast_2d(starts[0]))[0])
     for number, start in enumerate(starts):

@@ -138,48 +138,65 @@ pub(crate) struct Whitening {
 
 /// Variance, in sensor variances, of a reading that is to be ignored.
 const IGNORED: f64 = 1e12;
-/// States of a filter at most.
-const MOST: usize = LONGEST + 1;
-/// A small matrix; only the first rows and columns of it are in use.
-type Small = [[f64; MOST]; MOST];
+/// A small matrix.
+type Small<const R: usize, const C: usize = R> = [[f64; C]; R];
 
 impl Whitening {
     /// For a record of which each reading has a weight: 1, or 0 to ignore it. `spread` is the sd of each first state.
     pub fn new(chain: &Chain, noise: &Noise, weights: &[f64], spread: &[f64]) -> Self {
-        let d = chain.states;
-        let inner = d + noise.hidden();
+        // Loops of a known length are several times faster.
+        let of_size = match (chain.states, noise.hidden()) {
+            (1, 0) => Self::of_size::<1, 1>,
+            (1, _) => Self::of_size::<1, 2>,
+            (2, 0) => Self::of_size::<2, 2>,
+            (2, _) => Self::of_size::<2, 3>,
+            (3, 0) => Self::of_size::<3, 3>,
+            (3, _) => Self::of_size::<3, 4>,
+            (_, 0) => Self::of_size::<LONGEST, LONGEST>,
+            _ => Self::of_size::<LONGEST, { LONGEST + 1 }>,
+        };
+        of_size(chain, noise, weights, spread)
+    }
+
+    /// For D states of a chain, and I of the filter.
+    fn of_size<const D: usize, const I: usize>(
+        chain: &Chain,
+        noise: &Noise,
+        weights: &[f64],
+        spread: &[f64],
+    ) -> Self {
         let kept = noise.kept(chain.dt);
         let disturbance = chain.disturbance(noise.process);
-        let mut transition: Small = [[0.0; MOST]; MOST];
-        for j in 0..inner {
-            let mut column = [0.0; MOST];
+        let mut transition: Small<I> = [[0.0; I]; I];
+        for j in 0..I {
+            let mut column = [0.0; I];
             column[j] = 1.0;
-            chain.coast(&mut column[..inner], kept);
-            (0..inner).for_each(|i| transition[i][j] = column[i]);
+            chain.coast(&mut column, kept);
+            (0..I).for_each(|i| transition[i][j] = column[i]);
         }
-        let mut covariance: Small = [[0.0; MOST]; MOST];
-        for i in 0..inner {
-            covariance[i][i] = if i < d { spread[i] * spread[i] } else { noise.gust };
+        let mut covariance: Small<I> = [[0.0; I]; I];
+        for i in 0..I {
+            covariance[i][i] = if i < D { spread[i] * spread[i] } else { noise.gust };
         }
-        let readings = weights.len() / d;
+        let (weights, _) = weights.as_chunks::<D>();
         let mut whitening = Self {
-            states: d,
-            inner,
+            states: D,
+            inner: I,
             kept,
-            gains: Vec::with_capacity(readings * inner * d),
-            roots: Vec::with_capacity(readings * d * d),
+            gains: Vec::with_capacity(weights.len() * I * D),
+            roots: Vec::with_capacity(weights.len() * D * D),
             log_determinant: 0.0,
-            readings: weights.iter().filter(|&&w| w > 0.0).count(),
+            readings: weights.as_flattened().iter().filter(|&&w| w > 0.0).count(),
         };
-        for weights in weights.chunks_exact(d) {
-            whitening.update(&mut covariance, &noise.sensors, weights);
-            covariance = moved(&covariance, &transition, inner);
-            for i in 0..d {
-                for j in 0..d {
-                    covariance[i][j] += disturbance[i * d + j];
+        for weights in weights {
+            whitening.update::<D, I>(&mut covariance, &noise.sensors, weights);
+            covariance = moved(&covariance, &transition);
+            for i in 0..D {
+                for j in 0..D {
+                    covariance[i][j] += disturbance[i * D + j];
                 }
             }
-            for (i, row) in covariance.iter_mut().enumerate().take(inner).skip(d) {
+            for (i, row) in covariance.iter_mut().enumerate().skip(D) {
                 row[i] += noise.gust * (1.0 - kept * kept);
             }
         }
@@ -187,35 +204,39 @@ impl Whitening {
     }
 
     /// Takes in a reading: keeps its gain and its whitening matrix, and leaves what is not known yet once it is used.
-    fn update(&mut self, covariance: &mut Small, sensors: &[f64], weights: &[f64]) {
-        let (d, inner) = (self.states, self.inner);
-        let mut innovation = *covariance;
-        for i in 0..d {
+    fn update<const D: usize, const I: usize>(
+        &mut self,
+        covariance: &mut Small<I>,
+        sensors: &[f64],
+        weights: &[f64; D],
+    ) {
+        let mut innovation: Small<D> = [[0.0; D]; D];
+        for i in 0..D {
+            innovation[i].copy_from_slice(&covariance[i][..D]);
             innovation[i][i] += sensors[i] * if weights[i] > 0.0 { 1.0 } else { IGNORED };
         }
-        let root = whitened(&innovation, d);
+        let root = whitened(&innovation);
         // W = P Hᵀ L⁻ᵀ: the gain is W L⁻¹, and W Wᵀ is what the reading tells.
-        let mut told: Small = [[0.0; MOST]; MOST];
-        for i in 0..inner {
-            for (told, root) in told[i].iter_mut().zip(&root).take(d) {
-                *told = covariance[i].iter().zip(root).take(d).map(|(p, r)| p * r).sum();
+        let mut told: Small<I, D> = [[0.0; D]; I];
+        for i in 0..I {
+            for j in 0..D {
+                told[i][j] = (0..D).map(|k| covariance[i][k] * root[j][k]).sum();
             }
         }
-        for row in told.iter().take(inner) {
-            let column = |j: usize| row.iter().zip(&root).take(d).map(|(told, root)| told * root[j]).sum();
-            self.gains.extend((0..d).map::<f64, _>(column));
+        for row in &told {
+            self.gains.extend((0..D).map::<f64, _>(|j| (0..D).map(|k| row[k] * root[k][j]).sum()));
         }
-        for i in 0..inner {
-            for j in 0..inner {
-                covariance[i][j] -= (0..d).map(|l| told[i][l] * told[j][l]).sum::<f64>();
+        for i in 0..I {
+            for j in 0..I {
+                covariance[i][j] -= (0..D).map(|l| told[i][l] * told[j][l]).sum::<f64>();
             }
         }
-        for (i, row) in root.iter().enumerate().take(d) {
+        for i in 0..D {
             // A reading that is ignored adds nothing to the sum of squares.
             let counts = weights[i] > 0.0;
-            self.roots.extend(row[..d].iter().map(|&value| if counts { value } else { 0.0 }));
+            self.roots.extend(root[i].map(|value| if counts { value } else { 0.0 }));
             if counts {
-                self.log_determinant -= 2.0 * libm::log(row[i]);
+                self.log_determinant -= 2.0 * libm::log(root[i][i]);
             }
         }
     }
@@ -232,10 +253,10 @@ impl Whitening {
 }
 
 /// L⁻¹ with L Lᵀ the covariance of an innovation; of its diagonal alone where rounding has left no such L.
-fn whitened(innovation: &Small, d: usize) -> Small {
-    let mut root: Small = [[0.0; MOST]; MOST];
-    let mut lower: Small = [[0.0; MOST]; MOST];
-    for i in 0..d {
+fn whitened<const D: usize>(innovation: &Small<D>) -> Small<D> {
+    let mut root: Small<D> = [[0.0; D]; D];
+    let mut lower: Small<D> = [[0.0; D]; D];
+    for i in 0..D {
         for j in 0..=i {
             let sum = innovation[i][j] - (0..j).map(|k| lower[i][k] * lower[j][k]).sum::<f64>();
             if i > j {
@@ -243,9 +264,9 @@ fn whitened(innovation: &Small, d: usize) -> Small {
             } else if sum > 0.0 {
                 lower[i][i] = sum.sqrt();
             } else {
-                for (k, row) in root.iter_mut().enumerate().take(d) {
-                    row[k] = 1.0 / (innovation[k][k].abs() + f64::MIN_POSITIVE).sqrt();
-                    row[..k].fill(0.0);
+                root = [[0.0; D]; D];
+                for k in 0..D {
+                    root[k][k] = 1.0 / (innovation[k][k].abs() + f64::MIN_POSITIVE).sqrt();
                 }
                 return root;
             }
@@ -259,17 +280,17 @@ fn whitened(innovation: &Small, d: usize) -> Small {
 }
 
 /// Φ P Φᵀ, symmetric to the last bit.
-fn moved(covariance: &Small, transition: &Small, inner: usize) -> Small {
-    let mut half: Small = [[0.0; MOST]; MOST];
-    let mut next: Small = [[0.0; MOST]; MOST];
-    for i in 0..inner {
-        for j in 0..inner {
-            half[i][j] = (0..inner).map(|k| transition[i][k] * covariance[k][j]).sum();
+fn moved<const I: usize>(covariance: &Small<I>, transition: &Small<I>) -> Small<I> {
+    let mut half: Small<I> = [[0.0; I]; I];
+    let mut next: Small<I> = [[0.0; I]; I];
+    for i in 0..I {
+        for j in 0..I {
+            half[i][j] = (0..I).map(|k| transition[i][k] * covariance[k][j]).sum();
         }
     }
-    for i in 0..inner {
+    for i in 0..I {
         for j in 0..=i {
-            next[i][j] = (0..inner).map(|k| half[i][k] * transition[j][k]).sum();
+            next[i][j] = (0..I).map(|k| half[i][k] * transition[j][k]).sum();
             next[j][i] = next[i][j];
         }
     }

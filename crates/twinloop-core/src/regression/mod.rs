@@ -1,8 +1,10 @@
 //! Regression: which sums of features explain what the sensors saw, with sensor noise and process noise told apart.
 
+mod blocks;
 mod chain;
 mod cholesky;
 mod gram;
+mod inverse;
 mod likelihood;
 mod subset;
 

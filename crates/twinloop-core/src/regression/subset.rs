@@ -3,8 +3,9 @@
 //! Features of one smooth run are close to collinear, and then greedy selection ends at an alias of the law that fits
 //! as well and predicts nothing. Annealing crosses between them (Kirkpatrick, Gelatt, Vecchi 1983).
 
-use super::cholesky::Cholesky;
 use super::gram::Gram;
+use super::inverse::{Inverse, Products};
+use crate::lanes::{Isa, Kernel, Vector, Width, dispatch};
 use crate::rng::Stream;
 
 /// How long and how hot.
@@ -77,21 +78,20 @@ impl Choices {
         self.features.len()
     }
 
-    /// Inner products of a feature with all.
+    /// Inner products of all with all.
     #[inline(always)]
-    fn row(&self, i: usize) -> &[f64] {
-        &self.products[i * self.len()..][..self.len()]
+    fn products(&self) -> Products<'_> {
+        Products { numbers: &self.products, features: self.len() }
     }
 }
 
 /// A subset on its way, with the inverse of its Gram matrix.
-struct Walk<'a> {
+struct Walk<'a, V> {
     choices: &'a Choices,
     members: Vec<usize>,
     /// Whether each feature is a member.
     inside: Vec<bool>,
-    /// Of the members (row after row), at the start of a buffer that holds the largest.
-    inverse: Vec<f64>,
+    inverse: Inverse<V>,
     coefficients: Vec<f64>,
     left: f64,
     price: f64,
@@ -100,23 +100,22 @@ struct Walk<'a> {
     /// Inner products of a feature with the members, and the inverse times them.
     products: Vec<f64>,
     images: Vec<f64>,
-    spare: Vec<f64>,
 }
 
-impl<'a> Walk<'a> {
-    fn new(choices: &'a Choices) -> Self {
+impl<'a, V: Vector> Walk<'a, V> {
+    fn new(choices: &'a Choices, largest: usize) -> Self {
+        let inverse = Inverse::new(largest.min(choices.len()));
         Self {
             choices,
             members: vec![],
             inside: vec![false; choices.len()],
-            inverse: vec![],
             coefficients: vec![],
             left: choices.total,
             price: 0.0,
             doubt: 0.0,
-            products: vec![],
-            images: vec![],
-            spare: vec![],
+            products: inverse.empty_row(),
+            images: inverse.empty_row(),
+            inverse,
         }
     }
 
@@ -125,81 +124,58 @@ impl<'a> Walk<'a> {
     }
 
     /// Inverse, coefficients and χ² of the members from scratch.
+    #[inline(always)]
     fn refresh(&mut self) -> bool {
-        let k = self.members.len();
-        self.spare.clear();
-        for &i in &self.members {
-            let row = self.choices.row(i);
-            self.spare.extend(self.members.iter().map(|&j| row[j]));
+        let (k, choices, members) = (self.members.len(), self.choices, &self.members);
+        if !self.inverse.invert(members, choices.products(), COLLINEAR) {
+            return false;
         }
-        let Some(factor) = Cholesky::new(&self.spare, k, COLLINEAR) else { return false };
-        self.inverse = factor.inverse();
-        self.products.clear();
-        self.products.extend(self.members.iter().map(|&j| self.choices.targets[j]));
+        self.products.iter_mut().zip(members).for_each(|(target, &j)| *target = choices.targets[j]);
+        self.inverse.times(&self.products, &mut self.images);
         self.coefficients.clear();
-        self.coefficients.extend((0..k).map(|a| dot(&self.inverse[a * k..][..k], &self.products)));
+        self.coefficients.extend_from_slice(&self.images[..k]);
         self.doubt = 0.0;
-        self.left = (self.choices.total - dot(&self.coefficients, &self.products)).max(0.0);
-        self.price = self.members.iter().map(|&j| self.choices.prices[j]).sum();
+        self.left = (choices.total - dot(&self.coefficients, &self.products)).max(0.0);
+        self.price = members.iter().map(|&j| choices.prices[j]).sum();
         true
     }
 
     /// What of a feature lies outside the members' span, and what of the rest of the readings it would explain.
+    #[inline(always)]
     fn against(&mut self, j: usize) -> (f64, f64) {
-        let k = self.members.len();
-        let row = self.choices.row(j);
-        self.products.clear();
-        self.products.extend(self.members.iter().map(|&i| row[i]));
-        self.images.clear();
-        self.images.extend((0..k).map(|a| dot(&self.inverse[a * k..][..k], &self.products)));
-        let outside = 1.0 - dot(&self.products, &self.images);
-        (outside, self.choices.targets[j] - dot(&self.products, &self.coefficients))
+        let row = self.choices.products().row(j);
+        for (product, &i) in self.products.iter_mut().zip(&self.members) {
+            *product = row[i];
+        }
+        self.inverse.times(&self.products, &mut self.images);
+        let products = &self.products[..self.members.len()];
+        let outside = 1.0 - dot(products, &self.images);
+        (outside, self.choices.targets[j] - dot(products, &self.coefficients))
     }
 
-    /// Adds the feature that was last looked at.
+    /// Adds the feature that was last looked at; no more than that where all is computed from scratch afterwards.
+    #[inline(always)]
     fn insert(&mut self, j: usize, outside: f64, gain: f64) {
-        let k = self.members.len();
         self.doubt += 1.0 / outside;
-        self.spare.clear();
-        for (row, &image) in self.inverse.chunks_exact(k.max(1)).zip(&self.images) {
-            let factor = image / outside;
-            self.spare.extend(row.iter().zip(&self.images).map(|(old, other)| old + factor * other));
-            self.spare.push(-factor);
+        self.members.push(j);
+        self.inside[j] = true;
+        if self.doubt > DOUBT {
+            return;
         }
-        self.spare.extend(self.images.iter().map(|image| -image / outside));
-        self.spare.push(1.0 / outside);
-        std::mem::swap(&mut self.inverse, &mut self.spare);
+        self.inverse.grow(&self.images, outside);
         let new = gain / outside;
         self.coefficients.iter_mut().zip(&self.images).for_each(|(c, image)| *c -= image * new);
         self.coefficients.push(new);
         self.left = (self.left - gain * gain / outside).max(0.0);
-        self.members.push(j);
-        self.inside[j] = true;
         self.price += self.choices.prices[j];
     }
 
+    #[inline(always)]
     fn remove(&mut self, at: usize) {
-        let k = self.members.len();
-        let pivot = self.inverse[at * k + at];
+        let pivot = self.inverse.diagonal(at);
         self.doubt += pivot;
         let old = self.coefficients[at];
-        self.images.clear();
-        self.images.extend_from_slice(&self.inverse[at * k..][..k]);
-        self.spare.clear();
-        for (a, row) in self.inverse.chunks_exact(k).enumerate() {
-            if a != at {
-                let factor = self.images[a] / pivot;
-                let less = |range: std::ops::Range<usize>| {
-                    row[range.clone()]
-                        .iter()
-                        .zip(&self.images[range])
-                        .map(|(old, other)| old - factor * other)
-                };
-                self.spare.extend(less(0..at));
-                self.spare.extend(less(at + 1..k));
-            }
-        }
-        std::mem::swap(&mut self.inverse, &mut self.spare);
+        self.inverse.shrink(at, &mut self.images);
         self.coefficients.iter_mut().zip(&self.images).for_each(|(c, image)| *c -= image * old / pivot);
         self.coefficients.remove(at);
         self.left += old * old / pivot;
@@ -209,11 +185,15 @@ impl<'a> Walk<'a> {
     }
 
     /// One move at a temperature; whether it was made.
-    fn step(&mut self, largest: usize, heat: f64, stream: &mut Stream) -> bool {
+    #[inline(always)]
+    fn step(&mut self, largest: usize, heat: impl Fn() -> f64, stream: &mut Stream) -> bool {
         let k = self.members.len();
         let kind = stream.below(3);
         let accept = |change: f64, stream: &mut Stream| {
-            change <= 0.0 || (heat > 0.0 && stream.uniform() < libm::exp(-change / heat))
+            change <= 0.0 || {
+                let heat = heat();
+                heat > 0.0 && stream.uniform() < libm::exp(-change / heat)
+            }
         };
         if kind == 0 || k == 0 {
             if k >= largest || self.choices.len() == 0 {
@@ -230,7 +210,7 @@ impl<'a> Walk<'a> {
             self.insert(j, outside, gain);
         } else {
             let at = stream.below(k);
-            let pivot = self.inverse[at * k + at];
+            let pivot = self.inverse.diagonal(at);
             let loss =
                 self.coefficients[at] * self.coefficients[at] / pivot - self.choices.prices[self.members[at]];
             if kind == 1 {
@@ -272,42 +252,65 @@ impl<'a> Walk<'a> {
 
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let mut sum = 0.0;
+    for (a, b) in a.iter().zip(b) {
+        sum += a * b;
+    }
+    sum
 }
 
 /// Walks from hot to cold; the best subset first, then others that are nearly as good, best first.
-pub fn search(choices: &Choices, annealing: &Annealing, stream: &mut Stream) -> Vec<Found> {
-    let mut walk = Walk::new(choices);
-    let mut kept: Vec<Found> = vec![];
-    let keep = |walk: &Walk<'_>, kept: &mut Vec<Found>| {
-        let energy = walk.energy();
-        if kept.len() == KEPT && energy >= kept[KEPT - 1].energy {
-            return;
+pub fn search(choices: &Choices, annealing: &Annealing, stream: &mut Stream, width: Width) -> Vec<Found> {
+    dispatch(width, Walked { choices, annealing, stream })
+}
+
+struct Walked<'a> {
+    choices: &'a Choices,
+    annealing: &'a Annealing,
+    stream: &'a mut Stream,
+}
+
+impl Kernel for Walked<'_> {
+    type Output = Vec<Found>;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Vec<Found> {
+        let Self { choices, annealing, stream } = self;
+        let mut walk = Walk::<W::Of4>::new(choices, annealing.largest);
+        let mut kept: Vec<Found> = vec![];
+        keep(&walk, &mut kept);
+        let hottest = (0.02 * choices.total).max(100.0 * annealing.coldest);
+        let cooling = libm::log(annealing.coldest / hottest);
+        // The last tenth goes down only.
+        let cooled = annealing.moves - annealing.moves / 10;
+        for n in 0..annealing.moves {
+            let heat =
+                || if n < cooled { hottest * libm::exp(cooling * n as f64 / cooled as f64) } else { 0.0 };
+            // Early subsets are passed through only, but the best of a walk is often one that it never leaves again.
+            if walk.step(annealing.largest, heat, stream)
+                && (n % 16 == 0 || walk.energy() < kept[0].energy || heat() <= 20.0 * annealing.coldest)
+            {
+                keep(&walk, &mut kept);
+            }
         }
-        let mut subset: Vec<usize> = walk.members.iter().map(|&i| choices.features[i]).collect();
-        subset.sort_unstable();
-        if kept.iter().any(|found| found.subset == subset) {
-            return;
-        }
-        let at = kept.partition_point(|found| found.energy <= energy);
-        kept.insert(at, Found { subset, energy });
-        kept.truncate(KEPT);
-    };
-    keep(&walk, &mut kept);
-    let hottest = (0.02 * choices.total).max(100.0 * annealing.coldest);
-    let cooling = libm::log(annealing.coldest / hottest);
-    // The last tenth goes down only.
-    let cooled = annealing.moves - annealing.moves / 10;
-    for n in 0..annealing.moves {
-        let heat = if n < cooled { hottest * libm::exp(cooling * n as f64 / cooled as f64) } else { 0.0 };
-        // Early subsets are passed through only, but the best of a walk is often one that it never leaves again.
-        if walk.step(annealing.largest, heat, stream)
-            && (heat <= 20.0 * annealing.coldest || n % 16 == 0 || walk.energy() < kept[0].energy)
-        {
-            keep(&walk, &mut kept);
-        }
+        let best = kept[0].energy;
+        kept.retain(|found| found.energy <= best + WORTH);
+        kept
     }
-    let best = kept[0].energy;
-    kept.retain(|found| found.energy <= best + WORTH);
-    kept
+}
+
+/// Keeps where a walk is, unless better subsets are there already.
+fn keep<V: Vector>(walk: &Walk<'_, V>, kept: &mut Vec<Found>) {
+    let energy = walk.energy();
+    if kept.len() == KEPT && energy >= kept[KEPT - 1].energy {
+        return;
+    }
+    let mut subset: Vec<usize> = walk.members.iter().map(|&i| walk.choices.features[i]).collect();
+    subset.sort_unstable();
+    if kept.iter().any(|found| found.subset == subset) {
+        return;
+    }
+    let at = kept.partition_point(|found| found.energy <= energy);
+    kept.insert(at, Found { subset, energy });
+    kept.truncate(KEPT);
 }
