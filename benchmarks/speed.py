@@ -19,6 +19,7 @@ import closed_loop
 import generations
 import ranking
 import rows
+import subsets
 from measure import Disagreement, Section
 from rich.console import Console
 from rich.table import Table
@@ -29,6 +30,7 @@ SECTIONS = {
     "ranking": ranking.report,
     "archive": archive.report,
     "generations": generations.report,
+    "subsets": subsets.report,
 }
 
 
