@@ -1,5 +1,7 @@
 """Whole campaigns of the preset `default`: same bits, interruption, cut runs, and data that nobody would wish for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS
 from oracles import rk4, same_bits
 from twinloop.models import Noise
+from twinloop.result import summary
 
 SMALL = {
     "moves": 1500, "starts": 1, "generations": 0, "lags": False, "evaluations": 256, "candidates": 32,
@@ -342,6 +345,27 @@ def test_the_band_of_exact_readings_is_that_of_what_the_twin_leaves_of_the_fligh
         np.testing.assert_array_equal(twin.noise.sensors, nine_of_ten / 1.645)
         assert twin.inflation == 1.0 and 0.0 < twin.noise.sensors.max() < 1e-12
     assert min(shares) > 0.5
+
+
+def test_gusts_are_reported_unless_the_readings_were_taken_for_exact(begin, monkeypatch):
+    stream = np.random.default_rng(0)
+
+    def gusty_pendulum(x, u):
+        push = stream.normal(0.0, 2.0)
+        return rk4(
+            lambda now: np.array([now[1], 6.0 * u[0] - 12.0 * np.sin(now[0]) + push]),
+            np.asarray(x),
+            SIGNALS.dt,
+        )
+
+    plant = tl.systems.Simulated(SIGNALS, gusty_pendulum, default_gains=PENDULUM_GAINS)
+    campaign = begin(duration=3.0).run(plant, 1)
+    (found,) = summary(campaign, {}, {})["twin"]["disturbances"]
+    assert found["name"] == "rate" and max(found["white"] / SIGNALS.dt, found["lasting"]) > 0.5
+    # The same noise, had it been held at the least that is believed rather than estimated.
+    exact = [replace(lesson, misfit=1e-6) for lesson in campaign.history]
+    monkeypatch.setattr(tl.Campaign, "history", property(lambda campaign: exact))
+    assert summary(campaign, {}, {})["twin"]["disturbances"] == []
 
 
 def test_members_that_are_one_spread_by_nothing_not_by_the_rounding_of_their_mean(begin, pendulum):

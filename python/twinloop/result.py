@@ -13,6 +13,7 @@ import numpy as np
 from twinloop.campaign import Campaign
 from twinloop.flight import fly
 from twinloop.history import Experiment, Lesson
+from twinloop.identification.noise import exact
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality
@@ -194,7 +195,8 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
 
 def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[str, object]]:
     """What moves the states beside the commands: white, and lasting with a memory; those that are felt at all."""
-    if twin.noise is None:
+    # By exact readings none is told: the least that is believed was held.
+    if twin.noise is None or exact(lesson.misfit * lesson.readings, lesson.readings):
         return []
     lasting = {states[0]: (size, memory) for states, _, size, memory in twin.noise.gusts}
     found: list[dict[str, object]] = []
