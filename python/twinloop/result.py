@@ -196,7 +196,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
 def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[str, object]]:
     """What moves the states beside the commands: white, and lasting with a memory; those that are felt at all."""
     # By exact readings none is told: the least that is believed was held.
-    if twin.noise is None or exact(lesson.misfit * lesson.readings, lesson.readings):
+    if twin.noise is None or exact(lesson.misfit):
         return []
     lasting = {states[0]: (size, memory) for states, _, size, memory in twin.noise.gusts}
     found: list[dict[str, object]] = []

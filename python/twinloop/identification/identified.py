@@ -64,7 +64,7 @@ class Identified:
     @property
     def exact(self) -> bool:
         """Whether the readings are as good as exact."""
-        return exact(self.left, self.readings)
+        return exact(self.misfit)
 
     def noise(self, signals: Signals) -> Noise:
         """Of the sensors, and of what moves the states from one period to the next."""

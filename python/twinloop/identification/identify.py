@@ -335,8 +335,8 @@ class _Learner:
 
     def _rescaled(self, observer: Sequence[Chain], left: float, readings: int) -> list[Chain]:
         """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
-        factor = left / max(1, readings) if np.isfinite(left) else 1.0
-        factor = max(factor, ROUNDING if exact(left, readings) else 1.0)
+        misfit = left / max(1, readings) if np.isfinite(left) else 1.0
+        factor = max(misfit, ROUNDING if exact(misfit) else 1.0)
         return [
             c.with_noise(c.sensors * factor, (c.motion[0] * factor, c.motion[1] * factor, c.motion[2]))
             for c in observer

@@ -28,9 +28,9 @@ RIDGE = 1e-9
 """Added to the columns' unit lengths where all terms are fitted at once."""
 
 
-def exact(left: float, readings: int) -> bool:
-    """Whether a χ² says that the readings are exact: next to nothing is left by the least noise that is believed."""
-    return left < NOTHING * max(1, readings)
+def exact(misfit: float) -> bool:
+    """Whether a χ² a reading says that they are exact: next to nothing is left by the least noise that is believed."""
+    return misfit < NOTHING
 
 
 def declared_noise(chain: Chain, signals: Signals) -> Chain:
@@ -109,7 +109,7 @@ def first_noise(
             break
         with engine_input():
             ((sensors, motion, _),) = _core.most_likely_noises(
-                [(regression, solved[0], sensors, motion, low, slow)]
+                [(regression, solved[0], sensors, motion, low, slow)], problem.workers
             )
         used = min(len(terms), 0.7 * readings)
         sensors = sensors * readings / (readings - used)

@@ -142,7 +142,7 @@ def remarks(
         said.append(
             f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."
         )
-    elif exact(left, readings):
+    elif exact(left / max(1, readings)):
         said.append("The readings are as good as exact: their noise is taken to be what the model leaves.")
     still = [
         signals.state_names[i]
