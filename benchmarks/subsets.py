@@ -47,8 +47,9 @@ def annealed(products: np.ndarray, moves: int, seed: int) -> tuple[list[int], fl
     now = energy(here)
     best, least = here, now
     hottest = max(0.02 * total, 100.0 * COLDEST)
+    cooled = moves - moves // 10
     for n in range(moves):
-        heat = hottest * (COLDEST / hottest) ** (n / moves)
+        heat = hottest * (COLDEST / hottest) ** (n / cooled) if n < cooled else 0.0
         kind, there = rng.integers(3), list(here)
         if kind > 0 and there:
             there.pop(rng.integers(len(there)))
@@ -58,7 +59,7 @@ def annealed(products: np.ndarray, moves: int, seed: int) -> tuple[list[int], fl
                 continue
             there.append(new)
         change = (value := energy(there)) - now
-        if change <= 0.0 or rng.random() < np.exp(-change / heat):
+        if change <= 0.0 or (heat > 0.0 and rng.random() < np.exp(-change / heat)):
             here, now = there, value
             if now < least:
                 best, least = here, now
@@ -73,8 +74,8 @@ def report(smoke: bool) -> Section:
     prices, moves = np.full(gram.features, PRICE), 4000
     workers = _core.Workers(1)
 
-    def ours(seed: int = 0) -> tuple[list[int], float]:
-        settings = {"moves": moves, "largest": LARGEST, "starts": 1, "seed": seed, "iteration": 0}
+    def ours() -> tuple[list[int], float]:
+        settings = {"moves": moves, "largest": LARGEST, "starts": 1, "seed": 0, "iteration": 0}
         return _core.search_subsets([gram], [prices], coldest=COLDEST, workers=workers, **settings)[0][0]
 
     (subset, value), (other, expected) = ours(), annealed(products, moves, 0)

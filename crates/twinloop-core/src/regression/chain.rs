@@ -152,8 +152,9 @@ impl Whitening {
             (2, _) => Self::of_size::<2, 3>,
             (3, 0) => Self::of_size::<3, 3>,
             (3, _) => Self::of_size::<3, 4>,
-            (_, 0) => Self::of_size::<LONGEST, LONGEST>,
-            _ => Self::of_size::<LONGEST, { LONGEST + 1 }>,
+            (LONGEST, 0) => Self::of_size::<LONGEST, LONGEST>,
+            (LONGEST, _) => Self::of_size::<LONGEST, { LONGEST + 1 }>,
+            (states, _) => unreachable!("a chain of {states} states"),
         };
         of_size(chain, noise, weights, spread)
     }

@@ -93,20 +93,15 @@ impl<V: Vector> Inverse<V> {
         let (k, stride, shares) = (self.order, self.stride, &mut self.row);
         shares.copy_from_slice(images);
         divide::<V>(shares, -outside, k);
-        let (old, new) = self.columns.split_at_mut(k * stride);
-        for (i, column) in old.chunks_exact_mut(stride).enumerate() {
-            let image = images[i];
-            for (entries, shares) in column
-                .chunks_exact_mut(V::LANES)
-                .zip(shares.chunks_exact(V::LANES))
-                .take(k.div_ceil(V::LANES))
-            {
-                (V::load(entries) - V::load(shares) * image).store(entries);
-            }
-            column[k] = shares[i];
-            new[i] = shares[i];
+        let (places, last) = self.spare.split_at_mut(k * stride);
+        let columns = self.columns.chunks_exact(stride).zip(places.chunks_exact_mut(stride));
+        for (i, (column, next)) in columns.enumerate() {
+            less::<V>(column, images[i], shares, next, k);
+            next[k] = shares[i];
         }
-        new[k] = 1.0 / outside;
+        last[..k].copy_from_slice(&shares[..k]);
+        last[k] = 1.0 / outside;
+        std::mem::swap(&mut self.columns, &mut self.spare);
         self.order += 1;
     }
 

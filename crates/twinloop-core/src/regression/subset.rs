@@ -250,6 +250,7 @@ impl<'a, V: Vector> Walk<'a, V> {
     }
 }
 
+/// A loop, for a fold over both would be a call, without the instructions of the width.
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sum = 0.0;
