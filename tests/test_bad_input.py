@@ -74,6 +74,8 @@ SIGNALS = {
     "a scale of zero": lambda: tl.State("x", "m", 0.0),
     "a scale that is NaN": lambda: tl.State("x", "m", np.nan),
     "a scale that is true": lambda: tl.State("x", "m", True),
+    "a word of Python's for a name": lambda: tl.State("lambda", "m", 1.0),
+    "a unit that is a number": lambda: tl.Command("u", 3, (0.0, 1.0)),
     "a name with a space": lambda: tl.State("roll rate", "rad/s", 1.0),
     "a name that is a number": lambda: tl.Command("1", "V", (0.0, 1.0)),
     "the derivative of nothing": lambda: tl.Signals(
@@ -209,6 +211,7 @@ CAMPAIGNS = {
     "a seed of 65 bits": {"seed": 2**64},
     "half a seed": {"seed": 0.5},
     "no threads": {"threads": 0},
+    "nothing to call": {"progress": 3},
     "a misspelt argument": {"targt_state": [1.0, 0.0]},
     "an argument of another version": {"store": "hover.db"},
 }
@@ -230,6 +233,11 @@ def told(new_campaign, pendulum):
     return SimpleNamespace(campaign=campaign, system=pendulum, test=first, twin=campaign.twin)
 
 
+def slower(system):
+    signals = system.signals
+    return tl.systems.Simulated(tl.Signals(signals.states, signals.commands, 2.0 * signals.dt), pendulum_step)
+
+
 CALLS = {
     "an unknown gain": lambda e: e.campaign.test({**PENDULUM_GAINS, "angle.kq": 1.0}),
     "a missing gain": lambda e: e.campaign.test({"angle.kp": 1.0}),
@@ -239,6 +247,7 @@ CALLS = {
     "two gains": lambda e: e.campaign.test([1.0, 2.0]),
     "an excitation": lambda e: e.campaign.test(PENDULUM_GAINS, excitation=np.zeros(20)),
     "no system": lambda e: e.campaign.run("rig"),
+    "a system of another period": lambda e: e.campaign.run(slower(e.system), 2),
     "half an experiment": lambda e: e.campaign.run(e.system, 1.5),
     "no experiment": lambda e: e.campaign.run(e.system, 0),
     "no digits": lambda e: e.twin.equations(digits=0),
@@ -356,6 +365,7 @@ ANSWERS = {
     "an empty run": lambda r: tl.Trajectory(r.t[:1], r.states[:1], r.commands[:0]),
     "a run of one step": lambda r: tl.Trajectory(r.t[:2], r.states[:2], r.commands[:1]),
     "another state too many": lambda r: tl.Trajectory(r.t, np.hstack([r.states, r.states]), r.commands),
+    "millivolts for volts": lambda r: tl.Trajectory(r.t, r.states, r.commands * 1e3),
     "degrees for radians": lambda r: tl.Trajectory(r.t, r.states * 1e4 + 1e4, r.commands),
 }
 

@@ -53,7 +53,7 @@ def rebuilt(run, count, **changes):
 
 BROKEN = {
     "commands out of bounds": (
-        lambda r, n: rebuilt(r, n, commands=r.commands + 50.0),
+        lambda r, n: rebuilt(r, n, commands=r.commands + 3.0),
         "torque within -2 to 2",
     ),
     "a cut run that claims to be complete": (

@@ -21,7 +21,7 @@ from twinloop.presets import AnyOptions, Options
 from twinloop.setup import checked, refuse_arguments
 from twinloop.signals import Signals
 from twinloop.systems import System
-from twinloop.test import Test
+from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
 
 ARGUMENTS = (
@@ -102,6 +102,10 @@ class Campaign:
         self.threads = (
             available_threads() if threads is None else whole("Campaign, threads", threads, least=1)
         )
+        if progress is not None and not callable(progress):
+            raise InvalidInput(
+                f"Campaign, progress: expected something to call with a Progress, found {progress!r}; pass a function."
+            )
         self.progress = progress
         self.interrupted = False
         with engine_input():
@@ -208,15 +212,17 @@ class Campaign:
             NotAvailable: there is no first test.
         """
         budget = whole("Campaign.run, experiments", experiments, least=1)
-        if not (hasattr(system, "signals") and callable(getattr(system, "run", None))):
+        described = isinstance(getattr(system, "signals", None), Signals)
+        if not (described and callable(getattr(system, "run", None))):
             raise InvalidInput(
-                "Campaign.run, system: expected an object with `signals` and `run(test)`, "
+                "Campaign.run, system: expected an object with twinloop.Signals as `signals` and with `run(test)`, "
                 f"found {type(system).__name__}; add them."
             )
         self.interrupted = False
         try:
             while len(self._book.experiments) < budget:
                 test = self._next(system, last=len(self._book.experiments) + 1 == budget)
+                check_signals(test, system.signals)
                 self._report_experiment()
                 self.tell(test, system.run(test))
         except KeyboardInterrupt:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -130,6 +131,8 @@ def checked(
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
     if isinstance(chosen, DefaultOptions):
+        for what, state in (("initial_state", start), ("target_state", target)):
+            _check_inside(f"Campaign, {what}", state, signals, chosen.margin)
         pool = Pool(signals.n_x + signals.n_u)  # formulas are refused now rather than after the first flight
         for text in chosen.seed_terms:
             parsed_term(text, pool, signals)
@@ -153,11 +156,18 @@ def _purpose(
                 raise unknown(what, named, known)
         for name in ("quality_weights", "initial_range", "target_range"):
             numbers = getattr(options, name)
-            if len(numbers) not in (0, signals.n_x) or any(value < 0.0 for value in numbers):
+            if len(numbers) not in (0, signals.n_x) or not all(0.0 <= value < math.inf for value in numbers):
                 raise InvalidInput(
-                    f"Option {name!r}: expected {signals.n_x} numbers of at least 0, one a state, or none, found"
+                    f"Option {name!r}: expected {signals.n_x} finite numbers of at least 0, one a state, or none, found"
                     f" {numbers}; write one for each."
                 )
+        if options.quality_weights and not any(
+            (*options.quality_weights, options.effort, options.effort_rate)
+        ):
+            raise InvalidInput(
+                "Option 'quality_weights': expected one state to count at least, found 0 for each; any flight would be"
+                " as good as any other."
+            )
         weights, effort, rate = options.quality_weights, options.effort, options.effort_rate
         return purpose, quality_of(kind, signals, weights, effort, rate)
     for what, value, only in (("goal", goal, "both"), ("quality", quality, "final_distance")):
@@ -167,6 +177,19 @@ def _purpose(
                 ' choose preset="default".'
             )
     return "both", quality_of("final_distance", signals)
+
+
+def _check_inside(what: str, values: Floats, signals: Signals, margin: float) -> None:
+    """Refuses a start or target that no flight could keep the envelope with."""
+    for value, state in zip(values, signals.states, strict=True):
+        if state.envelope is not None:
+            low, high = state.envelope
+            kept = 0.5 * margin * (high - low)
+            if not low + kept <= value <= high - kept:
+                raise InvalidInput(
+                    f"{what}: expected {state.name} within {low + kept:g} to {high - kept:g} {state.unit}, its envelope"
+                    f" less the margin of {margin:g}, found {value:g}; declare a wider envelope, or move it."
+                )
 
 
 def refuse_arguments(where: str, found: Mapping[str, object], known: Sequence[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from keyword import iskeyword
 
 from twinloop import _core
 from twinloop.arrays import number
@@ -27,7 +28,7 @@ class State:
             estimate there and says where the two are far apart.
 
     Raises:
-        InvalidInput: a name, scale, envelope or noise that cannot be used.
+        InvalidInput: a name, unit, scale, envelope or noise that cannot be used.
     """
 
     name: str
@@ -38,7 +39,7 @@ class State:
     noise: float | None = None
 
     def __post_init__(self) -> None:
-        _check_name("State", self.name)
+        _check_words("State", self.name, self.unit)
         object.__setattr__(self, "scale", number(f"State {self.name!r}, scale", self.scale, above=0.0))
         if self.envelope is not None:
             object.__setattr__(self, "envelope", ordered(f"State {self.name!r}, envelope", self.envelope))
@@ -52,12 +53,13 @@ class Command:
 
     Args:
         name: a Python identifier; it appears in equations and tables.
-        unit: SI.
+        unit: SI. Commands of one unit and the same bounds are taken for alike, such as rotors: they share an actuator's
+            lag and delay. Call the units of unlike ones differently, "pump" and "heater" instead of "1" and "1".
         bounds: smallest and largest value that is ever sent, in its unit.
         scale: what a model sees as 1, in its unit; by default the larger magnitude of the two bounds.
 
     Raises:
-        InvalidInput: a name, bounds or scale that cannot be used.
+        InvalidInput: a name, unit, bounds or scale that cannot be used.
     """
 
     name: str
@@ -66,7 +68,7 @@ class Command:
     scale: float | None = None
 
     def __post_init__(self) -> None:
-        _check_name("Command", self.name)
+        _check_words("Command", self.name, self.unit)
         low, high = ordered(f"Command {self.name!r}, bounds", self.bounds)
         scale = max(abs(low), abs(high)) if self.scale is None else self.scale
         object.__setattr__(self, "bounds", (low, high))
@@ -243,11 +245,15 @@ def ordered(what: str, bounds: object) -> Bounds:
     return low, high
 
 
-def _check_name(kind: str, name: object) -> None:
-    if not isinstance(name, str) or not name.isidentifier():
+def _check_words(kind: str, name: object, unit: object) -> None:
+    if not isinstance(name, str) or not name.isidentifier() or iskeyword(name):
         raise InvalidInput(
-            f"{kind}: expected a name of letters, digits and underscores, found {name!r}; "
+            f"{kind}: expected a name of letters, digits and underscores, no word of Python's own, found {name!r}; "
             "it becomes a symbol in equations, so rename it."
+        )
+    if not isinstance(unit, str):
+        raise InvalidInput(
+            f"{kind} {name!r}, unit: expected a text such as 'rad/s', found {unit!r}; write it so."
         )
 
 

@@ -86,7 +86,8 @@ def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_
         The trajectory, unchanged.
 
     Raises:
-        InvalidInput: no trajectory, another width or period, too short, too long, or far out of scale.
+        InvalidInput: no trajectory, another width or period, too short, too long, far out of scale, or with commands
+            beyond their bounds by more than those are apart.
     """
     if not isinstance(trajectory, Trajectory):
         raise InvalidInput(
@@ -128,4 +129,18 @@ def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_
             f" factor times its scale), found {trajectory.states[k, i]:g} at row {k}; cut the record before"
             " it, or declare a larger scale."
         )
+    _check_commands(trajectory, signals)
     return trajectory
+
+
+def _check_commands(trajectory: Trajectory, signals: Signals) -> None:
+    """Refuses commands so far beyond their bounds that they are in another unit."""
+    for command, sent in zip(signals.commands, trajectory.commands.T, strict=True):
+        low, high = command.bounds
+        beyond = np.maximum(low - sent, sent - high)
+        k = int(np.argmax(beyond))
+        if beyond[k] > high - low:
+            raise InvalidInput(
+                f"Trajectory: expected {command.name} within its bounds, {low:g} to {high:g} {command.unit}, found"
+                f" {sent[k]:g} at row {k}; record what was sent, in that unit, or declare the bounds that it has."
+            )

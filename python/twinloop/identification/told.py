@@ -39,15 +39,20 @@ def told(options: IdentificationOptions, pool: Pool, signals: Signals) -> Told:
         The same by state.
 
     Raises:
-        InvalidInput: text that is no such formula or bound, a state that no output drives, a term that is bounded
-            twice, or one that is both fixed and bounded.
+        InvalidInput: text that is no such formula or bound, a state that no output drives, a term that is fixed or
+            bounded twice, or one that is both.
     """
     form = options.form_for(signals)
     fixed: dict[int, list[int]] = {}
     for text in options.fixed_terms:
         state, node = fixed_term(text, pool, signals)
         _check_driven(f"Fixed term {text!r}", state, form, signals)
-        fixed.setdefault(state, []).append(node)
+        if node in fixed.setdefault(state, []):
+            raise InvalidInput(
+                f"Fixed term {text!r}: expected each term once, found it twice in the equation of"
+                f" {signals.state_names[state]}; remove one, or write what both come to."
+            )
+        fixed[state].append(node)
     bare = {(state, bare_term(node, pool)[0]) for state, nodes in fixed.items() for node in nodes}
     found: dict[int, dict[int, Bounds]] = {}
     for text in options.bounded_terms:
