@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from conftest import PENDULUM_GAINS
+from conftest import PENDULUM_GAINS, pendulum_step
 from oracles import rk4, same_bits
+from twinloop.logbook import _check_first_reading
 from twinloop.models import Noise
 from twinloop.result import summary
 
@@ -151,7 +152,14 @@ def test_an_interrupted_campaign_still_has_the_twin_that_it_had(begin, pendulum)
         ({"operators": []}, None),
         ({"options": {"libraries": ["lineal"]}}, "did you mean 'linear'"),
         ({"options": {"libraries": [], "generations": 0}}, "found neither"),
-        ({"options": {"quality_weights": [1.0]}}, "expected 2 numbers"),
+        ({"options": {"quality_weights": [1.0]}}, "expected 2 finite numbers"),
+        ({"options": {"quality_weights": [1.0, np.nan]}}, "expected 2 finite numbers"),
+        ({"options": {"initial_range": [np.inf, 0.0]}}, "expected 2 finite numbers"),
+        ({"options": {"quality_weights": [0.0, 0.0]}}, "as good as any other"),
+        ({"options": {"fixed_terms": ["rate: -2 * rate"] * 2}}, "each term once"),
+        ({"initial_state": [0.0, 13.0]}, r"initial_state: expected rate within -10\.8 to 10\.8"),
+        ({"target_state": [1.0, -11.0]}, r"target_state: expected rate within .* found -11"),
+        ({"progress": 3}, "something to call"),
         ({"options": {"candidates": 1}}, "expected 2 to"),
         ({"options": {"margin": 1.0}}, "'margin'"),
         ({"options": {"form": "acceleraton"}}, "did you mean 'acceleration'"),
@@ -272,6 +280,66 @@ def test_a_run_that_was_cut_is_data_but_no_quality(begin, pendulum):
     test = campaign.ask()
     campaign.tell(test, pendulum.run(test))
     assert campaign.experiments[1].quality is not None
+
+
+def test_a_twin_that_does_not_follow_its_own_runs_is_not_followed(begin, pendulum):
+    """Commands recorded with the wrong sign: the law is right for the record, and nobody can fly by it."""
+    campaign = told(begin(), pendulum, lambda run: changed(run, commands=-run.commands))
+    first = campaign.experiments[0].test
+    best, test = campaign.best_test, campaign.ask()
+    assert same_bits(best.genes, first.genes) and "does not follow" in best.reason
+    assert same_bits(test.genes, first.genes) and "again" in test.reason
+    assert any("check the signs" in remark for remark in campaign.history[0].remarks)
+    honest = told(begin(), pendulum)
+    assert not same_bits(honest.best_test.genes, first.genes)
+    assert not any("check the signs" in remark for remark in honest.history[0].remarks)
+
+
+def test_where_no_run_was_complete_a_remark_says_so(begin, pendulum):
+    campaign = told(begin(), pendulum, DATA["a first controller that crashes at once"])
+    assert campaign.twin and "the longest had 2 of 20 steps" in campaign.history[0].remarks[-1]
+
+
+def test_after_a_first_flight_beyond_the_envelope_flights_keep_it_and_so_does_the_controller(begin):
+    rate = replace(SIGNALS.states[1], envelope=(-1.1, 1.1))
+    signals = tl.Signals([SIGNALS.states[0], rate], SIGNALS.commands, SIGNALS.dt)
+    system = tl.systems.Simulated(signals, pendulum_step)
+    quick = {"angle.kp": 5.0, "angle.ki": 0.0, "angle.kd": 0.2}
+    campaign = begin(signals=signals, options={"candidates": 256, "evaluations": 2048})
+    first = campaign.test(quick, excitation=None)
+    campaign.tell(first, system.run(first))
+    assert campaign.experiments[0].left_envelope and campaign.experiments[0].usage > 1.5
+    for _ in range(2):
+        campaign.run(system, len(campaign.experiments) + 1)
+        flown = campaign.experiments[-1]
+        assert not flown.left_envelope and flown.quality > campaign.experiments[0].quality
+        assert campaign.history[-1].asked[-1].safe
+    best = campaign.best_test
+    assert best.risk < 0.2 and np.abs(system.run(best).states[:, 1]).max() <= 1.1
+    # After the first flight alone it is not recommended either.
+    again = begin(signals=signals, options={"candidates": 256, "evaluations": 2048})
+    first = again.test(quick, excitation=None)
+    again.tell(first, system.run(first))
+    assert np.abs(system.run(again.best_test).states[:, 1]).max() <= 1.1
+    assert "as the best gains flown did" in again.best_test.reason
+
+
+def test_a_first_reading_that_no_state_was_near_is_refused_and_a_noisy_one_is_not(begin, pendulum):
+    campaign = begin()
+    test = campaign.test(PENDULUM_GAINS)
+    run = pendulum.run(test)
+    states = np.array(run.states)
+    states[0, 0] = 1.5
+    with pytest.raises(
+        tl.InvalidInput, match=r"expected angle to begin near 0 rad, found 1\.5 in the first row"
+    ):
+        campaign.tell(test, changed(run, states))
+    assert campaign.experiments == ()
+    for seed in range(200):
+        noisy = run.states + np.random.default_rng(seed).normal(0.0, 0.3, run.states.shape)
+        _check_first_reading(changed(run, noisy), test)
+    # A run that began elsewhere, and stayed there, is a run.
+    _check_first_reading(changed(run, run.states + np.array([0.5, 0.0])), test)
 
 
 def test_the_same_test_twice_is_a_replicate(begin, pendulum):

@@ -107,6 +107,24 @@ def test_every_flight_is_judged_by_its_own_trajectory(rig, rig_family, committee
         assert diverged > 0
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_measured_quality_is_that_of_the_readings(rig, rig_family, committee, kind):
+    drawn, weights = Drawn(rig, rig_family, 5), np.array([2.0, 0.5])
+    noise = np.random.default_rng(1).normal(0.0, 0.05, (3, STEPS + 1, 2))
+    measure = _core.Quality(kind, weights, effort=0.3, effort_rate=0.02)
+    found = _core.qualities(committee[:3], drawn.flights, measure, ENVELOPE, noise=noise, measured=True)
+    true = _core.qualities(committee[:3], drawn.flights, measure, ENVELOPE, noise=noise)
+    assert same_bits(found[1], true[1]) and (found[0] != true[0]).all()
+    for m, d, i in np.ndindex(found[0].shape):
+        run = drawn.run(committee[m], i, noise[d])
+        readings = run.states[0] + noise[d]
+        readings[0] = run.states[0][0]  # where the flight begins counts in no quality
+        expected = expected_quality(kind, weights, 0.3, 0.02, readings, run.commands[0], drawn.target[i])
+        assert found[0][m, d, i] == pytest.approx(expected, rel=1e-12)
+    silent = _core.qualities(committee[:3], drawn.flights, measure, ENVELOPE, measured=True)
+    assert same_bits(silent[0], _core.qualities(committee[:3], drawn.flights, measure, ENVELOPE)[0])
+
+
 def test_without_draws_there_is_one_flight_without_noise(rig, rig_family, committee):
     drawn, measure = Drawn(rig, rig_family, 5, excited=False), _core.Quality("iae", [1.0, 1.0])
     found = _core.qualities(committee, drawn.flights, measure, ENVELOPE)

@@ -366,12 +366,13 @@ def qualities(
     *,
     noise: ArrayLike | None = None,
     offsets: ArrayLike | None = None,
+    measured: bool = False,
     workers: Workers | None = None,
 ) -> tuple[_Floats, _Floats]:
     """Quality and usage of the envelope of every flight, both (members, draws, K).
 
     noise (D, n + 1, n_x) is added to what the controllers read, offsets (D, n_x) to the initial states; both
-    are the same for all candidates and members.
+    are the same for all candidates and members. measured: the quality is that of the readings.
     """
 
 def disagreements(

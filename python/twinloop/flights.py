@@ -84,6 +84,7 @@ def qualities(
     *,
     noise: ArrayLike | None = None,
     offsets: ArrayLike | None = None,
+    measured: bool = False,
     workers: _core.Workers | None = None,
 ) -> tuple[Floats, Floats]:
     """Flies every candidate on every member, under every draw of noise.
@@ -98,6 +99,8 @@ def qualities(
         noise: D draws of what the sensors add to each state (D, n + 1, n_x), in the units of the states;
             None: perfect sensors.
         offsets: D draws of what is added to the initial state (D, n_x); None: nothing.
+        measured: whether qualities are those of the readings, as a record of the flight will give them, or of the
+            true states.
         workers: how the work is carried out; one thread by default.
 
     Returns:
@@ -111,8 +114,9 @@ def qualities(
     envelope = [state.envelope for state in signals.states]
     with engine_input():
         return _core.qualities(
-            dynamics, flights, measure, envelope, noise=noise, offsets=offsets, workers=workers
-        )
+            dynamics, flights, measure, envelope,
+            noise=noise, offsets=offsets, measured=measured, workers=workers,
+        )  # fmt: skip
 
 
 def disagreements(

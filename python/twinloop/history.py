@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from twinloop.arrays import Floats
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -27,6 +30,26 @@ class Experiment:
     frozen: float
     final_distance: float | None
     quality: float | None
+
+    @property
+    def usage(self) -> float:
+        """The most that its readings used of the envelope: 1 at a bound; 0 where none is declared."""
+        return float(self._usages().max())
+
+    @property
+    def left_envelope(self) -> bool:
+        """Whether two readings in a row were outside; a single one may be the sensor's."""
+        outside = self._usages() > 1.0
+        return bool((outside[1:] & outside[:-1]).any())
+
+    def _usages(self) -> Floats:
+        """The most that any state used at each reading (n + 1,)."""
+        most = np.zeros(len(self.trajectory.states))
+        for readings, state in zip(self.trajectory.states.T, self.test.family.signals.states, strict=True):
+            if state.envelope is not None:
+                low, high = state.envelope
+                most = np.maximum(most, np.abs(readings - 0.5 * (low + high)) / (0.5 * (high - low)))
+        return most
 
 
 @dataclass(frozen=True)
@@ -108,6 +131,8 @@ class Lesson:
         offsets: by how much later than those of the driven states each state's readings were taken from it, s.
         closed_loop: of the best model, one for each selected test, SI units squared.
         normalised: closed_loop over that of the model that never moves.
+        follows: whether the best model, flown by itself, follows at least half of the runs that it was learnt from; if
+            not, nothing is planned on it.
         remarks: what a person should know.
         asked: the tests planned after it.
     """
@@ -126,6 +151,7 @@ class Lesson:
     offsets: tuple[float, ...]
     closed_loop: tuple[float, ...]
     normalised: tuple[float, ...]
+    follows: bool
     remarks: tuple[str, ...]
     asked: tuple[Planned, ...] = ()
 

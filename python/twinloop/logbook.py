@@ -8,6 +8,8 @@ import uuid
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+import numpy as np
+
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput, engine_input
@@ -17,6 +19,10 @@ from twinloop.setup import Setup
 from twinloop.test import Test, check_signals, final_distance
 from twinloop.trajectory import Trajectory, check_recorded
 
+FAR = 5.0
+"""A first reading is refused if it is this many times further off than the second, and than the next readings move."""
+NEXT = 9
+"""Readings after the first that are looked at for this."""
 Asked = TypeVar("Asked", TestLoop, Planned)
 
 
@@ -124,6 +130,7 @@ class Logbook:
         """
         known = self._known(test)
         check_recorded(trajectory, self.setup.signals, known.steps, self.setup.options.divergence_factor)
+        _check_first_reading(trajectory, known)
         with engine_input():
             states, commands = trajectory.states, trajectory.commands
             run = (known.genes, known.target_state, states, commands, known.excitation)
@@ -150,13 +157,26 @@ class Logbook:
         return math.fsum(values) / len(values) if values else None
 
     def best(self) -> Test:
-        """The flown test of the best quality; the first one if no run was complete."""
+        """The flown test of the best quality; the first one if no run was complete.
 
-        def quality(test: Test) -> float:
+        Tests that left the envelope, of which the paper knows nothing, come after all others.
+        """
+
+        def rank(test: Test) -> tuple[bool, float]:
             measured = self.measured(test.number)
-            return math.inf if measured is None else measured
+            if measured is None:
+                return True, math.inf
+            return self.setup.preset != "paper" and self.left_envelope(test.number), measured
 
-        return min((run.test for run in self.experiments), key=quality)
+        return min((run.test for run in self.experiments), key=rank)
+
+    def left_envelope(self, test: int) -> bool:
+        """Whether any run of a test left the envelope.
+
+        Args:
+            test: its number.
+        """
+        return any(run.left_envelope for run in self.experiments if run.test.number == test)
 
     def waiting(self) -> Test | None:
         """The first test that was asked for and not told; before the first flight, the last that was made."""
@@ -212,3 +232,21 @@ class Logbook:
                 "tell it to the campaign that made it, or make it here with campaign.test(gains)."
             )
         return self.tests[test.number]
+
+
+def _check_first_reading(trajectory: Trajectory, test: Test) -> None:
+    """Refuses a first reading that only a sensor that was not ready can have given: free runs begin there."""
+    if trajectory.steps < NEXT:
+        return
+    scales = np.array([state.scale for state in test.family.signals.states])
+    first, second = np.abs(trajectory.states[:2] - test.initial_state)
+    # What the next readings do of themselves: their noise, and what the system does in a period.
+    usual = np.abs(np.diff(trajectory.states[1 : NEXT + 1], axis=0)).max(axis=0)
+    wrong = (first > 0.01 * scales) & (first > FAR * second) & (first > FAR * usual)
+    for i in np.flatnonzero(wrong):
+        state = test.family.signals.states[int(i)]
+        raise InvalidInput(
+            f"Campaign.tell: expected {state.name} to begin near {test.initial_state[i]:g} {state.unit}, found"
+            f" {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the sensor"
+            " was not ready: put into the first row what the state was, or run the test again."
+        )

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from twinloop.arrays import Floats
 from twinloop.campaign import Campaign
 from twinloop.flight import fly
 from twinloop.history import Experiment, Lesson
@@ -189,7 +190,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
         "why": best.reason,
         "flown": any(run.test.number == best.number for run in campaign.experiments),
     }
-    result["first_controller"]["predicted"] = _simulated_quality(campaign, twin, first)
+    result["first_controller"]["predicted"] = _first_predicted(campaign, twin, first)
     result["advice"] = _advice(campaign, twin, best)
 
 
@@ -224,10 +225,10 @@ def _errors_by_state(campaign: Campaign, twin: Twin) -> list[float]:
     return [float(value) for value in np.sqrt(squares / max(1, rows))]
 
 
-def _simulated_quality(campaign: Campaign, twin: Twin, test: Test) -> float | None:
-    """Quality of a flight on the twin; None if it diverges."""
-    run = fly(twin.model, test, divergence_factor=twin.divergence_factor)
-    return campaign.setup.quality.flown(run, test.target_state) if run.steps == test.steps else None
+def _first_predicted(campaign: Campaign, twin: Twin, first: Test) -> float | None:
+    """Quality that the twin expects to be measured of a flight, under the sensors' noise; None if it diverges."""
+    values = _repeated(campaign, twin, first, gusts=False)
+    return None if np.isnan(values).any() else float(np.mean(values))
 
 
 def _advice(campaign: Campaign, twin: Twin, best: Test) -> dict[str, object]:
@@ -235,8 +236,8 @@ def _advice(campaign: Campaign, twin: Twin, best: Test) -> dict[str, object]:
     lessons = [lesson for lesson in campaign.history if isinstance(lesson, Lesson)]
     judged = [(plan, lesson) for lesson in lessons for plan in lesson.asked if math.isfinite(plan.predicted)]
     gain = judged[-1][0].gain if judged else None
-    # A model that diverges on its own runs, then or now, can advise nobody.
-    trusted = bool(judged) and math.isfinite(judged[-1][1].misfit) and math.isfinite(lessons[-1].misfit)
+    # A model that does not follow its own runs, then or now, can advise nobody.
+    trusted = bool(judged) and judged[-1][1].follows and lessons[-1].follows
     scatter = _scatter(campaign, twin, best)
     quality = best.predicted if best.measured is None else best.measured
     known = gain is not None and quality is not None and math.isfinite(quality) and quality > 0.0
@@ -252,15 +253,22 @@ def _advice(campaign: Campaign, twin: Twin, best: Test) -> dict[str, object]:
 
 def _scatter(campaign: Campaign, twin: Twin, best: Test) -> float | None:
     """Standard deviation of the quality that would be measured if the same flight were repeated, on the twin."""
-    if twin.noise is None:
-        return None
-    noise, moves = twin.noise.drawn(REPEATS, best.steps, stream(campaign.setup.seed, 81))
-    values = []
-    for seen, moved in zip(noise, moves, strict=True):
-        run = fly(twin.model, best, noise=seen, disturbance=moved, divergence_factor=twin.divergence_factor)
-        if run.steps == best.steps:
-            values.append(campaign.setup.quality.flown(run, best.target_state))
+    values = [value for value in _repeated(campaign, twin, best, gusts=True) if not math.isnan(value)]
     return float(np.std(values)) if len(values) > 1 else None
+
+
+def _repeated(campaign: Campaign, twin: Twin, test: Test, gusts: bool) -> list[float]:
+    """Qualities that would be measured if a flight were repeated, on the twin; NaN for one that diverges."""
+    draws: list[tuple[Floats | None, Floats | None]] = [(None, None)]
+    if twin.noise is not None:
+        noise, moves = twin.noise.drawn(REPEATS, test.steps, stream(campaign.setup.seed, 81))
+        draws = [(seen, moved if gusts else None) for seen, moved in zip(noise, moves, strict=True)]
+    values = []
+    for seen, moved in draws:
+        run = fly(twin.model, test, noise=seen, disturbance=moved, divergence_factor=twin.divergence_factor)
+        lasted = run.steps == test.steps
+        values.append(campaign.setup.quality.flown(run, test.target_state) if lasted else math.nan)
+    return values
 
 
 def plain_dict(values: Mapping[str, object]) -> Result:

@@ -107,7 +107,9 @@ pub enum Members<'py> {
 
 /// Quality and usage of the envelope of every flight (members, draws, K).
 #[pyfunction]
-#[pyo3(signature = (dynamics, flights, quality, envelope, *, noise = None, offsets = None, workers = None))]
+#[pyo3(signature = (
+    dynamics, flights, quality, envelope, *, noise = None, offsets = None, measured = false, workers = None
+))]
 #[expect(clippy::too_many_arguments, reason = "what a judgement needs, named by keyword in Python")]
 #[expect(clippy::type_complexity, reason = "two arrays")]
 pub fn qualities<'py>(
@@ -118,6 +120,7 @@ pub fn qualities<'py>(
     envelope: Vec<Option<(f64, f64)>>,
     noise: Option<Cube<'py>>,
     offsets: Option<Matrix<'py>>,
+    measured: bool,
     workers: Option<&PyWorkers>,
 ) -> Result<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>)> {
     let workers = or_default(workers)?;
@@ -127,7 +130,7 @@ pub fn qualities<'py>(
     let noise = optional_blocks("noise", noise, [draws, flights.steps() + 1, n_x])?;
     let offsets = optional_rows("offsets", offsets, n_x)?;
     let (noise, offsets) = (views(&noise), views(&offsets));
-    let draws = Draws { noise: &noise, offsets: &offsets };
+    let draws = Draws { noise: &noise, offsets: &offsets, measured };
     let (members, judged) = match dynamics {
         Members::Plant(plant) => {
             let plant = plant.get();

@@ -41,6 +41,8 @@ STEPS = (
     "candidates",
 )
 """What there is to see while it works, in order."""
+DOUBT = 3.0
+"""Standard deviations of predicted flights by which they may be worse than one that was measured."""
 FEWEST = 4
 """Members of a committee that are kept in any case."""
 WRONG = 0.5
@@ -73,6 +75,7 @@ class IdentifyAndPlan:
         self._learnt = 0
         self._told: tuple[int, ...] = ()
         self._believed: list[_core.Model] = []
+        self._follows = False
         self._tuned: tuple[int, Floats] | None = None
         self._best: tuple[int, Test] | None = None
         self._lessons: list[Lesson] = []
@@ -118,6 +121,7 @@ class IdentifyAndPlan:
         kept = {0, *np.flatnonzero(~wrong).tolist()}
         kept |= set([i for i in order.tolist() if i not in kept][: max(0, FEWEST - len(kept))])
         self._believed = [identified.members[i] for i in sorted(kept)]
+        self._follows = self._can_follow(identified, free[0], frozen)
         self.identified, self._learnt, self.iteration = identified, told, told
         self._needed = needed
         self._lessons.append(self._lesson(identified, book, free[0].tolist()))
@@ -140,15 +144,17 @@ class IdentifyAndPlan:
         exploit = not waiting and (
             (last and self.options.exploit_last) or (self.setup.goal == "control" and len(told) > 1)
         )
+        best = book.best()
         found = self.planner.propose(
             committee,
             tuned,
-            book.best().genes,
+            best.genes,
             self.setup.goal,
             number,
             len(book.experiments),
             self._first_quality(book),
-            self._used(book),
+            [run.usage for run in book.experiments],
+            not book.left_envelope(best.number),
             exploit,
         )
         test = book.new_test(
@@ -182,23 +188,37 @@ class IdentifyAndPlan:
         committee, flown = self._committee(), book.best().quiet()
         tuned = self._gains(book)
         genes = np.stack([tuned, flown.genes])
-        judged = self.planner.judge(
-            self.planner.lasting(committee.members, genes), genes, committee.sds, self.options.draws
-        )
+        members = self.planner.lasting(committee.members, genes)
+        judged = self.planner.judge(members, genes, committee.sds, self.options.draws)
         measured = book.measured(flown.number)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < old).mean())
         safe = float(judged.usages[:, :, 0].max()) <= 1.0
-        trusted = committee.trusted and safe and better >= self.options.confidence
+        left = book.left_envelope(flown.number)
+        recorded = self.planner.judge(
+            members, genes, committee.sds, self.options.draws, measured=True
+        ).qualities
+        doubtful = measured is not None and self._doubtful(
+            members, committee.sds, book.best(), recorded, measured
+        )
+        trusted = (
+            committee.trusted and safe and (left or (better >= self.options.confidence and not doubtful))
+        )
         pick = 0 if trusted else 1
         known = next((t for t in book.tests if t.genes.tobytes() == tuned.tobytes()), None)
-        means = judged.qualities[:, :, pick].mean(axis=1)
+        predicted, spread = expected(recorded[:, :, pick].mean(axis=1))
         if pick == 1:
-            reason = self._refusal(committee.trusted, safe, better, tuned, flown.genes)
-            test = flown.judged(expected(means), measured)
+            reason = self._refusal(committee.trusted, safe, doubtful, better, tuned, flown.genes)
+            if left:
+                reason += " They left the envelope when they flew."
+            test = flown.judged(predicted, measured)
         else:
-            share = f"{100 * better:.0f} %"
+            share = f"{100 * better:.3g} %"
             reason = f"Tuned on the twin, which prefers them to the best flown in {share} of its predictions."
+            if left:
+                reason = (
+                    "Tuned on the twin: no model sees them leave the envelope, as the best gains flown did."
+                )
             number = len(book.tests) if known is None else known.number
             number_measured = None if known is None or known.excitation is not None else book.measured(number)
             test = Test(
@@ -210,10 +230,10 @@ class IdentifyAndPlan:
                 None,
                 number=number,
                 campaign=flown.campaign,
-                predicted=expected(means),
+                predicted=predicted,
                 measured=number_measured,
             )
-        answer = test.explained(float(means.std()), self._risk(judged.usages[:, :, pick]), reason)
+        answer = test.explained(spread, self._risk(judged.usages[:, :, pick]), reason)
         self._best = (len(book.experiments), answer)
         return answer
 
@@ -276,7 +296,13 @@ class IdentifyAndPlan:
 
     def _committee(self) -> Committee:
         known = self._known()
-        return Committee(self._believed, known.sensors(self.setup.signals.n_x), bool(np.isfinite(known.left)))
+        return Committee(self._believed, known.sensors(self.setup.signals.n_x), self._follows)
+
+    def _can_follow(self, known: Identified, free: Floats, frozen: Floats) -> bool:
+        """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from."""
+        noise = float(np.square(known.sensors(self.setup.signals.n_x)).mean())
+        lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
+        return bool(np.isfinite(known.left)) and 2 * int(lost.sum()) <= len(lost)
 
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
@@ -306,38 +332,48 @@ class IdentifyAndPlan:
         except (NotAvailable, InvalidInput):
             return []
 
-    def _refusal(self, trusted: bool, safe: bool, better: float, tuned: Floats, flown: Floats) -> str:
+    def _doubtful(
+        self, members: Sequence[_core.Model], sds: Floats, flown: Test, recorded: Floats, measured: float
+    ) -> bool:
+        """Whether the twin expects less of its own gains than was measured of the best, and of that flight too."""
+        ends = flown.initial_state[np.newaxis], flown.target_state[np.newaxis]
+        excitation = None if flown.excitation is None else flown.excitation[np.newaxis]
+        again = self.planner.judge(
+            members, flown.genes[np.newaxis], sds, self.options.draws, excitation, ends, measured=True
+        )
+        least = 1.01 * measured + DOUBT * float(again.qualities.std())
+        return bool(recorded[:, :, 0].mean() > least and again.mean[0] > least)
+
+    def _refusal(
+        self, trusted: bool, safe: bool, doubtful: bool, better: float, tuned: Floats, flown: Floats
+    ) -> str:
         """Why the best gains flown are kept."""
+        if not trusted:
+            return "The best gains flown: the twin does not follow the runs that it was learnt from."
         if tuned.tobytes() == flown.tobytes():
             return "The best gains flown: the twin knows no better ones."
-        if not trusted:
-            return "The best gains flown: the twin diverges on the runs that it was learnt from."
         if not safe:
             return "The best gains flown: a model sees those that the twin prefers leave the envelope."
-        share, asked = (f"{100 * part:.0f} %" for part in (better, self.options.confidence))
+        if doubtful:
+            return "The best gains flown: the twin expects less of others than was measured of these, and of these too."
+        share, asked = (f"{100 * part:.3g} %" for part in (better, self.options.confidence))
         return (
             f"The best gains flown: the twin prefers others in {share} of its predictions, and {asked} are asked"
             " for."
         )
 
     def _first_quality(self, book: Logbook) -> float:
-        first = book.measured(book.experiments[0].test.number)
-        if first is not None:
-            return first
+        """Of the first controller, as flown or predicted; infinite where it left the envelope."""
+        first = book.experiments[0].test
+        if book.left_envelope(first.number):
+            return float("inf")
+        measured = book.measured(first.number)
+        if measured is not None:
+            return measured
         committee = self._committee()
-        genes = book.experiments[0].test.genes[np.newaxis]
-        return float(self.planner.judge(committee.members[:1], genes, committee.sds, 1).mean[0])
-
-    def _used(self, book: Logbook) -> list[float]:
-        """Largest usage of the envelope in each flight."""
-        used = [0.0] * len(book.experiments)
-        for i, state in enumerate(self.setup.signals.states):
-            if state.envelope is not None:
-                low, high = state.envelope
-                for number, run in enumerate(book.experiments):
-                    off = np.abs(run.trajectory.states[:, i] - 0.5 * (low + high)).max()
-                    used[number] = max(used[number], float(off) / (0.5 * (high - low)))
-        return used
+        return float(
+            self.planner.judge(committee.members[:1], first.genes[np.newaxis], committee.sds, 1).mean[0]
+        )
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
@@ -368,8 +404,25 @@ class IdentifyAndPlan:
             normalised=tuple(
                 normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)
             ),
-            remarks=tuple(known.remarks),
+            follows=self._follows,
+            remarks=(*known.remarks, *self._doubts(known, book)),
         )
+
+    def _doubts(self, known: Identified, book: Logbook) -> list[str]:
+        """What speaks against the twin as a whole."""
+        said = []
+        if np.isfinite(known.left) and not self._follows:
+            said.append(
+                "Flown by itself the twin does not follow the runs that it was learnt from: check the signs, units and"
+                " order of states and commands, and that the recorded controller is the one that the test names."
+            )
+        if all(run.quality is None for run in book.experiments):
+            longest = max(run.trajectory.steps for run in book.experiments)
+            said.append(
+                f"No run was complete, the longest had {longest} of {self.setup.steps} steps: what comes after them"
+                " nobody has seen."
+            )
+        return said
 
     def _watch(self, step: str, share: float) -> None:
         lesson = self._lessons[-1] if self._lessons else None

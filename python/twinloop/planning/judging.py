@@ -66,13 +66,15 @@ class Judged:
         return worst
 
 
-def expected(means: Floats) -> float:
-    """Quality that members expect on average, each by its mean (members,); infinite where one of them diverges.
+def expected(means: Floats) -> tuple[float, float]:
+    """Quality that members expect on average, each by its mean (members,), and its spread; infinite where one diverges.
 
     Args:
         means: of the members.
     """
-    return float("inf") if bool((means >= DIVERGED).any()) else float(means.mean())
+    if bool((means >= DIVERGED).any()):
+        return float("inf"), float("inf")
+    return float(means.mean()), float(means.std())
 
 
 class Judge:
@@ -113,12 +115,17 @@ class Judge:
         draws: int,
         excitation: Floats | None = None,
         ends: Ends | None = None,
+        measured: bool = False,
     ) -> Judged:
-        """Flies candidates on members under noise; what diverges is worth `HOPELESS`."""
+        """Flies candidates on members under noise; what diverges is worth `HOPELESS`.
+
+        Qualities are those of the true states, which gains are chosen by, or, `measured`, those that a record of the
+        flight would give.
+        """
         noise = self.noise(sds, draws)
         values, usages = qualities(
             members, self.flights(genes, excitation, ends), self.quality.engine, self.signals,
-            noise=noise, workers=self.workers,
+            noise=noise, measured=measured, workers=self.workers,
         )  # fmt: skip
         return Judged(
             np.where(np.isfinite(values), values, HOPELESS), np.where(np.isfinite(usages), usages, HOPELESS)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -13,11 +14,16 @@ from twinloop.controllers import Family
 from twinloop.flights import disagreements
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import from_unit, to_unit, tune_gains
-from twinloop.planning.judging import DIVERGED, Committee, Ends, Judge, Task, expected
+from twinloop.planning.judging import DIVERGED, Committee, Ends, Judge, Judged, Task, expected
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 
+Flags = NDArray[np.bool_]
 GOALS = ("both", "model", "control")
+TRIED = 128
+"""Candidates at most that are flown under noise before the safest one is taken."""
+TOGETHER = 4
+"""Of them at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +35,11 @@ class Proposal:
         initial_state: where it starts (n_x,).
         target_state: where it leads (n_x,).
         excitation: (n, n_u), or None.
-        predicted: mean quality over members and draws; infinite if any diverges.
-        spread: standard deviation of the members' means.
+        predicted: mean quality over members and draws, as a record of the flight would give it; infinite if any
+            diverges.
+        spread: standard deviation of the members' means; infinite likewise.
         risk: share of predicted flights that leave the envelope, with half a flight added on either side.
-        safe: whether every member keeps the margin.
+        safe: whether every member keeps the margin, and the envelope under every draw of the sensors' noise.
         disagreement: of the committee, log det.
         gain: quality that knowing the right member would bring, by the committee's own estimate.
         reason: for a person.
@@ -164,6 +171,7 @@ class Planner(Judge):
         told: int,
         first_quality: float,
         used: Sequence[float],
+        kept: bool,
         exploit: bool,
     ) -> Proposal:
         """The next test.
@@ -175,8 +183,10 @@ class Planner(Judge):
             goal: "both", "model" or "control".
             number: of the test, for its stream.
             told: experiments so far.
-            first_quality: of the first controller, as flown or predicted.
+            first_quality: of the first controller, as flown or predicted; infinite where it left the envelope: a
+                flight that keeps it may then be worse.
             used: largest usage of the envelope in each flight so far.
+            kept: whether the best gains flown kept the envelope.
             exploit: whether the tuned gains are flown as they are.
 
         Returns:
@@ -197,51 +207,50 @@ class Planner(Judge):
         mean = per_member.mean(axis=0)
         keeps = judged.worst_usage <= self._reach(goal, used)
         scatter = 0.0 if goal == "model" else self._scatter(committee, tuned)
-        limit = self._limit(float(mean[0]), goal, told, first_quality, scatter)
+        first = first_quality if np.isfinite(first_quality) else 2.0 * float(mean[0])
+        limit = self._limit(float(mean[0]), goal, told, first, scatter)
         allowed = keeps & (mean <= limit)
         repeats = len(genes) - self._repeats(len(genes))
-        if not committee.trusted:
-            # Nothing is known but that these gains have flown: again, with another excitation.
-            chosen = repeats
-        elif exploit and allowed[0]:
-            chosen = 0
-        elif allowed.any():
-            chosen = int(np.argmax(np.where(allowed, values, -np.inf)))
-        elif (keeps & (mean <= first_quality)).any():
-            chosen = int(np.argmin(np.where(keeps, mean, np.inf)))
-        else:
-            # What was flown has kept the envelope, whatever the members make of it.
-            chosen = repeats + int(np.argmin(judged.worst_usage[repeats:]))
+
+        def drawn(chosen: Sequence[int]) -> Judged:
+            of_each = (ends[0][chosen], ends[1][chosen])
+            draws = self.options.draws
+            return self.judge(
+                members, genes[chosen], committee.sds, draws, excitation[chosen], of_each, measured=True
+            )
+
+        order = _order(values, mean, allowed, keeps & (mean <= first), exploit) if committee.trusted else []
+        found = _first_that_lasts(order, drawn, max(limit, first_quality + 2.0 * scatter))
+        if found is None:
+            # What was flown and kept the envelope will again, whatever the members make of it. Where no model is to be
+            # trusted, nothing is known but that these gains have flown: again, with another excitation.
+            known = repeats if kept or not committee.trusted else 0
+            chosen = known + int(np.argmin(judged.worst_usage[known:]))
+            found = chosen, drawn([chosen])
+        chosen, noisy = found
         # What knowing the right member would bring: each one's own best against the best for all of them.
         choices = per_member[:, keeps]
         gain = float(choices.mean(axis=0).min() - choices.min(axis=1).mean()) if keeps.any() else 0.0
         row, state, high, low = (int(i) for i in where[chosen])
-        noisy = self.judge(
-            members,
-            genes[[chosen]],
-            committee.sds,
-            self.options.draws,
-            excitation[[chosen]],
-            (ends[0][[chosen]], ends[1][[chosen]]),
-        )
-        safe = bool(judged.worst_usage[chosen] <= 1.0 - self.options.margin)
+        inside = judged.worst_usage[chosen] <= 1.0 - self.options.margin and noisy.usages.max() <= 1.0
+        safe = bool(inside and (kept or chosen < repeats))
         left = int((noisy.usages > 1.0).sum())
-        drawn = noisy.usages.size
-        means = noisy.qualities.mean(axis=(1, 2))
+        predicted, spread = expected(noisy.qualities.mean(axis=(1, 2)))
         return Proposal(
             genes=genes[chosen],
             initial_state=ends[0][chosen],
             target_state=ends[1][chosen],
             excitation=excitation[chosen] if excitation[chosen].any() else None,
-            predicted=expected(means),
-            spread=float(means.std()),
-            risk=(left + 0.5) / (drawn + 1.0),
+            predicted=predicted,
+            spread=spread,
+            risk=(left + 0.5) / (noisy.usages.size + 1.0),
             safe=safe,
             disagreement=float(values[chosen]),
             gain=max(0.0, gain),
             reason=self._reason(
                 exploit and chosen == 0,
                 chosen >= repeats,
+                kept,
                 safe,
                 float(values[chosen]),
                 row,
@@ -335,6 +344,7 @@ class Planner(Judge):
         self,
         exploits: bool,
         repeats: bool,
+        kept: bool,
         safe: bool,
         value: float,
         row: int,
@@ -344,7 +354,8 @@ class Planner(Judge):
         sentences = []
         if repeats:
             change = "a stronger excitation" if self.options.excitation > 0.0 else "a small variation"
-            sentences.append(f"The best gains flown, again, with {change}: they are known to fly.")
+            known = "they are known to fly" if kept else "they left the envelope when they flew"
+            sentences.append(f"The best gains flown, again, with {change}: {known}.")
         if exploits:
             sentences.append("The best gains that the twin knows, flown as they are.")
         elif value > 0.0 and pair[0] != pair[1]:
@@ -356,7 +367,29 @@ class Planner(Judge):
             sentences.append("All models agree: the flight confirms what is known.")
         if not safe:
             sentences.append(
-                "No candidate keeps the envelope with its margin, or lasts at all, on every model: this is the safest"
-                " that is known. Fly it with a hand on the switch, or not at all."
+                "No candidate keeps the envelope with its margin, or lasts at all, on every model and under the noise"
+                " of the sensors: this is the safest that is known. Fly it with a hand on the switch, or not at all."
             )
         return " ".join(sentences)
+
+
+def _order(values: Floats, mean: Floats, allowed: Flags, better: Flags, exploit: bool) -> list[int]:
+    """Candidates, the most wanted first: what tells most among those allowed, then what flies best among the better."""
+    first = [0] if exploit and allowed[0] else []
+    telling = np.flatnonzero(allowed)[np.argsort(-values[allowed], kind="stable")]
+    flying = np.flatnonzero(better)[np.argsort(mean[better], kind="stable")]
+    return [*first, *telling.tolist(), *flying.tolist()]
+
+
+def _first_that_lasts(
+    order: Sequence[int], drawn: Callable[[Sequence[int]], Judged], worst: float
+) -> tuple[int, Judged] | None:
+    """The first candidate that keeps the envelope under every draw of noise and is not worse than the worst allowed."""
+    for at in range(0, min(len(order), TRIED), TOGETHER):
+        batch = order[at : at + TOGETHER]
+        noisy = drawn(batch)
+        lasts = np.flatnonzero((noisy.worst_usage <= 1.0) & (noisy.mean <= worst))
+        if len(lasts):
+            i = int(lasts[0])
+            return batch[i], Judged(noisy.qualities[:, :, [i]], noisy.usages[:, :, [i]])
+    return None

@@ -16,6 +16,8 @@ pub struct Draws<'a> {
     pub noise: &'a [&'a [f64]],
     /// What is added to the initial states, n_x a draw; empty for nothing.
     pub offsets: &'a [&'a [f64]],
+    /// Whether qualities are those of the readings, as a record of a flight gives them, or of the true states.
+    pub measured: bool,
 }
 
 impl Draws<'_> {
@@ -75,8 +77,8 @@ pub fn qualities<D: Dynamics + Sync>(
         let dynamics = &dynamics[unit / groups / count];
         let row = |rows: &[&'_ [f64]]| rows.get(draw).map_or(vec![], |row| row.to_vec());
         let (noise, offset) = (row(draws.noise), row(draws.offsets));
-        let of_group =
-            OfGroup { dynamics, flights, group, quality, envelope, noise: &noise, offset: &offset };
+        let (noise, offset, measured) = (noise.as_slice(), offset.as_slice(), draws.measured);
+        let of_group = OfGroup { dynamics, flights, group, quality, envelope, noise, offset, measured };
         dispatch(workers.width(), of_group)
     });
     Ok(judged.concat())
@@ -92,6 +94,7 @@ struct OfGroup<'a, D> {
     noise: &'a [f64],
     /// n_x, or empty.
     offset: &'a [f64],
+    measured: bool,
 }
 
 impl<D: Dynamics> Kernel for OfGroup<'_, D> {
@@ -117,6 +120,8 @@ impl<D: Dynamics> OfGroup<'_, D> {
         let mut judge = Judge {
             tally: self.quality.tally(self.flights.signals(), &lanes.target),
             reach: self.envelope.reach(&lanes.initial),
+            noise: if self.measured { &noise } else { &[] },
+            reading: lanes.initial.clone(),
         };
         let lasted = rollout(self.dynamics, &self.flights.start(&lanes, &noise), &mut judge);
         let (quality, usage) = (judge.tally.total(), judge.reach.usage());
@@ -135,12 +140,23 @@ impl<D: Dynamics> OfGroup<'_, D> {
 struct Judge<'a, V> {
     tally: Tally<'a, V>,
     reach: Reach<'a, V>,
+    /// Of the readings that the quality is of; empty where it is of the true states.
+    noise: &'a [V],
+    reading: Vec<V>,
 }
 
 impl<V: Vector> Watch<V> for Judge<'_, V> {
     #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
-        self.tally.add(seen.step, seen.command, seen.next);
         self.reach.see(seen.next);
+        if self.noise.is_empty() {
+            return self.tally.add(seen.step, seen.command, seen.next);
+        }
+        let after = self.noise.chunks_exact(seen.next.len()).nth(seen.step + 1);
+        let readings = self.reading.iter_mut().zip(seen.next).zip(after.unwrap_or_default());
+        for ((reading, &state), &noise) in readings {
+            *reading = state + noise;
+        }
+        self.tally.add(seen.step, seen.command, &self.reading);
     }
 }
