@@ -12,9 +12,10 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.flights import disagreements
+from twinloop.planning.candidates import candidates
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import from_unit, to_unit, tune_gains
-from twinloop.planning.judging import DIVERGED, Committee, Ends, Judge, Judged, Task, expected
+from twinloop.planning.judging import DIVERGED, Committee, Judge, Judged, Task, expected
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 
@@ -192,108 +193,71 @@ class Planner(Judge):
         Returns:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
-        genes, excitation = self._candidates(tuned, flown, goal, number)
-        ends = self._ends(number, len(genes))
+        drafts = candidates(self, self.options, tuned, flown, goal, number)
         self.watch("candidates", 0.0)
         # A member that blows up whatever is flown is no member (E-SINDy).
-        members = self.lasting(committee.members, genes, excitation, ends)
-        judged = self.judge(members, genes, committee.sds, 1, excitation, ends)
-        flights = self.flights(genes, excitation, ends)
-        values, where = disagreements(
-            members, flights, np.maximum(committee.sds, self._smallest()), workers=self.workers
+        members = self.lasting(committee.members, drafts.genes, drafts.excitation, drafts.ends)
+        quiet = self.judge(members, drafts.genes, committee.sds, 1, drafts.excitation, drafts.ends)
+        tells, where = disagreements(
+            members,
+            self.flights(drafts.genes, drafts.excitation, drafts.ends),
+            np.maximum(committee.sds, self._smallest()),
+            workers=self.workers,
         )
         self.watch("candidates", 1.0)
-        per_member = judged.qualities.mean(axis=1)
-        mean = per_member.mean(axis=0)
-        keeps = judged.worst_usage <= self._reach(goal, used)
+        keeps = quiet.worst_usage <= self._reach(goal, used)
         scatter = 0.0 if goal == "model" else self._scatter(committee, tuned)
-        first = first_quality if np.isfinite(first_quality) else 2.0 * float(mean[0])
-        limit = self._limit(float(mean[0]), goal, told, first, scatter)
-        allowed = keeps & (mean <= limit)
-        repeats = len(genes) - self._repeats(len(genes))
+        promised = float(quiet.mean[0])
+        first = first_quality if np.isfinite(first_quality) else 2.0 * promised
+        limit = self._limit(promised, goal, told, first, scatter)
+        wanted: list[int] = []
+        if committee.trusted:
+            allowed, better = keeps & (quiet.mean <= limit), keeps & (quiet.mean <= first)
+            wanted = [0] if exploit and allowed[0] else []
+            wanted += [*_first(allowed, -tells), *_first(better, quiet.mean)]
 
-        def drawn(chosen: Sequence[int]) -> Judged:
-            of_each = (ends[0][chosen], ends[1][chosen])
-            draws = self.options.draws
+        def noisy(chosen: list[int]) -> Judged:
+            some = drafts.some(chosen)
             return self.judge(
-                members, genes[chosen], committee.sds, draws, excitation[chosen], of_each, measured=True
+                members,
+                some.genes,
+                committee.sds,
+                self.options.draws,
+                some.excitation,
+                some.ends,
+                measured=True,
             )
 
-        order = _order(values, mean, allowed, keeps & (mean <= first), exploit) if committee.trusted else []
-        found = _first_that_lasts(order, drawn, max(limit, first_quality + 2.0 * scatter))
+        found = _first_that_lasts(wanted, noisy, max(limit, first_quality + 2.0 * scatter))
         if found is None:
             # What was flown and kept the envelope will again, whatever the members make of it. Where no model is to be
             # trusted, nothing is known but that these gains have flown: again, with another excitation.
-            known = repeats if kept or not committee.trusted else 0
-            chosen = known + int(np.argmin(judged.worst_usage[known:]))
-            found = chosen, drawn([chosen])
-        chosen, noisy = found
-        # What knowing the right member would bring: each one's own best against the best for all of them.
-        choices = per_member[:, keeps]
-        gain = float(choices.mean(axis=0).min() - choices.min(axis=1).mean()) if keeps.any() else 0.0
-        row, state, high, low = (int(i) for i in where[chosen])
-        inside = judged.worst_usage[chosen] <= 1.0 - self.options.margin and noisy.usages.max() <= 1.0
-        safe = bool(inside and (kept or chosen < repeats))
-        left = int((noisy.usages > 1.0).sum())
-        predicted, spread = expected(noisy.qualities.mean(axis=(1, 2)))
+            known = drafts.repeats if kept or not committee.trusted else 0
+            chosen = known + int(np.argmin(quiet.worst_usage[known:]))
+            found = chosen, noisy([chosen])
+        chosen, flights = found
+        repeats = chosen >= drafts.repeats
+        inside = quiet.worst_usage[chosen] <= 1.0 - self.options.margin and flights.usages.max() <= 1.0
+        safe = bool(inside and (kept or not repeats))
+        predicted, spread = expected(flights.qualities.mean(axis=(1, 2)))
+        excitation, disagreement = drafts.excitation[chosen], float(tells[chosen])
         return Proposal(
-            genes=genes[chosen],
-            initial_state=ends[0][chosen],
-            target_state=ends[1][chosen],
-            excitation=excitation[chosen] if excitation[chosen].any() else None,
+            genes=drafts.genes[chosen],
+            initial_state=drafts.ends[0][chosen],
+            target_state=drafts.ends[1][chosen],
+            excitation=excitation if excitation.any() else None,
             predicted=predicted,
             spread=spread,
-            risk=(left + 0.5) / (noisy.usages.size + 1.0),
+            risk=(int((flights.usages > 1.0).sum()) + 0.5) / (flights.usages.size + 1.0),
             safe=safe,
-            disagreement=float(values[chosen]),
-            gain=max(0.0, gain),
+            disagreement=disagreement,
+            gain=_gain(quiet.qualities.mean(axis=1)[:, keeps]),
             reason=self._reason(
-                exploit and chosen == 0,
-                chosen >= repeats,
-                kept,
-                safe,
-                float(values[chosen]),
-                row,
-                state,
-                (high, low),
+                exploit and chosen == 0, repeats, kept, safe, disagreement, where[chosen].tolist()
             ),
         )
 
     # Inside
-
-    def _repeats(self, count: int) -> int:
-        """Candidates, the last ones, that fly the best gains flown with another excitation."""
-        return max(1, count // 16)
-
-    def _candidates(self, tuned: Floats, flown: Floats, goal: str, number: int) -> tuple[Floats, Floats]:
-        """Genes (K, size) and excitations (K, n, n_u); the first candidate is the tuned one as it is."""
-        options = self.options
-        stream = self.stream(5, number)
-        count = max(2, options.candidates)
-        place = to_unit(self.family, tuned)
-        places = place + options.nearness * stream.standard_normal((count, self.family.size))
-        places[: count // 4] = place
-        if goal == "model":
-            places[count // 2 :] = stream.random((count - count // 2, self.family.size))
-        genes = from_unit(self.family, np.clip(places, 0.0, 1.0))
-        genes[0] = tuned
-        again = self._repeats(count)
-        genes[count - again :] = flown
-        if options.excitation <= 0.0:
-            # The same flight once more would tell nothing: gains close by.
-            near = to_unit(self.family, flown) + 0.3 * options.nearness * stream.standard_normal(
-                (again, self.family.size)
-            )
-            genes[count - again :] = from_unit(self.family, np.clip(near, 0.0, 1.0))
-        excitation = np.zeros((count, self.task.steps, self.signals.n_u))
-        most = options.excitation_most
-        if most > 0.0 and options.excitation > 0.0:
-            # Gains that have flown bear more of it than at first, and once more the same would tell little.
-            stronger = min(2.0 * options.excitation, most)
-            for i in range(1, count):
-                amplitude = stronger if i >= count - again else most * stream.random()
-                excitation[i] = chirps(self.signals, self.task.steps, amplitude, options.fade, stream)
-        return genes, excitation
 
     def _reach(self, goal: str, used: Sequence[float]) -> float:
         """Usage of the envelope that a proposal may have, where that of each flight so far is known."""
@@ -326,31 +290,11 @@ class Planner(Judge):
         """Differences below this are rounding (n_x,)."""
         return np.array([1e-6 * state.scale for state in self.signals.states])
 
-    def _ends(self, number: int, count: int) -> Ends:
-        """Start and target of each candidate (K, n_x); those of the campaign for the first one."""
-        stream = self.stream(6, number)
-        ends = []
-        for middle, reach in (
-            (self.task.initial_state, self.options.initial_range),
-            (self.task.target_state, self.options.target_range),
-        ):
-            states = np.tile(middle, (count, 1))
-            if any(reach):
-                states[1:] += np.array(reach) * stream.uniform(-1.0, 1.0, (count - 1, len(middle)))
-            ends.append(states)
-        return ends[0], ends[1]
-
     def _reason(
-        self,
-        exploits: bool,
-        repeats: bool,
-        kept: bool,
-        safe: bool,
-        value: float,
-        row: int,
-        state: int,
-        pair: tuple[int, int],
+        self, exploits: bool, repeats: bool, kept: bool, safe: bool, value: float, where: Sequence[int]
     ) -> str:
+        """Why this test; `where`: step, state and the two members that are the furthest apart."""
+        row, state, high, low = where
         sentences = []
         if repeats:
             change = "a stronger excitation" if self.options.excitation > 0.0 else "a small variation"
@@ -358,9 +302,9 @@ class Planner(Judge):
             sentences.append(f"The best gains flown, again, with {change}: {known}.")
         if exploits:
             sentences.append("The best gains that the twin knows, flown as they are.")
-        elif value > 0.0 and pair[0] != pair[1]:
+        elif value > 0.0 and high != low:
             sentences.append(
-                f"Models {pair[0]} and {pair[1]} disagree most on {self.signals.state_names[state]},"
+                f"Models {high} and {low} disagree most on {self.signals.state_names[state]},"
                 f" {row * self.signals.dt:.2g} s after the start; the flight tells {value / np.log(2):.3g} bits."
             )
         else:
@@ -373,23 +317,28 @@ class Planner(Judge):
         return " ".join(sentences)
 
 
-def _order(values: Floats, mean: Floats, allowed: Flags, better: Flags, exploit: bool) -> list[int]:
-    """Candidates, the most wanted first: what tells most among those allowed, then what flies best among the better."""
-    first = [0] if exploit and allowed[0] else []
-    telling = np.flatnonzero(allowed)[np.argsort(-values[allowed], kind="stable")]
-    flying = np.flatnonzero(better)[np.argsort(mean[better], kind="stable")]
-    return [*first, *telling.tolist(), *flying.tolist()]
+def _first(those: Flags, cost: Floats) -> list[int]:
+    """Numbers of those that are meant, the one of least cost first."""
+    numbers: list[int] = np.flatnonzero(those)[np.argsort(cost[those], kind="stable")].tolist()
+    return numbers
 
 
 def _first_that_lasts(
-    order: Sequence[int], drawn: Callable[[Sequence[int]], Judged], worst: float
+    wanted: Sequence[int], noisy: Callable[[list[int]], Judged], worst: float
 ) -> tuple[int, Judged] | None:
-    """The first candidate that keeps the envelope under every draw of noise and is not worse than the worst allowed."""
-    for at in range(0, min(len(order), TRIED), TOGETHER):
-        batch = order[at : at + TOGETHER]
-        noisy = drawn(batch)
-        lasts = np.flatnonzero((noisy.worst_usage <= 1.0) & (noisy.mean <= worst))
+    """The first that keeps the envelope under every draw of noise and is not worse than the worst allowed."""
+    for at in range(0, min(len(wanted), TRIED), TOGETHER):
+        batch = list(wanted[at : at + TOGETHER])
+        flights = noisy(batch)
+        lasts = np.flatnonzero((flights.worst_usage <= 1.0) & (flights.mean <= worst))
         if len(lasts):
             i = int(lasts[0])
-            return batch[i], Judged(noisy.qualities[:, :, [i]], noisy.usages[:, :, [i]])
+            return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])
     return None
+
+
+def _gain(choices: Floats) -> float:
+    """What knowing the right member would bring (members, K): each one's own best against the best for all of them."""
+    if not choices.size:
+        return 0.0
+    return max(0.0, float(choices.mean(axis=0).min() - choices.min(axis=1).mean()))

@@ -1,0 +1,93 @@
+"""Candidates for the next test: gains near the tuned ones with an excitation, and once more the best ones flown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.planning.excitation import chirps
+from twinloop.planning.gains import from_unit, to_unit
+from twinloop.planning.judging import Ends, Judge
+from twinloop.planning.settings import PlanningOptions
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """K flights that are compared.
+
+    Args:
+        genes: gains of each (K, size).
+        excitation: of each (K, n, n_u).
+        ends: where each starts and where it leads, (K, n_x) both.
+        repeats: the first of those, the last ones, that fly the best gains flown with another excitation.
+    """
+
+    genes: Floats
+    excitation: Floats
+    ends: Ends
+    repeats: int
+
+    def some(self, chosen: list[int]) -> Candidates:
+        """Those of some numbers, in their order."""
+        ends = self.ends[0][chosen], self.ends[1][chosen]
+        return Candidates(self.genes[chosen], self.excitation[chosen], ends, len(chosen))
+
+
+def candidates(
+    judge: Judge, options: PlanningOptions, tuned: Floats, flown: Floats, goal: str, number: int
+) -> Candidates:
+    """Draws candidates; the first one is the tuned gains as they are.
+
+    Args:
+        judge: of the campaign: family, task and seed.
+        options: of the planning.
+        tuned: gains that are best on the committee (size,).
+        flown: the best gains flown (size,).
+        goal: "both", "model" or "control".
+        number: of the test, for its streams.
+
+    Returns:
+        The candidates.
+    """
+    family, steps = judge.family, judge.task.steps
+    stream = judge.stream(5, number)
+    count = max(2, options.candidates)
+    again = max(1, count // 16)
+    place = to_unit(family, tuned)
+    places = place + options.nearness * stream.standard_normal((count, family.size))
+    places[: count // 4] = place
+    if goal == "model":
+        places[count // 2 :] = stream.random((count - count // 2, family.size))
+    genes = from_unit(family, np.clip(places, 0.0, 1.0))
+    genes[0] = tuned
+    genes[count - again :] = flown
+    if options.excitation <= 0.0:
+        # The same flight once more would tell nothing: gains close by.
+        near = to_unit(family, flown) + 0.3 * options.nearness * stream.standard_normal((again, family.size))
+        genes[count - again :] = from_unit(family, np.clip(near, 0.0, 1.0))
+    excitation = np.zeros((count, steps, judge.signals.n_u))
+    most = options.excitation_most
+    if most > 0.0 and options.excitation > 0.0:
+        # Gains that have flown bear more of it than at first, and once more the same would tell little.
+        stronger = min(2.0 * options.excitation, most)
+        for i in range(1, count):
+            amplitude = stronger if i >= count - again else most * stream.random()
+            excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)
+    return Candidates(genes, excitation, _ends(judge, options, number, count), count - again)
+
+
+def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> Ends:
+    """Start and target of each candidate (K, n_x); those of the campaign for the first one."""
+    stream = judge.stream(6, number)
+    ends = []
+    for middle, reach in (
+        (judge.task.initial_state, options.initial_range),
+        (judge.task.target_state, options.target_range),
+    ):
+        states = np.tile(middle, (count, 1))
+        if any(reach):
+            states[1:] += np.array(reach) * stream.uniform(-1.0, 1.0, (count - 1, len(middle)))
+        ends.append(states)
+    return ends[0], ends[1]
