@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import sqlite3
 import subprocess
 import sys
 
@@ -27,6 +28,7 @@ from twinloop.exam.tables import as_markdown, render, tables
 from twinloop.exam.tuning import score, tuned, variants
 from twinloop.models import Twin
 from twinloop.planning.gains import from_unit, to_unit
+from twinloop.presets import options_of
 
 PAPER = for_smoke(LEARNERS["paper"])
 RANDOM = LEARNERS["random-gains"]
@@ -460,6 +462,17 @@ def test_another_file_is_refused(tmp_path):
         Store(path)
 
 
+def test_a_database_of_somebody_else_is_refused_and_left_as_it_is(tmp_path):
+    path = tmp_path / "bookmarks.db"
+    with sqlite3.connect(path) as base:
+        base.execute("CREATE TABLE bookmarks (address TEXT)")
+    base.close()
+    before = path.read_bytes()
+    with pytest.raises(tl.InvalidInput, match="'bookmarks'; choose another"):
+        Store(path)
+    assert path.read_bytes() == before
+
+
 def test_settings_tell_learners_apart_and_costs_do_not():
     settings = [key(who, LEARNERS["paper"]) for who in LEARNERS.values()]
     assert len(set(settings)) == len(settings)
@@ -649,10 +662,16 @@ def test_a_system_that_this_version_lacks_is_left_out_with_a_reason(monkeypatch)
         systems.why_missing("quadrotar")
 
 
+def test_every_campaign_of_the_exam_has_options_that_there_are():
+    campaigns = [who for who in LEARNERS.values() if isinstance(who, Campaigner)]
+    assert len(campaigns) > 20
+    for who in campaigns:
+        options_of(who.preset, who.options)
+
+
 def test_every_learner_says_whether_it_can_run():
     assert LEARNERS["paper"].why_missing() is None
     assert Flyer("random-gains").why_missing() is None
-    assert "no_such" in Campaigner("x", "no_such_preset").why_missing()
     assert "install" in Fitter("x", "least_squares", {}, package="no_such_package").why_missing()
 
 

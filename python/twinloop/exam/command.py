@@ -152,14 +152,7 @@ def _tune(scope: Scope, path: Path, jobs: int, yes: bool) -> str:
 
 def _source(name: str | None) -> Learner:
     """Whose flights the fits are made on."""
-    if name is not None:
-        return learner(name)
-    ours = learner("ours")
-    lacking = ours.why_missing()
-    if lacking is None:
-        return ours
-    _say("Fits are made on the flights of the preset paper: ours cannot be run in this version.")
-    return learner("paper")
+    return learner("ours" if name is None else name)
 
 
 def _chosen(kind: str, asked: str | None, by_default: Sequence[str], known: Iterable[str]) -> list[str]:

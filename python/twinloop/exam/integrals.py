@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.errors import unknown
 from twinloop.exam.library import Library, model_inputs
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -42,7 +43,12 @@ def regression(
 
     Returns:
         A problem for each output of a model in the form "acceleration".
+
+    Raises:
+        InvalidInput: another form.
     """
+    if form not in FORMS:
+        raise unknown("form of a regression", form, FORMS)
     means = [_means(run, signals, library) for run in trajectories]
     states = list(signals.driven)
     if form == "increment":

@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from twinloop import _core
-from twinloop.errors import InvalidInput
-from twinloop.presets import options_of
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 
@@ -38,11 +36,7 @@ class Campaigner:
     seconds: float = 20.0
 
     def why_missing(self) -> str | None:
-        """Why it cannot be run in this version; None if it can."""
-        try:
-            options_of(self.preset, self.options)
-        except InvalidInput as reason:
-            return str(reason)
+        """It needs nothing."""
         return None
 
 

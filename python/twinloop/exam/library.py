@@ -10,7 +10,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.errors import engine_input
+from twinloop.errors import engine_input, unknown
 from twinloop.signals import Signals
 
 Term = tuple[int, ...]
@@ -109,7 +109,12 @@ def variables_of(kind: str, signals: Signals) -> list[int]:
 
     Returns:
         Their indices.
+
+    Raises:
+        InvalidInput: another kind.
     """
+    if kind not in VARIABLES:
+        raise unknown("variables of a library", kind, VARIABLES)
     states = signals.driven if kind == "rates" else range(signals.n_x)
     return [*states, *range(signals.n_x, signals.n_x + signals.n_u)]
 

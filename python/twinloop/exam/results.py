@@ -106,9 +106,9 @@ class Results:
                 found[row.address.seed] = value
         return found
 
-    def all_values(self, system: str, learner: str, measure: str, least_k: int = 0) -> list[float]:
-        """A measure at every seed and k from `least_k` on."""
-        found = [row.measures.get(measure) for row in self.rows(system, learner) if row.k >= least_k]
+    def all_values(self, system: str, learner: str, measure: str) -> list[float]:
+        """A measure at every seed and k."""
+        found = [row.measures.get(measure) for row in self.rows(system, learner)]
         return [value for value in found if value is not None]
 
     def failures(self, system: str, learner: str, k: int) -> int:

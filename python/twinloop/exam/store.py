@@ -7,7 +7,7 @@ import json
 import math
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from twinloop.exam.systems import Subject
 from twinloop.trajectory import Trajectory
 
 SCHEMA = 1
+TABLES = {"measured", "flights", "held_out"}
 _TABLES = """
 CREATE TABLE IF NOT EXISTS measured (
     system TEXT, learner TEXT, seed INTEGER, k INTEGER, settings TEXT,
@@ -86,22 +87,38 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            self._base = sqlite3.connect(path, timeout=60.0, isolation_level=None)
-            version = self._base.execute("PRAGMA user_version").fetchone()[0]
-            if version not in (0, SCHEMA):
+        with ExitStack() as unless_open:
+            try:
+                self._base = sqlite3.connect(path, timeout=60.0, isolation_level=None)
+                unless_open.callback(self._base.close)
+                self._check_whose()
+                # Readers and the writers of other jobs must not wait for each other.
+                self._base.execute("PRAGMA journal_mode = WAL")
+                self._base.executescript(_TABLES)
+                self._base.execute(f"PRAGMA user_version = {SCHEMA}")
+            except sqlite3.Error as reason:
                 raise InvalidInput(
-                    f"Store {str(path)!r}: expected version {SCHEMA}, found {version}; choose another file."
-                )
-            # Readers and the writers of other jobs must not wait for each other.
-            self._base.execute("PRAGMA journal_mode = WAL")
-            self._base.executescript(_TABLES)
-            self._base.execute(f"PRAGMA user_version = {SCHEMA}")
-        except sqlite3.Error as reason:
+                    f"Store {str(path)!r}: expected an SQLite file of the exam, found: {reason}; choose another"
+                    " file."
+                ) from reason
+            unless_open.pop_all()
+
+    def _check_whose(self) -> None:
+        """Refuses a file of another version, and one that somebody else keeps something in."""
+        version = self._base.execute("PRAGMA user_version").fetchone()[0]
+        if version not in (0, SCHEMA):
             raise InvalidInput(
-                f"Store {str(path)!r}: expected an SQLite file of the exam, found: {reason}; choose another"
-                " file."
-            ) from reason
+                f"Store {str(self.path)!r}: expected version {SCHEMA}, found {version}; choose another file."
+            )
+        tables = {
+            name for (name,) in self._base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+        }
+        strangers = sorted(tables - TABLES)
+        if strangers:
+            raise InvalidInput(
+                f"Store {str(self.path)!r}: expected an SQLite file of the exam, found one with a table"
+                f" {strangers[0]!r}; choose another file."
+            )
 
     def close(self) -> None:
         """Closes the file."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from twinloop import systems
 from twinloop.arrays import Floats
 from twinloop.controllers import Family, UnboundFamily
-from twinloop.errors import TwinloopError, unknown
+from twinloop.errors import NotAvailable, unknown
 from twinloop.exam import quality
 from twinloop.signals import Signals
 from twinloop.test import Test
@@ -208,10 +208,9 @@ def why_missing(name: str) -> str | None:
     Raises:
         InvalidInput: an unknown name.
     """
+    asked = subject(name)
     try:
-        _ = subject(name).family
-    except (TwinloopError, ImportError, TypeError) as reason:
-        if name in SUBJECTS:
-            return str(reason)
-        raise
+        _ = asked.family
+    except NotAvailable as reason:
+        return str(reason)
     return None
