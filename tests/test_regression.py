@@ -139,6 +139,30 @@ def test_least_squares_are_those_of_the_whole_covariance(states, integrated, mot
         np.testing.assert_allclose(covariance, np.linalg.inv(inner), rtol=1e-5, atol=1e-9)
 
 
+def test_more_rows_are_more_rows():
+    gram, _ = problem(1)
+    stream = np.random.default_rng(7)
+    rows, readings = stream.normal(size=(30, 8)), stream.normal(size=30)
+    more = gram.with_rows(np.column_stack([rows, readings]))
+    subset = [0, 3, 5]
+    # What the Gram matrix knows of its own rows: their inner products, from its solution and its total.
+    before, covariance, left = gram.solve(subset)
+    inner = np.linalg.inv(covariance)
+    expected = np.linalg.solve(
+        inner + rows[:, subset].T @ rows[:, subset], inner @ before + rows[:, subset].T @ readings
+    )
+    found, _, chi = more.solve(subset)
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    change = expected - before
+    rest = readings - rows[:, subset] @ expected
+    assert chi == pytest.approx(left + change @ inner @ change + rest @ rest, rel=1e-8)
+    assert (more.readings, more.features) == (gram.readings + 30, 8)
+    assert gram.solve(subset)[2] == left
+    for wrong in (rows, np.full((2, 9), np.nan)):
+        with pytest.raises(ValueError, match="rows: expected"):
+            gram.with_rows(wrong)
+
+
 @pytest.mark.parametrize("motion", MOTIONS, ids=["quiet", "white", "gusts"])
 @pytest.mark.parametrize(("states", "integrated"), CASES)
 @pytest.mark.parametrize("ignored", [0, 5])

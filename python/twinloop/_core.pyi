@@ -425,6 +425,8 @@ class Gram:
     @property
     def total(self) -> float:
         """Sum of squares of the whitened readings."""
+    def with_rows(self, rows: ArrayLike) -> Gram:
+        """With more rows (m, p + 1), whitened already: features, and a reading at the end."""
     def solve(self, subset: Sequence[int], ridge: float = 0.0) -> tuple[_Floats, _Floats, float] | None:
         """Coefficients (k,), their covariance (k, k) and χ²; None where the features are collinear."""
 

@@ -188,6 +188,15 @@ impl PyGram {
         self.0.total()
     }
 
+    /// With more rows: features, and a reading at the end.
+    fn with_rows(&self, rows: Matrix<'_>) -> Result<Self> {
+        let flat = crate::arrays::rows("rows", &rows, self.0.features + 1)?.concat();
+        if !flat.iter().all(|x| x.is_finite()) {
+            return Err(misuse("rows: expected finite numbers, found NaN or an infinite one".into()));
+        }
+        Ok(Self(Arc::new(Gram::clone(&self.0).with_rows(&flat))))
+    }
+
     /// Coefficients, their covariance and what is left; none where the features are collinear.
     #[pyo3(signature = (subset, ridge = 0.0))]
     #[expect(clippy::type_complexity, reason = "coefficients, covariance, χ²")]

@@ -44,6 +44,7 @@ class Problem:
         self.dt = dt
         self.workers = workers
         self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
+        self._feedthrough: dict[tuple[int, int], Floats] = {}
         self._usable: set[int] = set()
 
     def usable(self, terms: Sequence[int]) -> list[int]:
@@ -82,6 +83,28 @@ class Problem:
         ]
         with engine_input():
             return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+    def feedthrough(self, chain: Chain, terms: Sequence[int]) -> Floats:
+        """How much of a reading's noise terms give back within the period that the reading ends.
+
+        Args:
+            chain: whose first state is read; it is the integral of the terms.
+            terms: that were found usable.
+
+        Returns:
+            Half a period times each term's derivative by that state at the end of every period (rows, terms).
+        """
+        state, end = chain.states[0], self.stages.end
+        new = [term for term in terms if (state, term) not in self._feedthrough]
+        if new:
+            step = 1e-3 * max(float(np.abs(end[:, state]).max()), 1e-6)
+            above, below = (end.copy() for _ in range(2))
+            above[:, state] += step
+            below[:, state] -= step
+            slopes = (self.pool.values(new, above) - self.pool.values(new, below)) / (2.0 * step)
+            for term, slope in zip(new, slopes.T, strict=True):
+                self._feedthrough[state, term] = 0.5 * self.dt * np.where(np.isfinite(slope), slope, 0.0)
+        return np.stack([self._feedthrough[state, term] for term in terms], axis=1)
 
     def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
         """Bounds of a chain's coefficients, by place among terms."""

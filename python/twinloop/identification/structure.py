@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -18,14 +19,21 @@ from twinloop.identification.problem import Problem
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
-Judged = tuple[tuple[int, ...], float, float, Floats]
-"""A subset of features, its energy, what it leaves, its coefficients."""
+Walk = Callable[[Sequence[_core.Gram], Sequence[Floats]], Sequence[Sequence[tuple[Sequence[int], float]]]]
+"""Annealed walks: from inner products and prices, a pair for each chain, to subsets with their energies, best first."""
+Judged = tuple[tuple[int, ...], float, Floats]
+"""A subset of features, its energy, its coefficients."""
 NOISE_ROUNDS = 5
 """Times at most that terms are searched and the noise that they leave is estimated."""
 FEW_RUNS = 5
 """Runs up to which each is taken to tell something of its own."""
 RESEMBLANCE = 0.75
 """Power with which prices rise from there on; with 1, no weak term that is true would be found by flying on."""
+GIVEN_BACK = 0.25
+"""Share of a reading's noise from which a law is taken to explain it with itself: nothing that can be flown grows by
+half, of itself, in a period."""
+GIVEN_BACK_PRICES = (1e2, 1e3, 1e4, 1e5, 1e6)
+"""What giving back all of a reading's noise is made to cost, a reading, in units of χ²."""
 RUNG = 20.0
 """What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
 
@@ -38,14 +46,12 @@ class Sum:
         weights: coefficients by node.
         energy: its description length: −2 log of the likelihood at `chain`'s noise, and the price of its terms.
         chain: with the noise under which it was found.
-        left: χ², what whitening leaves.
         others: other subsets that are nearly as good, with their energies above the best's.
     """
 
     weights: Weights
     energy: float
     chain: Chain
-    left: float = 0.0
     others: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
 
 
@@ -122,21 +128,16 @@ def search(
         grams = [
             r.gram(c.sensors, c.motion, problem.workers) for r, c in zip(regressions, current, strict=True)
         ]
-        with engine_input():
-            walks = _core.search_subsets(
-                grams,
-                costs,
-                moves=moves if round_ == 0 else moves // 2,
-                largest=largest,
-                starts=starts if round_ == 0 else max(1, starts // 2),
-                seed=seed,
-                iteration=iteration * NOISE_ROUNDS + round_,
-                workers=problem.workers,
-            )
-        subsets = [
-            _best_subsets(problem, usable, place, *of_chain)
-            for of_chain in zip(chains, known, grams, walks, costs, strict=True)
-        ]
+        walk = partial(
+            _core.search_subsets,
+            moves=moves if round_ == 0 else moves // 2,
+            largest=largest,
+            starts=starts if round_ == 0 else max(1, starts // 2),
+            seed=seed,
+            iteration=iteration * NOISE_ROUNDS + round_,
+            workers=problem.workers,
+        )
+        subsets = _chosen(problem, usable, place, chains, known, grams, costs, walk)
         coefficients = [_spread(judged[0], len(usable)) for judged in subsets]
         noisy, changed = current, False
         if not fixed_noise:
@@ -145,17 +146,68 @@ def search(
             changed = any(_differ(*pair, scales, problem.dt) for pair in zip(noisy, current, strict=True))
         best = []
         for i, (judged, chain) in enumerate(zip(subsets, noisy, strict=True)):
-            subset, energy, left, weights = judged[0]
-            others = [(tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _, _ in judged[1:40]]
+            subset, energy, weights = judged[0]
+            others = [(tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _ in judged[1:40]]
             score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
             rung = RUNG * problem.pool.rung(usable[j] for j in subset)
             total = rung + score + float(costs[i][list(subset)].sum())
             chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}
-            best.append(Sum(chosen, total, chain, left, others))
+            best.append(Sum(chosen, total, chain, others))
         current = noisy
         if not changed:
             break
     return best
+
+
+def _chosen(
+    problem: Problem,
+    usable: Sequence[int],
+    place: Mapping[int, int],
+    chains: Sequence[Chain],
+    known: Sequence[Sum | None],
+    grams: Sequence[_core.Gram],
+    costs: Sequence[Floats],
+    walk: Walk,
+) -> list[list[Judged]]:
+    """For each chain what walks find and what was known, the best first; none that gives a reading's noise back.
+
+    A law that gives a share J of a reading's noise back within the period that the reading ends leaves (1 − J) of it:
+    it explains the noise with itself. Runs under one and the same controller offer such laws, for their commands are
+    sums of readings, and what tells the sum of all readings from that of all but the last is the last. Where one is
+    found, walks are repeated in which J costs something, and more until they find laws without.
+    """
+    with engine_input():
+        walks = walk(grams, costs)
+    posed = list(zip(chains, known, grams, walks, costs, strict=True))
+    subsets = [_best_subsets(problem, usable, place, *of_chain) for of_chain in posed]
+    for i, (chain, sum_, gram, _, cost) in enumerate(posed):
+        if not chain.integrated or _given_back(problem, chain, usable, subsets[i][0]) <= GIVEN_BACK:
+            continue
+        rows = problem.feedthrough(chain, usable)
+        for price in GIVEN_BACK_PRICES:
+            with engine_input():
+                dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
+                (walked,) = walk([dear], [cost])
+            # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
+            found = [
+                law
+                for of in (gram, dear)
+                for law in _best_subsets(problem, usable, place, chain, sum_, of, walked, cost)
+                if _given_back(problem, chain, usable, law) <= GIVEN_BACK
+            ]
+            if found:
+                subsets[i] = found
+                break
+    return subsets
+
+
+def _given_back(problem: Problem, chain: Chain, usable: Sequence[int], judged: Judged) -> float:
+    """Share of a reading's noise that a law gives back within the period that the reading ends."""
+    subset, _, weights = judged
+    if not subset:
+        return 0.0
+    shares = problem.feedthrough(chain, [usable[j] for j in subset]).mean(axis=0)
+    return float((shares * weights).sum())
 
 
 def _best_subsets(
@@ -182,7 +234,7 @@ def _best_subsets(
 
 def _spread(judged: Judged, features: int) -> Floats:
     """The coefficients of all features, 0 for those outside the subset."""
-    subset, _, _, weights = judged
+    subset, _, weights = judged
     coefficients = np.zeros(features)
     coefficients[list(subset)] = weights
     return coefficients
@@ -270,7 +322,7 @@ def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Li
     if nothing and len(nothing) < len(subset):
         # Held at 0 a term is none.
         return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
-    return subset, left + float(costs[list(subset)].sum()), left, weights
+    return subset, left + float(costs[list(subset)].sum()), weights
 
 
 def total(sums: Sequence[Sum]) -> float:

@@ -162,12 +162,28 @@ impl Gram {
                 rows.clear();
             }
         }
+        let mut gram = Self { features, products, readings: whitening.readings };
+        gram.mirror();
+        gram
+    }
+
+    /// With more rows, whitened already: p features and a reading each.
+    pub fn with_rows(mut self, rows: &[f64]) -> Self {
+        let width = self.features + 1;
+        multiply(rows, width, &mut self.products);
+        self.mirror();
+        self.readings += rows.len() / width;
+        self
+    }
+
+    /// Copies the upper triangle of the products to the lower one.
+    fn mirror(&mut self) {
+        let width = self.features + 1;
         for i in 0..width {
             for j in 0..i {
-                products[i * width + j] = products[j * width + i];
+                self.products[i * width + j] = self.products[j * width + i];
             }
         }
-        Self { features, products, readings: whitening.readings }
     }
 
     /// ⟨feature i, feature j⟩; i or j may be `features` for the readings.
