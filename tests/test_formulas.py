@@ -41,11 +41,15 @@ def test_a_formula_is_the_expression_that_it_says(text, expected):
 @pytest.mark.parametrize(
     "text",
     ["__import__('os')", "rate.real", "speed", "lambda: 1", "rate if angle else 1", "rate ** 99", "1 +", "'x'",
-     "abs(rate, angle)", "[rate]", "rate < angle", "(" * 300 + ")" * 300],
+     "abs(rate, angle)", "[rate]", "rate < angle", "(" * 300 + ")" * 300, "1e999 * rate", "rate + " + "9" * 401,
+     "-" * 490 + "rate"],
 )  # fmt: skip
 def test_what_is_no_formula_is_refused(text):
+    def below(calls):  # where little of the stack is left
+        return below(calls - 1) if calls else parsed_term(text, Pool(3), SIGNALS)
+
     with pytest.raises(tl.InvalidInput, match="Term"):
-        parsed_term(text, Pool(3), SIGNALS)
+        below(60)
 
 
 def pendulum(states, command):

@@ -49,32 +49,25 @@ class Learning:
         """Generations of this iteration that were run."""
         return self.options.model_generations - self.left
 
-    def start(self, selected: _core.SelectedTests, experiments: Sequence[Experiment]) -> _core.ModelSearch:
+    def start(self, selected: _core.SelectedTests, experiments: Sequence[Experiment]) -> None:
         """The random population, unless there is one; its non-dominated set is iteration 0.
 
         Args:
             selected: what was told so far.
             experiments: the same, with what is known about each.
-
-        Returns:
-            The models so far.
         """
         if self.models is None:
             self.models = start_models(self.options, self.signals, self.seed, selected, self.workers)
             self._selected, self._experiments = selected, tuple(experiments)
             self._finished.append(self._record(self.models, 0, 0))
             self.iteration, self.left = 1, self.options.model_generations
-        return self.models
 
-    def learn(self, selected: _core.SelectedTests, experiments: Sequence[Experiment]) -> _core.ModelSearch:
+    def learn(self, selected: _core.SelectedTests, experiments: Sequence[Experiment]) -> None:
         """Finishes the iteration that is running, and runs another if more was told since it began.
 
         Args:
             selected: what was told so far.
             experiments: the same, with what is known about each.
-
-        Returns:
-            The models so far.
 
         Raises:
             KeyboardInterrupt: between chunks; calling again goes on from there, with the same bits.
@@ -92,8 +85,6 @@ class Learning:
                 self.options.model_generations,
             )
             self._advance()
-        assert self.models is not None
-        return self.models
 
     def records(self) -> list[Iteration]:
         """One record for each iteration, the one that was interrupted too."""

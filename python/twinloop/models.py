@@ -16,7 +16,7 @@ from twinloop.equations import equations
 from twinloop.errors import engine_input
 from twinloop.flight import fly
 from twinloop.signals import Signals
-from twinloop.streams import stream
+from twinloop.streams import Purpose, stream
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
 
@@ -104,6 +104,8 @@ class Noise:
 
 DRAWS = 12
 """Runs of each member of a committee that a band is made of."""
+STARTS = 5.0
+"""Standard deviations of a sensor by which a flight's first reading may be off the state that its test asks for."""
 NINE_OF_TEN = 1.645
 """Standard deviations on either side of the mean between which nine of ten normal numbers lie."""
 
@@ -177,6 +179,22 @@ class Twin:
         half = NINE_OF_TEN * np.sqrt(self.inflation**2 * variance + self.noise.sensors**2)
         return dataclasses.replace(run, band=np.stack([mean - half, mean + half]))
 
+    def as_flown(self, test: Test, flown: Trajectory) -> Test:
+        """A test from where its flight began, to be compared with the flight.
+
+        Args:
+            test: that was flown.
+            flown: the flight.
+
+        Returns:
+            The test; states that were read further from where they were asked to begin than their sensors explain begin
+            as they were read.
+        """
+        read = flown.states[0]
+        explained = np.zeros_like(read) if self.noise is None else STARTS * self.noise.sensors
+        off = np.abs(read - test.initial_state) > explained
+        return dataclasses.replace(test, initial_state=np.where(off, read, test.initial_state))
+
     def spread(self, test: Test) -> tuple[Floats, Floats] | None:
         """What members and disturbances, drawn together, make of a test.
 
@@ -189,7 +207,7 @@ class Twin:
         """
         if not self.members or self.noise is None:
             return None
-        noise, moves = self.noise.drawn(DRAWS, test.steps, stream(self.seed, 80))
+        noise, moves = self.noise.drawn(DRAWS, test.steps, stream(self.seed, Purpose.BAND))
         excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
         runs = []
         for member in self.members:

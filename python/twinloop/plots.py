@@ -196,7 +196,7 @@ def _runs(figure: Any, campaign: Campaign) -> None:
     grid = figure.subplots(rows, len(runs), sharex=True, sharey="row", squeeze=False)
     best = campaign.best_test.number
     for column, run in enumerate(runs):
-        predicted = twin.simulate(run.test)
+        predicted = twin.simulate(twin.as_flown(run.test, run.trajectory))
         start = run.trajectory.t[0]
         title = f"test {run.test.number}" + (" (best)" if run.test.number == best else "")
         grid[0, column].set_title(title, loc="left")

@@ -19,7 +19,7 @@ from twinloop.models import TestErrors, Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality
 from twinloop.presets import DefaultOptions
-from twinloop.streams import stream
+from twinloop.streams import Purpose, stream
 from twinloop.test import Test
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
@@ -218,7 +218,7 @@ def _errors_by_state(campaign: Campaign, twin: Twin) -> list[float]:
     """Root mean square of flown minus simulated over all flights, for each state in its unit."""
     squares, rows = np.zeros(campaign.signals.n_x), 0
     for run in campaign.experiments:
-        simulated = twin.simulate(run.test).states[1:]
+        simulated = twin.simulate(twin.as_flown(run.test, run.trajectory)).states[1:]
         flown = run.trajectory.states[1 : len(simulated) + 1]
         squares += ((flown - simulated[: len(flown)]) ** 2).sum(axis=0)
         rows += len(flown)
@@ -261,7 +261,7 @@ def _repeated(campaign: Campaign, twin: Twin, test: Test, gusts: bool) -> list[f
     """Qualities that would be measured if a flight were repeated, on the twin; NaN for one that diverges."""
     draws: list[tuple[Floats | None, Floats | None]] = [(None, None)]
     if twin.noise is not None:
-        noise, moves = twin.noise.drawn(REPEATS, test.steps, stream(campaign.setup.seed, 81))
+        noise, moves = twin.noise.drawn(REPEATS, test.steps, stream(campaign.setup.seed, Purpose.REPEATS))
         draws = [(seen, moved if gusts else None) for seen, moved in zip(noise, moves, strict=True)]
     values = []
     for seen, moved in draws:

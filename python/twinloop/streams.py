@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 import numpy as np
+
+
+class Purpose(IntEnum):
+    """What random numbers of a campaign are for, beside those that the engine draws."""
+
+    EVOLUTION = 77
+    COMMITTEE = 78
+    PLANNING = 79
+    BAND = 80
+    REPEATS = 81
 
 
 def stream(*key: int, purpose: int | None = None) -> np.random.Generator:

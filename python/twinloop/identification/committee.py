@@ -13,7 +13,7 @@ from twinloop.identification.chains import Chain
 from twinloop.identification.fitting import Fitting
 from twinloop.identification.problem import Problem
 from twinloop.identification.structure import Sum
-from twinloop.streams import stream
+from twinloop.streams import Purpose, stream
 
 PLAUSIBLE = 1.5
 """Multiple of the best model's χ² up to which another structure is a member."""
@@ -41,7 +41,7 @@ def committee(
         At most as many as the options ask for, the best first.
     """
     size = fitting.options.committee_size - len(others)
-    draw = stream(fitting.seed, 78, fitting.iteration)
+    draw = stream(fitting.seed, Purpose.COMMITTEE, fitting.iteration)
     members = [best]
     _, base, readings, _, draws = fitting.tune(best, sums, observer, 0, size)
     plausible = PLAUSIBLE * max(base, readings)

@@ -15,7 +15,7 @@ from twinloop.arrays import Floats
 from twinloop.identification.pool import UNARY, Pool
 from twinloop.identification.problem import Problem
 from twinloop.identification.structure import Sum, search
-from twinloop.streams import stream
+from twinloop.streams import Purpose, stream
 
 PRODUCTS = 0.5
 """Share of new nodes that are products: most laws of machines are made of them."""
@@ -58,7 +58,7 @@ def evolve(
         The best sum of each chain, never worse than the known one.
     """
     pool = problem.pool
-    draw = stream(seed, 77, iteration)
+    draw = stream(seed, Purpose.EVOLUTION, iteration)
     best = list(known)
     survivors: dict[int, int] = dict.fromkeys(terms, 0)
     taken: set[int] = set()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import sys
 
 from twinloop.errors import InvalidInput
 from twinloop.identification.pool import UNARY, Pool
@@ -34,12 +35,16 @@ def parsed_term(text: str, pool: Pool, signals: Signals) -> int:
     """
     if len(text) > LONGEST:
         raise InvalidInput(f"Term: expected at most {LONGEST} characters, found {len(text)}; split it.")
+    names = {name: i for i, name in enumerate((*signals.state_names, *signals.command_names))}
     try:
         tree = ast.parse(text, mode="eval").body
-    except SyntaxError as reason:
+        if not all(abs(number) <= sys.float_info.max for number in _numbers(tree)):
+            raise InvalidInput(
+                f"Term {text!r}: expected finite numbers, found a larger one; write it smaller."
+            )
+        return _node(tree, text, pool, names)
+    except (SyntaxError, RecursionError, MemoryError) as reason:  # the last two where it is nested too deeply
         raise InvalidInput(f"Term {text!r}: expected a formula such as 'rate * abs(rate)'.") from reason
-    names = {name: i for i, name in enumerate((*signals.state_names, *signals.command_names))}
-    return _node(tree, text, pool, names)
 
 
 def fixed_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int]:
@@ -90,6 +95,8 @@ def bounded_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int, Bou
             f" {', '.join(signals.state_names)}; such as '{signals.state_names[-1]}: sin(angle) in -20 .. -5'."
         )
     node, factor = bare_term(parsed_term(formula.strip(), pool, signals), pool)
+    if not math.isfinite(factor):
+        raise InvalidInput(f"Bounded term {text!r}: expected finite factors, found {factor}; remove them.")
     low, high = _bound(first, text, -math.inf), _bound(last, text, math.inf)
     if not low <= high or (math.isinf(low) and low == high):
         raise InvalidInput(
@@ -157,6 +164,12 @@ def _node(tree: ast.expr, text: str, pool: Pool, names: dict[str, int]) -> int:
                 f"Term {text!r}: expected numbers, + - * / **, abs, sqrt, sin, cos, tanh, exp, min, max and the"
                 f" names {known}, found {ast.unparse(tree)!r}; write it with those."
             )
+
+
+def _numbers(tree: ast.expr) -> list[float]:
+    """All numbers of a formula, without their signs."""
+    values = [part.value for part in ast.walk(tree) if isinstance(part, ast.Constant)]
+    return [value for value in values if isinstance(value, (int, float))]
 
 
 def _constant(tree: ast.expr) -> float | None:

@@ -14,7 +14,7 @@ LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 DELAYS = (0, 1, 2, 3)
 """Delays that are tried, in periods."""
 PRICE = 12.0
-"""What a hidden state must gain in description length: its number, and the choice of having one."""
+"""What a lag or a delay must gain in description length: its number, and the choice of having one."""
 
 
 def search_actuators(

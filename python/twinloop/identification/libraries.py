@@ -11,6 +11,8 @@ from twinloop.signals import Signals
 Terms = list[int]
 FRICTION = 30.0
 """Steepness of dry friction at rest, in units of a speed's scale."""
+CUBIC_INPUTS = 13
+"""States and commands, together, of which there are products of three: 455."""
 
 
 def linear(pool: Pool, signals: Signals) -> Terms:
@@ -87,8 +89,8 @@ def quotients(pool: Pool, signals: Signals) -> Terms:
 
 
 def cubic(pool: Pool, signals: Signals) -> Terms:
-    """Products of three inputs; none where there would be more than 600 of them."""
-    if pool.inputs > 13:
+    """Products of three inputs; none where there are so many inputs that the list alone is too long."""
+    if pool.inputs > CUBIC_INPUTS:
         return []
     return [pool.product(*triple) for triple in combinations_with_replacement(range(pool.inputs), 3)]
 

@@ -26,7 +26,7 @@ from twinloop.signals import Signals
 
 
 class Selection:
-    """Candidates, rung by rung, and the searches among them; each search draws from a stream of its own.
+    """Candidates, rung by rung, and the searches among them; each search draws from the next stream.
 
     `driven` are the chains that outputs drive, `given` those that other states do, with the noise to begin with.
 

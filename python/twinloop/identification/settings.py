@@ -38,7 +38,7 @@ class IdentificationOptions:
         moves: of a walk over subsets of terms.
         starts: walks for each output.
         largest: terms of an output at most.
-        most_terms: of a library at most; a larger one is left out.
+        most_terms: of a rung at most; a library with which there would be more is left out.
         noise_from_above: whether the noise is also searched from the largest that could be, so that the strongest terms
             come first, rather than only from what all terms together leave.
         gusts: whether disturbances may last, as gusts do, rather than be white.

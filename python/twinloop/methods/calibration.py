@@ -35,7 +35,7 @@ def needed_factor(twin: Twin, test: Test, flown: Trajectory) -> float | None:
     Returns:
         The factor; None where the twin has no committee.
     """
-    spread = twin.spread(test)
+    spread = twin.spread(twin.as_flown(test, flown))
     if spread is None or twin.noise is None:
         return None
     mean, variance = spread

@@ -12,7 +12,7 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.flights import candidates, qualities
 from twinloop.planning.quality import Quality
-from twinloop.streams import stream
+from twinloop.streams import Purpose, stream
 
 Ends = tuple[Floats, Floats]
 """Initial states and target states (K, n_x)."""
@@ -38,7 +38,7 @@ class Committee:
     Args:
         members: m of them.
         sds: of each state's sensor (n_x,).
-        trusted: whether the best one explains the runs that it was learnt from without diverging.
+        trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
     """
 
     members: Sequence[_core.Model]
@@ -116,16 +116,18 @@ class Judge:
         excitation: Floats | None = None,
         ends: Ends | None = None,
         measured: bool = False,
+        off: Floats | None = None,
     ) -> Judged:
         """Flies candidates on members under noise; what diverges is worth `HOPELESS`.
 
         Qualities are those of the true states, which gains are chosen by, or, `measured`, those that a record of the
-        flight would give.
+        flight would give. Where `off` is given flights begin elsewhere, as far as it says (n_x,), drawn like noise.
         """
         noise = self.noise(sds, draws)
+        offsets = None if off is None else off * self.stream(7, 0).standard_normal((draws, len(off)))
         values, usages = qualities(
             members, self.flights(genes, excitation, ends), self.quality.engine, self.signals,
-            noise=noise, measured=measured, workers=self.workers,
+            noise=noise, offsets=offsets, measured=measured, workers=self.workers,
         )  # fmt: skip
         return Judged(
             np.where(np.isfinite(values), values, HOPELESS), np.where(np.isfinite(usages), usages, HOPELESS)
@@ -161,4 +163,4 @@ class Judge:
 
     def stream(self, purpose: int, number: int) -> np.random.Generator:
         """Random numbers of one purpose and one test."""
-        return stream(self.seed, 79, purpose, number)
+        return stream(self.seed, Purpose.PLANNING, purpose, number)
