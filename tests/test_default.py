@@ -124,6 +124,9 @@ def whole():
 def test_an_interrupted_campaign_goes_on_with_the_same_bits(begin, pendulum, whole, call):
     campaign = begin(progress=StopAt(call)).run(pendulum, 3)
     assert campaign.interrupted
+    # What is looked at in between is of what is known by then, and must not show in what comes.
+    if campaign.experiments:
+        assert campaign.best_test.genes.shape == (len(PENDULUM_GAINS),)
     campaign.run(pendulum, 3)
     assert not campaign.interrupted
     assert outcome(campaign) == whole
@@ -147,7 +150,12 @@ def test_an_interrupted_campaign_still_has_the_twin_that_it_had(begin, pendulum)
     [
         ({"goal": "contrl"}, "did you mean 'control'"),
         ({"goal": "everything"}, "expected one of both, model, control"),
+        ({"goal": ""}, "expected one of both, model, control"),
         ({"quality": "iaee"}, "did you mean 'iae'"),
+        ({"quality": ""}, "expected one of iae, ise, final_distance"),
+        ({"preset": ["paper"]}, "Unknown preset"),
+        ({"operators": 5}, "a list of names"),
+        ({"options": {"quality_weights": "x"}}, "a list of numbers"),
         ({"operators": ["+", "pow"]}, "operator 'pow'"),
         ({"operators": []}, None),
         ({"options": {"libraries": ["lineal"]}}, "did you mean 'linear'"),
@@ -436,6 +444,25 @@ def test_gusts_are_reported_unless_the_readings_were_taken_for_exact(begin, monk
     assert summary(campaign, {}, {})["twin"]["disturbances"] == []
 
 
+def test_a_flight_that_began_elsewhere_is_compared_with_the_twin_from_there(begin, pendulum):
+    campaign, off = begin(duration=3.0), np.array([0.1, -0.2])
+    for _ in range(2):
+        test = campaign.test(PENDULUM_GAINS)
+        campaign.tell(test, pendulum.run(replace(test, initial_state=off)))
+    twin, run = campaign.twin, campaign.experiments[0]
+    states = summary(campaign, {}, {})["twin"]["states"]
+    left = [
+        run.trajectory.states[1:] - twin.simulate(replace(run.test, initial_state=off)).states[1:]
+        for run in campaign.experiments
+    ]
+    expected = np.sqrt(np.mean(np.square(np.concatenate(left)), axis=0))
+    np.testing.assert_allclose([state["error"] for state in states], expected)
+    # What the sensor explains is no other start.
+    silent = Noise(np.array([0.05, 0.03]), np.zeros(2))
+    noisy = tl.Twin(twin.model, SIGNALS, noise=silent)
+    np.testing.assert_array_equal(noisy.as_flown(run.test, run.trajectory).initial_state, [0.0, -0.2])
+
+
 def test_members_that_are_one_spread_by_nothing_not_by_the_rounding_of_their_mean(begin, pendulum):
     campaign = begin().run(pendulum, 1)
     model, test = campaign.twin.model, campaign.experiments[0].test
@@ -455,3 +482,49 @@ def test_a_pendulum_is_learnt_and_flown_better_than_at_first(begin, pendulum):
     assert best.predicted <= 1.05 * first.quality and best.excitation is None
     band = campaign.twin.simulate(first.test).band
     assert band.shape == (2, 21, 2) and (band[0] <= band[1]).all()
+
+
+BRIEF = {
+    **SMALL, "libraries": ("linear", "quadratic"), "moves": 4000, "passes": 1, "parts": False, "hidden": False,
+    "offsets": False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_test_that_was_flown_again_and_again_teaches_the_plant_and_not_its_controller(seed):
+    plant = tl.systems.Quadrotor(noise=1e-2, seed=seed)
+    campaign = default_campaign(
+        BRIEF, signals=plant.signals, controller=plant.controller, initial_state=plant.initial_state,
+        target_state=plant.target_state, duration=2.0, seed=seed,
+    )  # fmt: skip
+    test = campaign.test(plant.default_gains)
+    for _ in range(4):
+        campaign.tell(test, plant.run(test))
+    # Commands are sums of readings: with them a law can give a reading's noise back, and call it explained.
+    assert len(campaign.committee) > 0
+    lesson = campaign.history[-1]
+    np.testing.assert_allclose(lesson.sensors, [0.01] * 3 + [0.05] * 3, rtol=0.15)
+    assert lesson.terms <= 10 and lesson.follows and max(lesson.normalised) < 0.01
+
+
+def test_copies_of_a_record_teach_nothing(begin, pendulum):
+    one, many = begin(), begin()
+    for campaign, times in ((one, 1), (many, 3)):
+        test = campaign.test(PENDULUM_GAINS)
+        record = pendulum.run(test)
+        for _ in range(times):
+            campaign.tell(test, record)
+    assert str(many.twin.model.program) == str(one.twin.model.program)
+    assert many.history[-1].readings == one.history[-1].readings
+    assert "2 of 3 records equal an earlier one" in " ".join(many.history[-1].remarks)
+
+
+def test_a_flight_of_another_task_is_not_given_back_as_the_best(begin, pendulum):
+    campaign = begin(options={"target_range": (0.3, 0.0)}, goal="model").run(pendulum, 3)
+    assert any(run.test.target_state[0] != 1.0 for run in campaign.experiments)
+    best = campaign.best_test
+    np.testing.assert_array_equal([*best.initial_state, *best.target_state], [0.0, 0.0, 1.0, 0.0])
+    flown = [run for run in campaign.experiments if (run.test.target_state == [1.0, 0.0]).all()]
+    # What was measured on the way to another target is not the quality of this one.
+    assert best.measured in [None, *(run.quality for run in flown)]
+    assert campaign._book.best().number == min(flown, key=lambda run: run.quality).test.number

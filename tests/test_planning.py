@@ -125,11 +125,10 @@ def test_gains_are_tuned_to_the_bottom_of_a_bowl_and_never_worse_than_the_start(
         return ((to_unit(family, genes) - bottom) ** 2).sum(axis=1)
 
     start = from_unit(family, np.array([0.9, 0.1, 0.9]))
-    genes, score = tune_gains(family, bowl, [start], evaluations=2000, spread=0.2, seed=1)
+    genes = tune_gains(family, bowl, [start], evaluations=2000, spread=0.2, seed=1)
     np.testing.assert_allclose(to_unit(family, genes), bottom, atol=0.02)
-    assert score == bowl(genes[None])[0]
-    genes, score = tune_gains(family, lambda g: np.ones(len(g)), [start], evaluations=64, spread=0.2, seed=1)
-    assert same_bits(genes, start) and score == 1.0
+    genes = tune_gains(family, lambda g: np.ones(len(g)), [start], evaluations=64, spread=0.2, seed=1)
+    assert same_bits(genes, start)
 
 
 # Quality
@@ -279,10 +278,10 @@ def test_gains_tuned_on_a_committee_beat_the_start_and_keep_the_margin():
     known = signals(envelope=(-0.7, 0.7))
     planner, committee = planner_of(known, evaluations=1000), committee_of(known)
     start = np.array([0.3, 1.5, 0.1])
-    genes, _ = planner.tune(committee, [start], 1)
+    genes = planner.tune(committee, [start], 1)
     judged = planner.judge(committee.members, np.stack([genes, start]), committee.sds, 3)
     assert judged.mean[0] < judged.mean[1] and judged.worst_usage[0] <= 0.9 + 0.02
-    same, _ = planner.tune(committee, [start], 1)
+    same = planner.tune(committee, [start], 1)
     assert same_bits(genes, same)
 
 

@@ -159,16 +159,27 @@ class Logbook:
     def best(self) -> Test:
         """The flown test of the best quality; the first one if no run was complete.
 
-        Tests that left the envelope, of which the paper knows nothing, come after all others.
+        Tests that left the envelope, of which the paper knows nothing, come after all others; then those that began or
+        led elsewhere than the campaign's own task, whose quality says nothing of it.
         """
 
-        def rank(test: Test) -> tuple[bool, float]:
+        def rank(test: Test) -> tuple[bool, bool, float]:
             measured = self.measured(test.number)
             if measured is None:
-                return True, math.inf
-            return self.setup.preset != "paper" and self.left_envelope(test.number), measured
+                return True, True, math.inf
+            left = self.setup.preset != "paper" and self.left_envelope(test.number)
+            return left, not self.on_task(test), measured
 
         return min((run.test for run in self.experiments), key=rank)
+
+    def on_task(self, test: Test) -> bool:
+        """Whether a test begins and leads where the campaign does.
+
+        Args:
+            test: of the campaign.
+        """
+        ends = (test.initial_state, self.setup.initial_state), (test.target_state, self.setup.target_state)
+        return all(np.array_equal(*pair) for pair in ends)
 
     def left_envelope(self, test: int) -> bool:
         """Whether any run of a test left the envelope.

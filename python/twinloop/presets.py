@@ -233,17 +233,18 @@ def options_of(preset: str, changes: Mapping[str, object] | None = None) -> AnyO
     Raises:
         InvalidInput: an unknown name, or a value that cannot be used.
     """
-    if preset not in PRESETS:
+    if not isinstance(preset, str) or preset not in PRESETS:
         raise unknown("preset", preset, PRESETS)
-    if not isinstance(changes or {}, Mapping):
+    changes = {} if changes is None else changes
+    if not isinstance(changes, Mapping):
         raise InvalidInput(
             f"Options: expected a dict of values by name, found {changes!r}; write {{name: value}}."
         )
     names = [field.name for field in dataclasses.fields(PRESETS[preset])]
-    for name in changes or {}:
+    for name in changes:
         if name not in names:
             raise unknown(f"option of the preset {preset!r}", name, names)
-    return dataclasses.replace(PRESETS[preset], **dict(changes or {}))  # type: ignore[arg-type]
+    return dataclasses.replace(PRESETS[preset], **dict(changes))  # type: ignore[arg-type]
 
 
 def parsed(preset: str, name: str, text: str) -> object:
@@ -329,7 +330,9 @@ def _typed(name: str, kind: str, value: object) -> object:
 
 def _article(kind: str) -> str:
     words = {"bool": "true or false", "float": "a number", "str": "a word"}
-    return words.get(kind, "a list of names" if kind.startswith("tuple") else "a whole number")
+    if kind.startswith("tuple"):
+        return "a list of numbers" if "float" in kind else "a list of names"
+    return words.get(kind, "a whole number")
 
 
 PRESETS: dict[str, AnyOptions] = {"default": DefaultOptions(), "paper": Options()}

@@ -121,18 +121,21 @@ def checked(
     if known_seed >= 2**64:
         raise InvalidInput(f"Campaign, seed: expected less than 2**64, found {seed}; choose a smaller one.")
     steps = _steps(number("Campaign, duration (s)", duration, above=0.0), signals.dt)
-    changes = dict(options or {}) if isinstance(options or {}, Mapping) else options
+    given = {} if options is None else options
+    changes = dict(given) if isinstance(given, Mapping) else given
     if operators is not None and isinstance(changes, dict):
-        changes["operations" if preset == "paper" else "operators"] = tuple(operators)
+        changes["operations" if preset == "paper" else "operators"] = operators
     chosen = options_of(preset, changes)
     purpose, measure = _purpose(preset, goal, quality, chosen, signals)
     family = controller.bind(signals)
     setup = Setup(signals, family, start, target, steps, preset, chosen, known_seed, purpose, measure)
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
-    if isinstance(chosen, DefaultOptions):
-        for what, state in (("initial_state", start), ("target_state", target)):
+    for what, state in (("initial_state", start), ("target_state", target)):
+        _check_reachable(f"Campaign, {what}", state, signals, chosen.divergence_factor)
+        if isinstance(chosen, DefaultOptions):
             _check_inside(f"Campaign, {what}", state, signals, chosen.margin)
+    if isinstance(chosen, DefaultOptions):
         pool = Pool(signals.n_x + signals.n_u)  # formulas are refused now rather than after the first flight
         for text in chosen.seed_terms:
             parsed_term(text, pool, signals)
@@ -150,7 +153,8 @@ def _purpose(
 ) -> tuple[str, Quality]:
     """What flights are for and what is minimised; the paper knows one answer to each."""
     if isinstance(options, DefaultOptions):
-        purpose, kind = goal or "both", quality or "iae"
+        purpose = "both" if goal is None else goal
+        kind = "iae" if quality is None else quality
         for what, named, known in (("goal", purpose, GOALS), ("quality", kind, KINDS)):
             if named not in known:
                 raise unknown(what, named, known)
@@ -177,6 +181,17 @@ def _purpose(
                 ' choose preset="default".'
             )
     return "both", quality_of("final_distance", signals)
+
+
+def _check_reachable(what: str, values: Floats, signals: Signals, divergence_factor: float) -> None:
+    """Refuses a start or target where every run would have been cut."""
+    for value, state in zip(values, signals.states, strict=True):
+        limit = divergence_factor * state.scale
+        if abs(value) >= limit:
+            raise InvalidInput(
+                f"{what}: expected {state.name} within {limit:g} {state.unit}, the divergence factor times its scale,"
+                f" found {value:g}; give it in the unit that is declared, or declare a larger scale."
+            )
 
 
 def _check_inside(what: str, values: Floats, signals: Signals, margin: float) -> None:

@@ -186,8 +186,8 @@ def _states(result: Mapping[str, Any]) -> str:
     lines = [
         "WHAT THE TWIN LEAVES, STATE BY STATE",
         table(head, rows),
-        "Errors: root mean square of flown minus simulated, over whole flights from their first reading. Noise:"
-        " standard\ndeviation, as estimated. A ratio of 1 is a twin that leaves the sensors' noise alone.",
+        "Errors: root mean square of flown minus simulated, over whole flights, each from where it began."
+        " Noise:\nstandard deviation, as estimated. A ratio of 1 is a twin that leaves the sensors' noise alone.",
         _disturbances(twin["disturbances"]),
         _actuators(twin["actuators"]),
         *(_hidden(state) for state in twin["hidden"]),
@@ -302,9 +302,7 @@ def _advice(result: Mapping[str, Any]) -> str:
     if advice["gain"] is None:
         return title + "No committee was asked for a flight yet; ask for one to hear what it would bring."
     if not advice["trusted"]:
-        return (
-            title + "The model diverged on flights that it was learnt from: it cannot say. Fly another one."
-        )
+        return f"{title}Flown by itself the model does not follow what it was learnt from: it cannot say. Fly another."
     share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
     words = f"{title}When test {advice['before_test']} was planned, knowing which model is right would"
     size = None if scatter is None else _with_unit(scatter, unit)

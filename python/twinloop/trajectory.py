@@ -116,7 +116,8 @@ def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_
     if abs(intervals[worst] - signals.dt) > JITTER * signals.dt * (1.0 + 1e-9):
         raise InvalidInput(
             f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s"
-            f" after row {worst}; resample the record, or declare the system's own period as dt."
+            f" after row {worst}; put in a row that was lost, or declare the system's own period as dt. Where the"
+            " loop only jitters around it, pass the even times dt * np.arange(n + 1)."
         )
     # Twice: noise may carry the last reading of a run that was stopped in time past the limit.
     limits = 2.0 * divergence_factor * np.array([state.scale for state in signals.states])

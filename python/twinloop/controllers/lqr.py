@@ -100,6 +100,11 @@ def lqr_gains(
 
 def _costs(kind: str, weights: Mapping[str, float] | None, scales: Mapping[str, float]) -> list[float]:
     """A weight for each name: as given, or one over its squared scale."""
+    if weights is not None and not isinstance(weights, Mapping):
+        names = ", ".join(repr(name) for name in scales)
+        raise InvalidInput(
+            f"lqr_gains, {kind} weights: expected a dict by name among {names}, found {weights!r}."
+        )
     given = dict(weights or {})
     for name, weight in given.items():
         if name not in scales:

@@ -18,6 +18,7 @@ from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.logbook import Logbook
 from twinloop.methods.calibration import OF_PARTS, factor, left_of_flights, needed_factor
+from twinloop.methods.doubts import distinct, doubts
 from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
@@ -77,7 +78,7 @@ class IdentifyAndPlan:
         self._believed: list[_core.Model] = []
         self._follows = False
         self._tuned: tuple[int, Floats] | None = None
-        self._best: tuple[int, Test] | None = None
+        self._best: tuple[tuple[int, int], Test] | None = None
         self._lessons: list[Lesson] = []
         self._needed: list[float] = []
         task = Task(setup.initial_state, setup.target_state, setup.steps)
@@ -100,7 +101,7 @@ class IdentifyAndPlan:
         load_ahead()
         self._told = tuple(run.test.number for run in book.experiments)
         needed = self._calibrated(book)
-        runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in book.experiments]
+        runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in distinct(book.experiments)]
         identified = identify_runs(
             runs,
             self.setup.signals,
@@ -110,7 +111,7 @@ class IdentifyAndPlan:
             iteration=told,
             known=self.identified,
             workers=self.workers,
-            watch=lambda step: self._watch(step, 0.0),
+            watch=self._watch,
         )
         free = closed_loop(identified.members, book.selected, self.workers)
         frozen = np.array([run.frozen for run in book.experiments])
@@ -183,24 +184,29 @@ class IdentifyAndPlan:
 
     def best_test(self, book: Logbook) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
-        if self._best is not None and self._best[0] == len(book.experiments):
+        known_and_told = self._learnt, len(book.experiments)
+        if self._best is not None and self._best[0] == known_and_told:
             return self._best[1]
-        committee, flown = self._committee(), book.best().quiet()
+        committee, best = self._committee(), book.best()
+        # That of another task says nothing of the campaign's own, and is none to be given back.
+        on_task, ends = book.on_task(best), (self.setup.initial_state, self.setup.target_state)
+        flown = replace(best.quiet(), initial_state=ends[0], target_state=ends[1])
         tuned = self._gains(book)
         genes = np.stack([tuned, flown.genes])
         members = self.planner.lasting(committee.members, genes)
         judged = self.planner.judge(members, genes, committee.sds, self.options.draws)
-        measured = book.measured(flown.number)
+        measured = book.measured(flown.number) if on_task else None
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < old).mean())
-        safe = float(judged.usages[:, :, 0].max()) <= 1.0
+        elsewhere = self.planner.judge(
+            members, genes, committee.sds, self.options.draws, off=_off_start(book)
+        )
+        safe = max(float(flights.usages[:, :, 0].max()) for flights in (judged, elsewhere)) <= 1.0
         left = book.left_envelope(flown.number)
         recorded = self.planner.judge(
             members, genes, committee.sds, self.options.draws, measured=True
         ).qualities
-        doubtful = measured is not None and self._doubtful(
-            members, committee.sds, book.best(), recorded, measured
-        )
+        doubtful = measured is not None and self._doubtful(members, committee.sds, best, recorded, measured)
         trusted = (
             committee.trusted and safe and (left or (better >= self.options.confidence and not doubtful))
         )
@@ -220,12 +226,12 @@ class IdentifyAndPlan:
                     "Tuned on the twin: no model sees them leave the envelope, as the best gains flown did."
                 )
             number = len(book.tests) if known is None else known.number
-            number_measured = None if known is None or known.excitation is not None else book.measured(number)
+            quiet = known is not None and known.excitation is None and book.on_task(known)
+            number_measured = book.measured(number) if quiet else None
             test = Test(
                 self.setup.family,
                 tuned,
-                self.setup.initial_state,
-                self.setup.target_state,
+                *ends,
                 self.setup.steps,
                 None,
                 number=number,
@@ -234,7 +240,7 @@ class IdentifyAndPlan:
                 measured=number_measured,
             )
         answer = test.explained(spread, self._risk(judged.usages[:, :, pick]), reason)
-        self._best = (len(book.experiments), answer)
+        self._best = (known_and_told, answer)
         return answer
 
     def first_excitation(self, number: int) -> Floats | None:
@@ -306,21 +312,23 @@ class IdentifyAndPlan:
 
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
-        if self._tuned is None or self._tuned[0] != len(book.experiments):
-            committee = self._committee()
-            starts = [book.best().genes]
-            if self._tuned is not None:
-                starts.append(self._tuned[1])
-            first = book.experiments[0].test.genes
-            if first.tobytes() != starts[0].tobytes():
-                starts.append(first)
-            starts += self._linear_gains(committee)
-            if committee.trusted:
-                genes, _ = self.planner.tune(committee, starts, 2 * len(book.experiments))
-            else:
-                genes = starts[0]
-            self._tuned = (len(book.experiments), genes)
-        return self._tuned[1]
+        told = len(book.experiments)
+        if self._tuned is not None and self._tuned[0] == told:
+            return self._tuned[1]
+        committee = self._committee()
+        starts = [book.best().genes]
+        if self._tuned is not None:
+            starts.append(self._tuned[1])
+        first = book.experiments[0].test.genes
+        if first.tobytes() != starts[0].tobytes():
+            starts.append(first)
+        starts += self._linear_gains(committee)
+        genes = self.planner.tune(committee, starts, 2 * told) if committee.trusted else starts[0]
+        if (
+            self._learnt == told
+        ):  # what an interruption has left unlearnt must not show in what is tuned afterwards
+            self._tuned = (told, genes)
+        return genes
 
     def _linear_gains(self, committee: Committee) -> list[Floats]:
         """Gains of a full state feedback by LQR on the linearised twin; none for other families, or where it fails."""
@@ -405,26 +413,18 @@ class IdentifyAndPlan:
                 normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)
             ),
             follows=self._follows,
-            remarks=(*known.remarks, *self._doubts(known, book)),
+            remarks=(
+                *known.remarks,
+                *doubts(
+                    book.experiments,
+                    self.setup.signals,
+                    self._follows or not np.isfinite(known.left),  # of one that diverges it is said already
+                    self.setup.steps,
+                ),
+            ),
         )
 
-    def _doubts(self, known: Identified, book: Logbook) -> list[str]:
-        """What speaks against the twin as a whole."""
-        said = []
-        if np.isfinite(known.left) and not self._follows:
-            said.append(
-                "Flown by itself the twin does not follow the runs that it was learnt from: check the signs, units and"
-                " order of states and commands, and that the recorded controller is the one that the test names."
-            )
-        if all(run.quality is None for run in book.experiments):
-            longest = max(run.trajectory.steps for run in book.experiments)
-            said.append(
-                f"No run was complete, the longest had {longest} of {self.setup.steps} steps: what comes after them"
-                " nobody has seen."
-            )
-        return said
-
-    def _watch(self, step: str, share: float) -> None:
+    def _watch(self, step: str) -> None:
         lesson = self._lessons[-1] if self._lessons else None
         self.report(
             Progress(
@@ -440,3 +440,9 @@ class IdentifyAndPlan:
                 evaluations=0,
             )
         )
+
+
+def _off_start(book: Logbook) -> Floats:
+    """How far flights began from where they were asked to, root mean square of the first readings (n_x,)."""
+    off = [run.trajectory.states[0] - run.test.initial_state for run in book.experiments]
+    return np.asarray(np.sqrt(np.square(off).mean(axis=0)), dtype=np.float64)

@@ -65,8 +65,8 @@ def tune_gains(
     spread: float,
     seed: int,
     watch: Callable[[], None] = lambda: None,
-) -> tuple[Floats, float]:
-    """Gains of the lowest score (Hansen 2001).
+) -> Floats:
+    """Genes of the lowest score (Hansen 2001).
 
     Args:
         family: of the controllers.
@@ -76,9 +76,6 @@ def tune_gains(
         spread: standard deviation of the first steps, in ranges of the gains.
         seed: of the searches.
         watch: called after every generation.
-
-    Returns:
-        The genes, and their score.
     """
     from cmaes import CMA  # imported here, or waited for: it takes a while
 
@@ -103,4 +100,4 @@ def tune_gains(
             watch()
             if search.should_stop():
                 break
-    return best_genes, best
+    return best_genes

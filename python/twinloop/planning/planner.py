@@ -70,7 +70,7 @@ class Planner(Judge):
         divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
         seed: of the campaign.
         workers: how the work is carried out.
-        watch: called now and then, with what is being done and how far it is (0 to 1).
+        watch: called now and then, with what is being done.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Planner(Judge):
         divergence_factor: float,
         seed: int,
         workers: _core.Workers,
-        watch: Callable[[str, float], None] = lambda step, share: None,
+        watch: Callable[[str], None] = lambda step: None,
     ) -> None:
         super().__init__(
             family, task, quality, divergence_factor=divergence_factor, seed=seed, workers=workers
@@ -91,16 +91,13 @@ class Planner(Judge):
         self.options = options
         self.watch = watch
 
-    def tune(self, committee: Committee, starts: Sequence[Floats], number: int) -> tuple[Floats, float]:
-        """Gains of the best quality on the committee, inside the envelope with its margin.
+    def tune(self, committee: Committee, starts: Sequence[Floats], number: int) -> Floats:
+        """Genes of the best quality on the committee, inside the envelope with its margin.
 
         Args:
             committee: that judges.
             starts: genes to start from.
             number: of the call, for its stream.
-
-        Returns:
-            The genes and their score, quality plus what is paid for leaving the margin.
         """
         options = self.options
         stream = self.stream(2, number)
@@ -110,10 +107,10 @@ class Planner(Judge):
             # The middle between what is known and anywhere: basins that no flight has seen.
             other = 0.5 * places[0] + 0.5 * stream.random(self.family.size)
             all_starts.append(from_unit(self.family, other))
-        best, _ = self._searched(committee.members[:1], committee.sds, 1, all_starts, 0.5, 0.2, number)
+        best = self._searched(committee.members[:1], committee.sds, 1, all_starts, 0.2, number)
         members = committee.members[: max(1, options.tuning_members)]
-        fine = [best, *starts[:1]]
-        return self._searched(members, committee.sds, options.draws, fine[:2], 0.5, 0.08, number + 1)
+        fine = [best, starts[0]]
+        return self._searched(members, committee.sds, options.draws, fine, 0.08, number + 1)
 
     def _searched(
         self,
@@ -121,24 +118,20 @@ class Planner(Judge):
         sds: Floats,
         draws: int,
         starts: Sequence[Floats],
-        share: float,
         spread: float,
         number: int,
-    ) -> tuple[Floats, float]:
+    ) -> Floats:
+        """One of two searches, with half of the evaluations."""
         options = self.options
-        done = 0
 
         def score(genes: Floats) -> Floats:
-            nonlocal done
-            done += len(genes)
             judged = self.judge(members, genes, sds, draws)
             excess = np.maximum(0.0, judged.worst_usage - (1.0 - options.margin))
-            return judged.mean * (1.0 + 10.0 * excess) + np.where(excess > 0.0, excess, 0.0)
+            return judged.mean * (1.0 + 10.0 * excess) + excess
 
-        total = share * options.evaluations
         return tune_gains(
-            self.family, score, starts, evaluations=int(total), spread=spread, seed=self.seed * 1009 + number,
-            watch=lambda: self.watch("gains", min(1.0, done / total)),
+            self.family, score, starts, evaluations=options.evaluations // 2, spread=spread,
+            seed=self.seed * 1009 + number, watch=lambda: self.watch("gains"),
         )  # fmt: skip
 
     # Proposing
@@ -194,7 +187,7 @@ class Planner(Judge):
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
         drafts = candidates(self, self.options, tuned, flown, goal, number)
-        self.watch("candidates", 0.0)
+        self.watch("candidates")
         # A member that blows up whatever is flown is no member (E-SINDy).
         members = self.lasting(committee.members, drafts.genes, drafts.excitation, drafts.ends)
         quiet = self.judge(members, drafts.genes, committee.sds, 1, drafts.excitation, drafts.ends)
@@ -204,7 +197,6 @@ class Planner(Judge):
             np.maximum(committee.sds, self._smallest()),
             workers=self.workers,
         )
-        self.watch("candidates", 1.0)
         keeps = quiet.worst_usage <= self._reach(goal, used)
         scatter = 0.0 if goal == "model" else self._scatter(committee, tuned)
         promised = float(quiet.mean[0])
