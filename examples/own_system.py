@@ -3,6 +3,8 @@
 import math
 
 import twinloop as tl
+from twinloop.result import summary
+from twinloop.text import render
 
 signals = tl.Signals(
     states=[
@@ -37,6 +39,4 @@ campaign = tl.Campaign(
 campaign.test({"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3})  # flown first
 campaign.run(rig, experiments=3)
 
-print(campaign.twin.equations())
-print(campaign.twin.errors)
-print(campaign.best_test)
+print(render(summary(campaign, {"name": "pendulum"}, run_info={})))

@@ -23,7 +23,7 @@ from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
 from twinloop.planning.gains import load_ahead
-from twinloop.planning.judging import Committee, Task, expected
+from twinloop.planning.judging import Committee, Task, expected, risk
 from twinloop.planning.planner import Planner
 from twinloop.presets import DefaultOptions
 from twinloop.setup import Setup
@@ -239,7 +239,7 @@ class IdentifyAndPlan:
                 predicted=predicted,
                 measured=number_measured,
             )
-        answer = test.explained(spread, self._risk(judged.usages[:, :, pick]), reason)
+        answer = test.explained(spread, risk(judged.usages[:, :, pick]), reason)
         self._best = (known_and_told, answer)
         return answer
 
@@ -363,7 +363,10 @@ class IdentifyAndPlan:
         if not safe:
             return "The best gains flown: a model sees those that the twin prefers leave the envelope."
         if doubtful:
-            return "The best gains flown: the twin expects less of others than was measured of these, and of these too."
+            return (
+                "The best gains flown: the twin expects worse of others than was measured of these, but of these it"
+                " expects worse, too, and so is not believed here."
+            )
         share, asked = (f"{100 * part:.3g} %" for part in (better, self.options.confidence))
         return (
             f"The best gains flown: the twin prefers others in {share} of its predictions, and {asked} are asked"
@@ -388,9 +391,6 @@ class IdentifyAndPlan:
         family, target = self.setup.family, self.setup.target_state
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
-
-    def _risk(self, usages: Floats) -> float:
-        return (float((usages > 1.0).sum()) + 0.5) / (usages.size + 1.0)
 
     def _lesson(self, known: Identified, book: Logbook, free: list[float]) -> Lesson:
         return Lesson(

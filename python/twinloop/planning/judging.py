@@ -66,6 +66,15 @@ class Judged:
         return worst
 
 
+def risk(usages: Floats) -> float:
+    """Share of flights that leave the envelope, with half a flight added on either side: none is no certainty.
+
+    Args:
+        usages: of the envelope, any shape.
+    """
+    return (float((usages > 1.0).sum()) + 0.5) / (usages.size + 1.0)
+
+
 def expected(means: Floats) -> tuple[float, float]:
     """Quality that members expect on average, each by its mean (members,), and its spread; infinite where one diverges.
 

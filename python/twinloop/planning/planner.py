@@ -15,7 +15,7 @@ from twinloop.flights import disagreements
 from twinloop.planning.candidates import candidates
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import from_unit, to_unit, tune_gains
-from twinloop.planning.judging import DIVERGED, Committee, Judge, Judged, Task, expected
+from twinloop.planning.judging import DIVERGED, Committee, Judge, Judged, Task, expected, risk
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 
@@ -240,7 +240,7 @@ class Planner(Judge):
             excitation=excitation if excitation.any() else None,
             predicted=predicted,
             spread=spread,
-            risk=(int((flights.usages > 1.0).sum()) + 0.5) / (flights.usages.size + 1.0),
+            risk=risk(flights.usages),
             safe=safe,
             disagreement=disagreement,
             gain=_gain(quiet.qualities.mean(axis=1)[:, keeps]),
