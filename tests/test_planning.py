@@ -13,7 +13,7 @@ from twinloop.flights import candidates, qualities
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import from_unit, to_unit, tune_gains
 from twinloop.planning.judging import Committee, Task
-from twinloop.planning.planner import Planner
+from twinloop.planning.planner import Flown, Planner
 from twinloop.planning.quality import KINDS, quality_of
 from twinloop.presets import options_of
 
@@ -61,12 +61,9 @@ def committee_of(known):
 TUNED = np.array([4.0, 0.1, 2.0])
 
 
-def proposed(planner, committee, tuned=TUNED, **changes):
-    arguments = {
-        "goal": "both", "number": 3, "told": 1, "first_quality": 1.0, "used": [1.0], "kept": True, "exploit": False,
-        **changes,
-    }  # fmt: skip
-    return planner.propose(committee, tuned, tuned, **arguments)
+def proposed(planner, committee, tuned=TUNED, goal="both", number=3, exploit=False, **changes):
+    flown = Flown(**{"best": tuned, "kept": True, "usages": [1.0], "first_quality": 1.0, **changes})
+    return planner.propose(committee, tuned, flown, goal, number, exploit)
 
 
 def usages(planner, committee, proposal):
@@ -188,15 +185,11 @@ def test_where_the_first_flight_left_the_envelope_one_that_keeps_it_may_be_worse
     planner, committee = planner_of(known, candidates=256), committee_of(known)
     wild = np.array([9.0, 2.0, 0.05])
     assert planner.judge(committee.members, wild[None], committee.sds, 1).worst_usage[0] > 1.0
-    found = planner.propose(
-        committee, TUNED, wild, goal=goal, number=3, told=1, first_quality=np.inf, used=[1.4], kept=False, exploit=False
-    )  # fmt: skip
+    found = planner.propose(committee, TUNED, Flown(wild, False, [1.4], np.inf), goal, 3, False)
     assert found.safe and usages(planner, committee, found).max() <= 0.9 and found.predicted > 0.0
     # Where none keeps it, the one that uses least of it is offered, whether it has flown or not.
     planner = planner_of(signals(envelope=(-0.52, 0.52), rate=(-0.5, 0.5)))
-    found = planner.propose(
-        committee, TUNED, wild, goal=goal, number=3, told=1, first_quality=np.inf, used=[1.4], kept=False, exploit=False
-    )  # fmt: skip
+    found = planner.propose(committee, TUNED, Flown(wild, False, [1.4], np.inf), goal, 3, False)
     assert not found.safe and "safest" in found.reason and not same_bits(found.genes, wild)
 
 
@@ -232,10 +225,8 @@ def test_where_the_twin_promises_less_than_was_flown_the_flown_gains_fly_again(g
     planner, committee = planner_of(known), committee_of(known)
     flown, lazy = np.array([3.0, 0.2, 1.5]), np.array([0.1, 0.0, 3.0])
     quality = float(planner.judge(committee.members, TUNED[None], committee.sds, 1).mean[0])
-    found = planner.propose(
-        committee, lazy, flown, goal=goal, number=3, told=1, first_quality=0.5 * quality, used=[1.0], kept=True,
-        exploit=exploit,
-    )  # fmt: skip
+    known_to_fly = Flown(flown, True, [1.0], 0.5 * quality)
+    found = planner.propose(committee, lazy, known_to_fly, goal, 3, exploit)
     assert same_bits(found.genes, flown) and "again" in found.reason and found.excitation is not None
     # Where the twin promises more than that, it is followed.
     assert not same_bits(proposed(planner, committee, goal=goal, exploit=exploit).genes, flown)
@@ -304,7 +295,7 @@ def test_flights_for_the_model_go_no_further_than_they_are_allowed_or_than_was_f
     cases = (([0.5], 0.45), ([0.33], 0.43), ([0.33, 0.44, 0.4], 0.44), ([0.6], 0.6), ([0.01], 0.43))
     for used, most in cases:
         planner = planner_of(known, reach_far=0.45, reach_first=0.9, reach_least=0.43, reach_growth=1.3)
-        found = proposed(planner, committee, goal="model", used=used)
+        found = proposed(planner, committee, goal="model", usages=used)
         flown = planner.judge(
             committee.members,
             found.genes[np.newaxis],

@@ -9,6 +9,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
+from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -54,14 +55,7 @@ def fly(
         )
     lasted = int(runs.lasted[0])
     completed = lasted == test.steps
-    reason = (
-        ""
-        if completed
-        else (
-            f"a state left {divergence_factor:g} times its scale, or stopped being finite, "
-            f"{(lasted + 1) * signals.dt:.3g} s after the start"
-        )
-    )
+    reason = "" if completed else _why_cut(runs.states[0, lasted], lasted, signals, divergence_factor)
     return Trajectory(
         signals.dt * np.arange(lasted + 1, dtype=np.float64),
         runs.measured[0, : lasted + 1],
@@ -69,6 +63,17 @@ def fly(
         ended="completed" if completed else "diverged",
         reason=reason,
         true_states=runs.states[0, : lasted + 1],
+    )
+
+
+def _why_cut(last: Floats, lasted: int, signals: Signals, divergence_factor: float) -> str:
+    """When a run was cut, and the state that was the furthest off a period before."""
+    worst = int(np.argmax(np.abs(last) / [state.scale for state in signals.states]))
+    state = signals.states[worst]
+    return (
+        f"a state left {divergence_factor:g} times its scale, or stopped being finite,"
+        f" {(lasted + 1) * signals.dt:.3g} s after the start; before that {state.name} was at"
+        f" {last[worst]:.3g} {state.unit}".rstrip()
     )
 
 

@@ -135,17 +135,22 @@ def checked(
         _check_reachable(f"Campaign, {what}", state, signals, chosen.divergence_factor)
         if isinstance(chosen, DefaultOptions):
             _check_inside(f"Campaign, {what}", state, signals, chosen.margin)
-    if isinstance(chosen, DefaultOptions):
-        pool = Pool(signals.n_x + signals.n_u)  # formulas are refused now rather than after the first flight
-        for text in chosen.seed_terms:
-            parsed_term(text, pool, signals)
-        told(chosen, pool, signals)
-    if isinstance(chosen, Options):
-        with engine_input():
-            grammar(chosen, signals)
-            variation(chosen, chosen.model_population)
-            settings_of_tests(chosen)
+    _check_use(chosen, signals)
     return setup
+
+
+def _check_use(options: AnyOptions, signals: Signals) -> None:
+    """Refuses formulas and settings of searches now rather than after the first flight."""
+    if isinstance(options, DefaultOptions):
+        pool = Pool(signals.n_x + signals.n_u)
+        for text in options.seed_terms:
+            parsed_term(text, pool, signals)
+        told(options, pool, signals)
+    if isinstance(options, Options):
+        with engine_input():
+            grammar(options, signals)
+            variation(options, options.model_population)
+            settings_of_tests(options)
 
 
 def _purpose(

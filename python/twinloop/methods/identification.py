@@ -24,7 +24,7 @@ from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
 from twinloop.planning.gains import load_ahead
 from twinloop.planning.judging import Committee, Task, expected, risk
-from twinloop.planning.planner import Planner
+from twinloop.planning.planner import Flown, Planner
 from twinloop.presets import DefaultOptions
 from twinloop.setup import Setup
 from twinloop.test import Test
@@ -149,13 +149,14 @@ class IdentifyAndPlan:
         found = self.planner.propose(
             committee,
             tuned,
-            best.genes,
+            Flown(
+                best.genes,
+                not book.left_envelope(best.number),
+                [run.usage for run in book.experiments],
+                self._first_quality(book),
+            ),
             self.setup.goal,
             number,
-            len(book.experiments),
-            self._first_quality(book),
-            [run.usage for run in book.experiments],
-            not book.left_envelope(best.number),
             exploit,
         )
         test = book.new_test(

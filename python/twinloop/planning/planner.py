@@ -28,6 +28,24 @@ TOGETHER = 4
 
 
 @dataclass(frozen=True, eq=False)
+class Flown:
+    """What has flown so far.
+
+    Args:
+        best: genes of the best flight.
+        kept: whether it kept the envelope.
+        usages: largest usage of the envelope in each flight.
+        first_quality: of the first controller, as flown or predicted; infinite where it left the envelope: a flight
+            that keeps it may then be worse.
+    """
+
+    best: Floats
+    kept: bool
+    usages: Sequence[float]
+    first_quality: float
+
+
+@dataclass(frozen=True, eq=False)
 class Proposal:
     """A test that is proposed.
 
@@ -159,13 +177,9 @@ class Planner(Judge):
         self,
         committee: Committee,
         tuned: Floats,
-        flown: Floats,
+        flown: Flown,
         goal: str,
         number: int,
-        told: int,
-        first_quality: float,
-        used: Sequence[float],
-        kept: bool,
         exploit: bool,
     ) -> Proposal:
         """The next test.
@@ -173,20 +187,15 @@ class Planner(Judge):
         Args:
             committee: that judges.
             tuned: gains that are best on it.
-            flown: the best gains flown.
+            flown: so far.
             goal: "both", "model" or "control".
             number: of the test, for its stream.
-            told: experiments so far.
-            first_quality: of the first controller, as flown or predicted; infinite where it left the envelope: a
-                flight that keeps it may then be worse.
-            used: largest usage of the envelope in each flight so far.
-            kept: whether the best gains flown kept the envelope.
             exploit: whether the tuned gains are flown as they are.
 
         Returns:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
-        drafts = candidates(self, self.options, tuned, flown, goal, number)
+        drafts = candidates(self, self.options, tuned, flown.best, goal, number)
         self.watch("candidates")
         # A member that blows up whatever is flown is no member (E-SINDy).
         members = self.lasting(committee.members, drafts.genes, drafts.excitation, drafts.ends)
@@ -197,11 +206,11 @@ class Planner(Judge):
             np.maximum(committee.sds, self._smallest()),
             workers=self.workers,
         )
-        keeps = quiet.worst_usage <= self._reach(goal, used)
+        keeps = quiet.worst_usage <= self._reach(goal, flown.usages)
         scatter = 0.0 if goal == "model" else self._scatter(committee, tuned)
         promised = float(quiet.mean[0])
-        first = first_quality if np.isfinite(first_quality) else 2.0 * promised
-        limit = self._limit(promised, goal, told, first, scatter)
+        first = flown.first_quality if np.isfinite(flown.first_quality) else 2.0 * promised
+        limit = self._limit(promised, goal, len(flown.usages), first, scatter)
         wanted: list[int] = []
         if committee.trusted:
             allowed, better = keeps & (quiet.mean <= limit), keeps & (quiet.mean <= first)
@@ -220,17 +229,17 @@ class Planner(Judge):
                 measured=True,
             )
 
-        found = _first_that_lasts(wanted, noisy, max(limit, first_quality + 2.0 * scatter))
+        found = _first_that_lasts(wanted, noisy, max(limit, flown.first_quality + 2.0 * scatter))
         if found is None:
             # What was flown and kept the envelope will again, whatever the members make of it. Where no model is to be
             # trusted, nothing is known but that these gains have flown: again, with another excitation.
-            known = drafts.repeats if kept or not committee.trusted else 0
+            known = drafts.repeats if flown.kept or not committee.trusted else 0
             chosen = known + int(np.argmin(quiet.worst_usage[known:]))
             found = chosen, noisy([chosen])
         chosen, flights = found
         repeats = chosen >= drafts.repeats
         inside = quiet.worst_usage[chosen] <= 1.0 - self.options.margin and flights.usages.max() <= 1.0
-        safe = bool(inside and (kept or not repeats))
+        safe = bool(inside and (flown.kept or not repeats))
         predicted, spread = expected(flights.qualities.mean(axis=(1, 2)))
         excitation, disagreement = drafts.excitation[chosen], float(tells[chosen])
         return Proposal(
@@ -245,7 +254,7 @@ class Planner(Judge):
             disagreement=disagreement,
             gain=_gain(quiet.qualities.mean(axis=1)[:, keeps]),
             reason=self._reason(
-                exploit and chosen == 0, repeats, kept, safe, disagreement, where[chosen].tolist()
+                exploit and chosen == 0, repeats, flown.kept, safe, disagreement, where[chosen].tolist()
             ),
         )
 
