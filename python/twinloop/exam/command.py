@@ -14,7 +14,7 @@ import click
 from twinloop.arrays import whole
 from twinloop.console import duration
 from twinloop.errors import InvalidInput, NotAvailable, unknown
-from twinloop.exam.kinds import Fitter, Learner, Tuner
+from twinloop.exam.kinds import Fitter, Tuner
 from twinloop.exam.learners import LEARNERS, for_smoke, learner
 from twinloop.exam.plan import TUNING_SEEDS, Scope, available, planned
 from twinloop.exam.results import Results
@@ -77,7 +77,7 @@ def power(
     chosen = [learner(name) for name in _chosen("learner", learners, known, LEARNERS)]
     chosen_seeds = SMOKE_SEEDS if smoke and seeds is None else None if seeds is None else _seeds(seeds)
     names, chosen = available(names, chosen, _say)
-    source = _source(data)
+    source = learner("ours" if data is None else data)
     if smoke:
         chosen, source = [for_smoke(who) for who in chosen], for_smoke(source)
     with tempfile.TemporaryDirectory() as folder:
@@ -148,11 +148,6 @@ def _tune(scope: Scope, path: Path, jobs: int, yes: bool) -> str:
     finally:
         store.close()
     return "\n\n".join(shown) + "\n"
-
-
-def _source(name: str | None) -> Learner:
-    """Whose flights the fits are made on."""
-    return learner("ours" if name is None else name)
 
 
 def _chosen(kind: str, asked: str | None, by_default: Sequence[str], known: Iterable[str]) -> list[str]:

@@ -20,19 +20,14 @@ from twinloop.exam.systems import Subject
 from twinloop.trajectory import Trajectory
 
 SCHEMA = 1
-TABLES = {"measured", "flights", "held_out"}
-_TABLES = """
-CREATE TABLE IF NOT EXISTS measured (
-    system TEXT, learner TEXT, seed INTEGER, k INTEGER, settings TEXT,
-    measures TEXT NOT NULL, seconds REAL NOT NULL, failure TEXT,
-    PRIMARY KEY (system, learner, seed, k, settings)
-);
-CREATE TABLE IF NOT EXISTS flights (
-    system TEXT, learner TEXT, seed INTEGER, k INTEGER, settings TEXT, flight BLOB NOT NULL,
-    PRIMARY KEY (system, learner, seed, k, settings)
-);
-CREATE TABLE IF NOT EXISTS held_out (system TEXT PRIMARY KEY, signature TEXT NOT NULL, runs BLOB NOT NULL);
-"""
+_KEY = "system TEXT, learner TEXT, seed INTEGER, k INTEGER, settings TEXT"
+_PRIMARY = "PRIMARY KEY (system, learner, seed, k, settings)"
+TABLES = {
+    "measured": f"{_KEY}, measures TEXT NOT NULL, seconds REAL NOT NULL, failure TEXT, {_PRIMARY}",
+    "flights": f"{_KEY}, flight BLOB NOT NULL, {_PRIMARY}",
+    "held_out": "system TEXT PRIMARY KEY, signature TEXT NOT NULL, runs BLOB NOT NULL",
+}
+"""Columns of each table."""
 
 
 class MissingFlights(NotAvailable):
@@ -94,7 +89,8 @@ class Store:
                 self._check_whose()
                 # Readers and the writers of other jobs must not wait for each other.
                 self._base.execute("PRAGMA journal_mode = WAL")
-                self._base.executescript(_TABLES)
+                for table, columns in TABLES.items():
+                    self._base.execute(f"CREATE TABLE IF NOT EXISTS {table} ({columns})")
                 self._base.execute(f"PRAGMA user_version = {SCHEMA}")
             except sqlite3.Error as reason:
                 raise InvalidInput(
@@ -113,7 +109,7 @@ class Store:
         tables = {
             name for (name,) in self._base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
         }
-        strangers = sorted(tables - TABLES)
+        strangers = sorted(tables - TABLES.keys())
         if strangers:
             raise InvalidInput(
                 f"Store {str(self.path)!r}: expected an SQLite file of the exam, found one with a table"

@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.history import Experiment
+from twinloop.identification.records import Run, guessed_noise
 from twinloop.signals import Signals
 
 MOVED = 20.0
@@ -63,20 +64,18 @@ def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, s
 
 def _against_derivatives(experiments: Sequence[Experiment], signals: Signals) -> Iterator[str]:
     """States that do not change as their declared derivatives say."""
+    runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in experiments]
+    noise = guessed_noise(runs, np.array([state.scale for state in signals.states]))
     for i, rate in enumerate(signals.states):
         if rate.derivative_of is None:
             continue
         j = signals.state_names.index(rate.derivative_of)
-        pairs = [
-            _moved(run.trajectory.states[:, j], run.trajectory.states[:, i], signals.dt)
-            for run in experiments
-        ]
+        pairs = [_moved(run.states[:, j], run.states[:, i], signals.dt) for run in runs]
         moved, said = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-        noise = [_noise(run.trajectory.states[:, j]) for run in experiments]
         size, told, both = (
             float(values.sum()) for values in (np.square(moved), np.square(said), moved * said)
         )
-        if size <= len(moved) * (MOVED * max(noise)) ** 2 or told == 0.0:
+        if size <= len(moved) * MOVED**2 * noise[j] or told == 0.0:
             continue
         how = ""
         if both**2 < ALIKE**2 * size * told:
@@ -94,8 +93,3 @@ def _moved(state: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
     """A state over a run, and the same by its derivative, each less its mean."""
     said = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
     return state - state.mean(), said - said.mean()
-
-
-def _noise(state: Floats) -> float:
-    """Standard deviation of white noise, from second differences, which a smooth motion leaves small."""
-    return float(np.median(np.abs(np.diff(state, 2)))) / (0.6745 * np.sqrt(6.0)) if len(state) > 2 else 0.0

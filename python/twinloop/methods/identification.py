@@ -190,8 +190,8 @@ class IdentifyAndPlan:
             return self._best[1]
         committee, best = self._committee(), book.best()
         # That of another task says nothing of the campaign's own, and is none to be given back.
-        on_task, ends = book.on_task(best), (self.setup.initial_state, self.setup.target_state)
-        flown = replace(best.quiet(), initial_state=ends[0], target_state=ends[1])
+        setup, on_task = self.setup, book.on_task(best)
+        flown = replace(best.quiet(), initial_state=setup.initial_state, target_state=setup.target_state)
         tuned = self._gains(book)
         genes = np.stack([tuned, flown.genes])
         members = self.planner.lasting(committee.members, genes)
@@ -200,7 +200,7 @@ class IdentifyAndPlan:
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < old).mean())
         elsewhere = self.planner.judge(
-            members, genes, committee.sds, self.options.draws, off=_off_start(book)
+            members, genes[:1], committee.sds, self.options.draws, off=_off_start(book)
         )
         safe = max(float(flights.usages[:, :, 0].max()) for flights in (judged, elsewhere)) <= 1.0
         left = book.left_envelope(flown.number)
@@ -228,18 +228,8 @@ class IdentifyAndPlan:
                 )
             number = len(book.tests) if known is None else known.number
             quiet = known is not None and known.excitation is None and book.on_task(known)
-            number_measured = book.measured(number) if quiet else None
-            test = Test(
-                self.setup.family,
-                tuned,
-                *ends,
-                self.setup.steps,
-                None,
-                number=number,
-                campaign=flown.campaign,
-                predicted=predicted,
-                measured=number_measured,
-            )
+            test = replace(flown, genes=tuned, number=number)
+            test = test.judged(predicted, book.measured(number) if quiet else None)
         answer = test.explained(spread, risk(judged.usages[:, :, pick]), reason)
         self._best = (known_and_told, answer)
         return answer
@@ -325,9 +315,8 @@ class IdentifyAndPlan:
             starts.append(first)
         starts += self._linear_gains(committee)
         genes = self.planner.tune(committee, starts, 2 * told) if committee.trusted else starts[0]
-        if (
-            self._learnt == told
-        ):  # what an interruption has left unlearnt must not show in what is tuned afterwards
+        # What an interruption has left unlearnt must not show in what is tuned afterwards.
+        if self._learnt == told:
             self._tuned = (told, genes)
         return genes
 
