@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -128,6 +129,21 @@ class Campaign:
         """Of the preset, with those that were changed."""
         return self.setup.options
 
+    def __copy__(self) -> Campaign:
+        """A campaign that goes on by itself from here, with the same bits; `progress` is called by both."""
+        campaign = object.__new__(Campaign)
+        campaign.setup, campaign.threads = self.setup, self.threads
+        campaign.progress, campaign.interrupted = self.progress, self.interrupted
+        campaign._workers = _core.Workers(threads=self.threads)
+        campaign._book = self._book.copied()
+        campaign._method = campaign._chosen()
+        campaign._method.memory = self._method.memory
+        return campaign
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Campaign:
+        """As `copy.copy`: what both share are values that never change."""
+        return copy.copy(self)
+
     # Ask and tell
 
     def test(
@@ -184,7 +200,8 @@ class Campaign:
         Raises:
             InvalidInput: a test of another campaign, or a useless trajectory; nothing has changed.
         """
-        model = self._method.best_model
+        # Of the last `ask`, not of the last look: `before` must not depend on who looked.
+        model = self._method.asked_model
 
         def error_so_far(alone: _core.SelectedTests) -> float | None:
             if model is None:

@@ -18,7 +18,7 @@ class Experiment:
     Args:
         test: what was asked for.
         trajectory: what the system answered.
-        before: closed-loop error of the twin before it learnt the run; None if there was no twin yet.
+        before: closed-loop error on the run of the twin that the last `ask` knew; None if nothing was asked yet.
         frozen: closed-loop error of the model that never moves, on the run.
         final_distance: distance of the last measured state to the target; None if the run was cut.
         quality: what the campaign minimises, as measured; None if the run was cut.

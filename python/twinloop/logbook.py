@@ -41,6 +41,18 @@ class Logbook:
         self.selected = setup.none_selected()
         self._identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
 
+    def copied(self) -> Logbook:
+        """The same entries in a book of its own."""
+        book = Logbook(self.setup)
+        book.tests, book.experiments, book.asked = list(self.tests), list(self.experiments), list(self.asked)
+        book.selected, book._identity = self.selected, self._identity
+        return book
+
+    @property
+    def revision(self) -> int:
+        """Number of entries; it grows with each."""
+        return len(self.tests) + len(self.experiments)
+
     def new_test(
         self,
         genes: Floats,

@@ -30,7 +30,7 @@ class TestErrors:
         open_loop: mean squared error one step ahead, over steps and components, SI units squared.
         closed_loop: mean squared error of the free run under the test's own controller, the same units.
         normalised: closed_loop over that of the model that never moves; 1 means useless.
-        before: closed-loop error of the twin before it learnt the test; None if there was no twin yet.
+        before: closed-loop error of the twin that the last `ask` before it knew; None if nothing was asked yet.
         after: closed-loop error now.
     """
 

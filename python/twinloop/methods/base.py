@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -14,7 +14,10 @@ from twinloop.test import Test
 
 
 class Method(Protocol):
-    """One way through the double loop; all that it remembers is its own."""
+    """One way through the double loop."""
+
+    memory: Any
+    """All that it remembers: one value that never changes, so that a copy of a campaign may share it."""
 
     @property
     def iteration(self) -> int:
@@ -22,7 +25,9 @@ class Method(Protocol):
         ...
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
-        """Learns all that was told.
+        """Learns all that was told, beginning with what was known when the last test was asked for.
+
+        What is learnt is thus a function of what was asked and told, not of who looked at it in between.
 
         Args:
             book: with at least one experiment.
@@ -55,8 +60,8 @@ class Method(Protocol):
         ...
 
     @property
-    def best_model(self) -> _core.Model | None:
-        """The best model so far, if there is any."""
+    def asked_model(self) -> _core.Model | None:
+        """The best model when the last test was asked for; None before."""
         ...
 
     def history(self, book: Logbook) -> tuple[Iteration, ...] | tuple[Lesson, ...]:

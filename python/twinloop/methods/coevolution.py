@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.history import Iteration, Progress
-from twinloop.learning import Learning
+from twinloop.learning import Learner, Learning
 from twinloop.logbook import Logbook
 from twinloop.methods.errors import errors
 from twinloop.models import Twin
@@ -18,6 +19,20 @@ from twinloop.presets import Options
 from twinloop.search import chunks, committee, start_tests
 from twinloop.setup import Setup
 from twinloop.test import Test
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What the preset `paper` remembers.
+
+    Args:
+        asked: what was learnt when the last test was asked for. Learning begins here, whoever looks in between.
+        latest: what was learnt last, or is being learnt; shown to whoever looks, and gone on with if it is of all that
+            was told.
+    """
+
+    asked: Learning | None = None
+    latest: Learning | None = None
 
 
 class Coevolution:
@@ -37,19 +52,39 @@ class Coevolution:
         self.options = options
         self.workers = workers
         self.report = report
-        self.learning = Learning(setup.signals, options, setup.seed, workers, self._watch_models)
+        self.memory = Memory()
+        self.learner = Learner(setup.signals, options, setup.seed, workers)
         self._told = 0
 
     @property
     def iteration(self) -> int:
         """Of the model loop."""
-        return self.learning.iteration
+        latest = self.memory.latest
+        return 0 if latest is None else latest.iteration
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
-        """Finishes the iteration that is running, and runs another if more was told."""
-        self._told = len(book.experiments)
-        learn = self.learning.start if at_once else self.learning.learn
-        learn(book.selected, book.experiments)
+        """One iteration on all that was told since the last test was asked for."""
+        self._told = told = len(book.experiments)
+        latest = self.memory.latest
+        if at_once and latest is not None:
+            return
+        if latest is None or len(latest.experiments) != told:
+            latest = self._begun(book)
+        if at_once:
+            self.memory = replace(self.memory, latest=latest)
+            return
+        for moved in self.learner.advanced(latest):
+            self.memory = replace(self.memory, latest=moved)
+            self._watch_models(moved)
+
+    def _begun(self, book: Logbook) -> Learning:
+        """The iteration that learns all that was told, at its beginning."""
+        known = self.memory.asked
+        if known is None:
+            return self.learner.started(book.selected, book.experiments)
+        if len(known.experiments) == len(book.experiments):
+            return known
+        return self.learner.renewed(known, book.selected, book.experiments)
 
     def ask(self, book: Logbook, last: bool) -> Test:
         """The test loop over the committee; that an experiment is the last means nothing to the paper."""
@@ -69,6 +104,7 @@ class Coevolution:
             self._report("tests", total - left, total, search.archive_size, search.evaluations)
         test = book.new_test(search.best_genes, predicted=self._predicted(search.best_genes))
         book.enter_loop(self.iteration, test, search)
+        self.memory = replace(self.memory, asked=self.memory.latest)
         return test
 
     def best_test(self, book: Logbook) -> Test:
@@ -89,17 +125,19 @@ class Coevolution:
     @property
     def models(self) -> _core.ModelSearch:
         """The model loop as a value."""
-        assert self.learning.models is not None
-        return self.learning.models
+        assert self.memory.latest is not None
+        return self.memory.latest.models
 
     @property
-    def best_model(self) -> _core.Model | None:
-        """The best trade-off so far."""
-        return None if self.learning.models is None else self.learning.models.best_model
+    def asked_model(self) -> _core.Model | None:
+        """The best trade-off when the last test was asked for."""
+        asked = self.memory.asked
+        return None if asked is None else asked.models.best_model
 
     def history(self, book: Logbook) -> tuple[Iteration, ...]:
         """One record for each iteration, from 0."""
-        return book.with_loops(self.learning.records())
+        latest = self.memory.latest
+        return () if latest is None else book.with_loops(latest.records(self.options.model_generations))
 
     def committee(self) -> Sequence[_core.Model]:
         """Members of the non-dominated set, the best trade-off first."""
@@ -113,15 +151,14 @@ class Coevolution:
         )
         return float(distances[0, 0])
 
-    def _watch_models(self) -> None:
-        models, done, total = self.learning.models, self.learning.done, self.options.model_generations
-        if models is not None:
-            self._report("models", done, total, models.archive_size, models.evaluations)
+    def _watch_models(self, latest: Learning) -> None:
+        models, total = latest.models, self.options.model_generations
+        self._report("models", total - latest.left, total, models.archive_size, models.evaluations)
 
     def _report(
         self, phase: str, generation: int, generations: int, archive_size: int, evaluations: int
     ) -> None:
-        best = [] if self.learning.models is None else self.learning.models.best_objectives.tolist()
+        best = self.models.best_objectives.tolist()
         self.report(
             Progress(
                 phase=phase,
@@ -129,7 +166,7 @@ class Coevolution:
                 generation=generation,
                 generations=generations,
                 told=self._told,
-                tests=self.learning.tests,
+                tests=() if self.memory.latest is None else self.memory.latest.tests,
                 open_loop=tuple(best[::2]),
                 closed_loop=tuple(best[1::2]),
                 archive_size=archive_size,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,47 @@ WRONG = 0.5
 """Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
 
 
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """What was learnt from the first experiments of a campaign.
+
+    Args:
+        told: how many they were.
+        identified: the model, its committee and how they were found.
+        believed: members of the committee that follow the flights, the best first.
+        follows: whether the best model, flown by itself, follows at least half of them.
+        needed: factors on the committees' spreads that the flights would have needed, each predicted before it was
+            learnt.
+        lessons: records of this identification and of those that it began with.
+        gains: that were tuned on the committee when a test was asked for; None: none were.
+    """
+
+    told: int
+    identified: Identified
+    believed: Sequence[_core.Model]
+    follows: bool
+    needed: tuple[float, ...]
+    lessons: tuple[Lesson, ...]
+    gains: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What the preset `default` remembers; all of it are values that never change.
+
+    Args:
+        asked: what was known when the last test was asked for. Learning begins here, whoever looks in between.
+        latest: what was learnt last; shown to whoever looks, and used by `ask` if it is of all that was told.
+        gains: tuned on the latest committee, after so many tests were told.
+        best: the controller to fly, at the revision of the logbook that it was chosen at.
+    """
+
+    asked: Learnt | None = None
+    latest: Learnt | None = None
+    gains: tuple[int, Floats] | None = None
+    best: tuple[int, Test] | None = None
+
+
 class IdentifyAndPlan:
     """Learns by identification, asks by planning.
 
@@ -71,16 +112,8 @@ class IdentifyAndPlan:
         self.options = options
         self.workers = workers
         self.report = report
-        self.iteration = 0
-        self.identified: Identified | None = None
-        self._learnt = 0
+        self.memory = Memory()
         self._told: tuple[int, ...] = ()
-        self._believed: list[_core.Model] = []
-        self._follows = False
-        self._tuned: tuple[int, Floats] | None = None
-        self._best: tuple[tuple[int, int], Test] | None = None
-        self._lessons: list[Lesson] = []
-        self._needed: list[float] = []
         task = Task(setup.initial_state, setup.target_state, setup.steps)
         self.planner = Planner(
             setup.family,
@@ -93,14 +126,23 @@ class IdentifyAndPlan:
             watch=self._watch,
         )
 
+    @property
+    def iteration(self) -> int:
+        """Number of experiments that are learnt."""
+        return 0 if self.memory.latest is None else self.memory.latest.told
+
     def learn(self, book: Logbook, at_once: bool = False) -> None:
-        """Identifies from all that was told; an interruption leaves what was known before."""
-        told = len(book.experiments)
-        if told == self._learnt or (at_once and self.identified is not None):
+        """Identifies from all that was told, beginning with what was known at the last `ask`."""
+        latest = self.memory.latest
+        if latest is not None and (at_once or latest.told == len(book.experiments)):
             return
         load_ahead()
         self._told = tuple(run.test.number for run in book.experiments)
-        needed = self._calibrated(book)
+        self.memory = Memory(asked=self.memory.asked, latest=self._learnt(book))
+
+    def _learnt(self, book: Logbook) -> Learnt:
+        known, told = self.memory.asked, len(book.experiments)
+        needed = () if known is None else self._calibrated(known, book)
         runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in distinct(book.experiments)]
         identified = identify_runs(
             runs,
@@ -109,7 +151,7 @@ class IdentifyAndPlan:
             rests=self._rests(),
             seed=self.setup.seed,
             iteration=told,
-            known=self.identified,
+            known=None if known is None else known.identified,
             workers=self.workers,
             watch=self._watch,
         )
@@ -121,11 +163,11 @@ class IdentifyAndPlan:
         order = np.argsort((free / np.maximum(frozen, 1e-300)).max(axis=1), kind="stable")
         kept = {0, *np.flatnonzero(~wrong).tolist()}
         kept |= set([i for i in order.tolist() if i not in kept][: max(0, FEWEST - len(kept))])
-        self._believed = [identified.members[i] for i in sorted(kept)]
-        self._follows = self._can_follow(identified, free[0], frozen)
-        self.identified, self._learnt, self.iteration = identified, told, told
-        self._needed = needed
-        self._lessons.append(self._lesson(identified, book, free[0].tolist()))
+        believed = [identified.members[i] for i in sorted(kept)]
+        follows = self._can_follow(identified, free[0], frozen)
+        lesson = self._lesson(identified, follows, book, free[0].tolist())
+        before = () if known is None else known.lessons
+        return Learnt(told, identified, believed, follows, needed, (*before, lesson))
 
     def ask(self, book: Logbook, last: bool) -> Test:
         """The next test, with what is expected of it."""
@@ -137,6 +179,7 @@ class IdentifyAndPlan:
                 test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
             )
             book.enter_plan(self.iteration, plan)
+            self.memory = replace(self.memory, asked=self._latest())
             return test
         committee = self._committee()
         tuned = self._gains(book)
@@ -181,13 +224,13 @@ class IdentifyAndPlan:
             reason=found.reason,
         )
         book.enter_plan(self.iteration, plan)
+        self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned))
         return test
 
     def best_test(self, book: Logbook) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
-        known_and_told = self._learnt, len(book.experiments)
-        if self._best is not None and self._best[0] == known_and_told:
-            return self._best[1]
+        if self.memory.best is not None and self.memory.best[0] == book.revision:
+            return self.memory.best[1]
         committee, best = self._committee(), book.best()
         # That of another task says nothing of the campaign's own, and is none to be given back.
         setup, on_task = self.setup, book.on_task(best)
@@ -231,7 +274,7 @@ class IdentifyAndPlan:
             test = replace(flown, genes=tuned, number=number)
             test = test.judged(predicted, book.measured(number) if quiet else None)
         answer = test.explained(spread, risk(judged.usages[:, :, pick]), reason)
-        self._best = (known_and_told, answer)
+        self.memory = replace(self.memory, best=(book.revision, answer))
         return answer
 
     def first_excitation(self, number: int) -> Floats | None:
@@ -240,60 +283,60 @@ class IdentifyAndPlan:
 
     def twin(self, book: Logbook) -> Twin:
         """The best model, with the committee and the sensors' noise for its band."""
-        return self._twin(book, errors(self._known().model, book, self.workers))
+        latest = self._latest()
+        return self._twin(latest, book, errors(latest.identified.model, book, self.workers))
 
-    def _twin(self, book: Logbook, rows: Sequence[TestErrors]) -> Twin:
-        known, divergence = self._known(), self.options.divergence_factor
-        noise = known.noise(self.setup.signals)
-        inflation = OF_PARTS if known.of_parts else factor(self._needed)
-        if known.exact:
+    def _twin(self, known: Learnt, book: Logbook, rows: Sequence[TestErrors]) -> Twin:
+        found, divergence = known.identified, self.options.divergence_factor
+        noise = found.noise(self.setup.signals)
+        inflation = OF_PARTS if found.of_parts else factor(known.needed)
+        if found.exact:
             # What follows exact readings to rounding is the law: its members are too sure of nothing.
-            left = left_of_flights(known.model, book.experiments[: self._learnt], divergence)
+            left = left_of_flights(found.model, book.experiments[: known.told], divergence)
             noise, inflation = replace(noise, sensors=left), 1.0
         return Twin(
-            known.model,
+            found.model,
             self.setup.signals,
             rows,
             divergence,
-            members=self._believed,
+            members=known.believed,
             noise=noise,
             seed=self.setup.seed,
             inflation=inflation,
         )
 
-    def _calibrated(self, book: Logbook) -> list[float]:
-        """Factors that the flights told since the last identification would have needed, after those before them."""
-        needed = list(self._needed)
+    def _calibrated(self, known: Learnt, book: Logbook) -> tuple[float, ...]:
+        """Factors that the flights told since would have needed, after those before them."""
         # A committee with parts in it says nothing of those that come after it.
-        if self.identified is not None and not self.identified.of_parts:
-            twin = self._twin(book, [])
-            for run in book.experiments[self._learnt :]:
-                found = needed_factor(twin, run.test, run.trajectory)
-                needed += [] if found is None else [found]
-        return needed
+        if known.identified.of_parts:
+            return known.needed
+        twin = self._twin(known, book, [])
+        needed = [needed_factor(twin, run.test, run.trajectory) for run in book.experiments[known.told :]]
+        return (*known.needed, *(found for found in needed if found is not None))
 
     @property
-    def best_model(self) -> _core.Model | None:
-        """The best model so far."""
-        return None if self.identified is None else self.identified.model
+    def asked_model(self) -> _core.Model | None:
+        """The best model when the last test was asked for."""
+        return None if self.memory.asked is None else self.memory.asked.identified.model
 
     def history(self, book: Logbook) -> tuple[Lesson, ...]:
         """One record for each identification."""
-        return book.with_plans(self._lessons)
+        return () if self.memory.latest is None else book.with_plans(self.memory.latest.lessons)
 
     def committee(self) -> Sequence[_core.Model]:
         """Members that follow the flown tests, the best first."""
-        return self._believed
+        return self._latest().believed
 
     # Inside
 
-    def _known(self) -> Identified:
-        assert self.identified is not None
-        return self.identified
+    def _latest(self) -> Learnt:
+        assert self.memory.latest is not None
+        return self.memory.latest
 
     def _committee(self) -> Committee:
-        known = self._known()
-        return Committee(self._believed, known.sensors(self.setup.signals.n_x), self._follows)
+        latest = self._latest()
+        sensors = latest.identified.sensors(self.setup.signals.n_x)
+        return Committee(latest.believed, sensors, latest.follows)
 
     def _can_follow(self, known: Identified, free: Floats, frozen: Floats) -> bool:
         """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from."""
@@ -304,20 +347,20 @@ class IdentifyAndPlan:
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
         told = len(book.experiments)
-        if self._tuned is not None and self._tuned[0] == told:
-            return self._tuned[1]
-        committee = self._committee()
+        if self.memory.gains is not None and self.memory.gains[0] == told:
+            return self.memory.gains[1]
+        committee, asked = self._committee(), self.memory.asked
         starts = [book.best().genes]
-        if self._tuned is not None:
-            starts.append(self._tuned[1])
+        if asked is not None and asked.gains is not None:
+            starts.append(asked.gains)
         first = book.experiments[0].test.genes
         if first.tobytes() != starts[0].tobytes():
             starts.append(first)
         starts += self._linear_gains(committee)
         genes = self.planner.tune(committee, starts, 2 * told) if committee.trusted else starts[0]
         # What an interruption has left unlearnt must not show in what is tuned afterwards.
-        if self._learnt == told:
-            self._tuned = (told, genes)
+        if self._latest().told == told:
+            self.memory = replace(self.memory, gains=(told, genes))
         return genes
 
     def _linear_gains(self, committee: Committee) -> list[Floats]:
@@ -382,9 +425,9 @@ class IdentifyAndPlan:
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
 
-    def _lesson(self, known: Identified, book: Logbook, free: list[float]) -> Lesson:
+    def _lesson(self, known: Identified, follows: bool, book: Logbook, free: list[float]) -> Lesson:
         return Lesson(
-            iteration=self.iteration,
+            iteration=len(book.experiments),
             tests=self._told,
             form=known.model.form,
             terms=known.terms,
@@ -402,20 +445,21 @@ class IdentifyAndPlan:
             normalised=tuple(
                 normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)
             ),
-            follows=self._follows,
+            follows=follows,
             remarks=(
                 *known.remarks,
                 *doubts(
                     book.experiments,
                     self.setup.signals,
-                    self._follows or not np.isfinite(known.left),  # of one that diverges it is said already
+                    follows or not np.isfinite(known.left),  # of one that diverges it is said already
                     self.setup.steps,
                 ),
             ),
         )
 
     def _watch(self, step: str) -> None:
-        lesson = self._lessons[-1] if self._lessons else None
+        latest = self.memory.latest
+        lesson = None if latest is None else latest.lessons[-1]
         self.report(
             Progress(
                 phase=step,
@@ -426,7 +470,7 @@ class IdentifyAndPlan:
                 tests=() if lesson is None else lesson.tests,
                 open_loop=(),
                 closed_loop=() if lesson is None else lesson.closed_loop,
-                archive_size=len(self._believed),
+                archive_size=0 if latest is None else len(latest.believed),
                 evaluations=0,
             )
         )

@@ -1,0 +1,187 @@
+"""Looking changes nothing: what is asked next, what flies in the end and the band are functions of `tell` and `ask`."""
+
+import copy
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import twinloop as tl
+from conftest import PENDULUM_GAINS, TINY, pendulum_step
+from twinloop.result import summary
+
+SIGNALS = tl.Signals(
+    [
+        tl.State("angle", "rad", scale=np.pi),
+        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
+    ],
+    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
+    dt=0.05,
+)
+CONTROLLER = tl.controllers.PID(
+    axes=[("angle", "rate")],
+    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
+)
+SMALL = {
+    "moves": 800, "starts": 1, "generations": 0, "lags": False, "evaluations": 128, "candidates": 24,
+    "committee_size": 4, "tuning_steps": 3, "draws": 2, "tuning_starts": 1,
+}  # fmt: skip
+OTHER_GAINS = {**PENDULUM_GAINS, "angle.kp": 1.2}
+
+LOOKS = {
+    "twin": lambda campaign: campaign.twin.simulate(campaign.experiments[0].test),
+    "best_test": lambda campaign: campaign.best_test,
+    "controller": lambda campaign: campaign.controller.command([0.1, 0.0], [1.0, 0.0]),
+    "committee": lambda campaign: campaign.committee,
+    "history": lambda campaign: campaign.history,
+    "experiments": lambda campaign: campaign.experiments,
+    "printing": lambda campaign: f"{campaign!r}{campaign}",
+    "summary": lambda campaign: summary(campaign, {}, {}),
+    "copy": copy.copy,
+}
+LIFE = ("tell", "tell", "ask", "ask", "tell", "tell", "ask", "tell", "own", "own")
+"""Two runs before the first question, two questions at once, their answers, and runs that nobody asked for."""
+
+
+def new(preset, seed=0):
+    return tl.Campaign(
+        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
+        preset=preset, seed=seed, options=TINY if preset == "paper" else SMALL,
+    )  # fmt: skip
+
+
+def lived(campaign, life, look=lambda campaign, step: campaign):
+    """A campaign after its events; `look` sees it after each, and gives the campaign that goes on."""
+    stream = np.random.default_rng(5)
+    plant = tl.systems.Simulated(SIGNALS, pendulum_step)
+    waiting = [campaign.test(gains) for gains in (PENDULUM_GAINS, OTHER_GAINS)]
+    for step, event in enumerate(life):
+        if event == "ask":
+            waiting.append(campaign.ask())
+        else:
+            test = campaign.test(OTHER_GAINS) if event == "own" else waiting.pop(0)
+            run = plant.run(test)
+            noisy = run.states + 1e-3 * stream.standard_normal(run.states.shape)
+            campaign.tell(test, tl.Trajectory(run.t, noisy, run.commands))
+        campaign = look(campaign, step)
+    return campaign
+
+
+def outcome(campaign):
+    """Everything that a campaign has asked and found, as one comparable value."""
+    best, twin = campaign.best_test, campaign.twin
+    run = twin.simulate(campaign.experiments[0].test)
+    return {
+        "asked": [(test.genes.tobytes(), None if test.excitation is None else test.excitation.tobytes())
+                  for test in campaign._book.tests],
+        "before": [run.before for run in campaign.experiments],
+        "history": campaign.history,
+        "program": str(twin.model.program),
+        "committee": [str(member.program) for member in campaign.committee],
+        "best": (best.number, best.genes.tobytes(), best.predicted, best.measured, best.reason),
+        "band": None if run.band is None else run.band.tobytes(),
+    }  # fmt: skip
+
+
+UNSEEN = {preset: None for preset in ("paper", "default")}
+
+
+def unseen(preset):
+    if UNSEEN[preset] is None:
+        UNSEEN[preset] = outcome(lived(new(preset), LIFE))
+    return UNSEEN[preset]
+
+
+def seen(preset, looks):
+    """A campaign of which, after step k, one sees `looks[k]`, in that order."""
+
+    def look(campaign, step):
+        for what in looks.get(step, ()):
+            LOOKS[what](campaign)
+        return campaign
+
+    return outcome(lived(new(preset), LIFE, look))
+
+
+@given(
+    st.dictionaries(
+        st.integers(0, len(LIFE) - 1), st.lists(st.sampled_from(sorted(LOOKS)), max_size=3), max_size=6
+    )
+)
+@settings(max_examples=25)
+def test_looking_at_a_campaign_of_the_paper_changes_no_bit(looks):
+    assert seen("paper", looks) == unseen("paper")
+
+
+@pytest.mark.parametrize(
+    "looks",
+    [
+        {0: ["twin"]},
+        {0: ["best_test"], 4: ["controller", "history"]},
+        {4: ["committee", "best_test"], 7: ["twin"], 8: ["summary"]},
+        {step: ["printing", "controller", "copy", "twin"] for step in range(len(LIFE))},
+    ],
+    ids=["a look before the second run", "between two answers", "before more runs", "everywhere"],
+)
+def test_looking_at_a_campaign_of_default_changes_no_bit(looks):
+    assert seen("default", looks) == unseen("default")
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_goes_on_with_the_same_bits(preset, copied):
+    kept = []
+
+    def look(campaign, step):
+        kept.append(campaign)
+        return copied(campaign)
+
+    assert outcome(lived(new(preset), LIFE, look)) == unseen(preset)
+    # Those that stayed behind know nothing of what came after.
+    for step, campaign in enumerate(kept):
+        assert len(campaign.experiments) == sum(event != "ask" for event in LIFE[: step + 1])
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_shares_nothing(copied):
+    plant = tl.systems.Simulated(SIGNALS, pendulum_step, default_gains=PENDULUM_GAINS)
+    campaign = new("paper").run(plant, 2)
+    before = outcome(campaign)
+    other = copied(campaign)
+    asked = other.ask()
+    other.tell(asked, plant.run(asked))
+    other.threads, other.interrupted = 7, True
+    assert outcome(campaign) == before
+    assert campaign.threads == 1 and not campaign.interrupted
+    # A test that was asked of the one before it was copied may be told to both; one asked since may not.
+    again = campaign.ask()
+    assert again.same_as(asked)
+    stranger = other.ask()
+    with pytest.raises(tl.InvalidInput, match="as it was made"):
+        campaign.tell(stranger, plant.run(stranger))
+
+
+def test_a_look_that_was_interrupted_changes_nothing():
+    class StopAt:
+        def __init__(self, call):
+            self.left = call
+
+        def __call__(self, progress):
+            self.left -= 1
+            if self.left == 0:
+                raise KeyboardInterrupt
+
+    for preset, call in (("paper", 1), ("paper", 3), ("default", 2), ("default", 6)):
+
+        def look(campaign, step, call=call):
+            # After the last one a look shows the best so far, as it should.
+            campaign.progress = StopAt(call) if step < len(LIFE) - 1 else None
+            try:
+                _ = campaign.twin, campaign.best_test
+            except KeyboardInterrupt:
+                assert campaign.interrupted
+            campaign.progress = None
+            return campaign
+
+        assert outcome(lived(new(preset), LIFE, look)) == unseen(preset)
