@@ -15,8 +15,8 @@ campaign = tl.Campaign(
 first = campaign.test(system.default_gains)  # a controller that we already trust, gently excited
 campaign.tell(first, system.run(first))
 
-for _ in range(2):
-    test = campaign.ask()  # learns a twin and a committee, then plans the next flight
+for last in (False, True):
+    test = campaign.ask(last=last)  # learns a twin and a committee, then plans the next flight
     print(f"predicted {test.predicted:.3g} ± {test.spread:.1g}, risk {test.risk:.2g}. {test.reason}")
     campaign.tell(test, system.run(test))
 

@@ -89,10 +89,20 @@ def test_experiments_count_every_run_on_the_system(new_campaign, pendulum):
     assert len(system.flown) == 3
 
 
+def test_a_run_of_fewer_experiments_than_were_told_is_refused(new_campaign, pendulum):
+    system = Counting(pendulum)
+    campaign = begun(new_campaign(), system).run(system, 2)
+    with pytest.raises(
+        tl.InvalidInput, match=r"at least the 2 runs that were told already, found 1;.* say 3"
+    ):
+        campaign.run(system, experiments=1)
+    assert len(system.flown) == 2
+
+
 def test_run_is_the_loop_by_hand(new_campaign, pendulum):
     by_hand = begun(new_campaign(), pendulum)
-    for _ in range(2):
-        test = by_hand.ask()
+    for last in (False, True):
+        test = by_hand.ask(last=last)
         by_hand.tell(test, pendulum.run(test))
     assert snapshot(by_hand) == snapshot(new_campaign().run(pendulum, 3))
 
@@ -185,6 +195,25 @@ def test_a_run_that_was_cut_can_be_told(new_campaign, pendulum):
     assert campaign.experiments[0].final_distance is None
     assert campaign.best_test.number == 0 and campaign.best_test.measured is None
     assert campaign.twin.errors[0].normalised > 0.0
+
+
+def test_the_controller_is_one_object_until_its_gains_change(new_campaign, pendulum):
+    campaign = begun(new_campaign(), pendulum)
+    controller = campaign.controller
+    integrating = [campaign.controller.command([0.2, 0.0], [1.0, 0.0]) for _ in range(3)]
+    assert integrating[0] < integrating[1] < integrating[2]  # the integral grows from access to access
+    campaign.ask()
+    _ = campaign.twin, campaign.history
+    assert campaign.controller is controller
+    # A run that changes nothing about which gains are the best leaves it as it is.
+    worse = campaign.test({"angle.kp": 0.01, "angle.ki": 0.0, "angle.kd": 1.0})
+    campaign.tell(worse, pendulum.run(worse))
+    assert campaign.best_test.number == 0 and campaign.controller is controller
+    better = campaign.test({"angle.kp": 5.0, "angle.ki": 5.0, "angle.kd": 0.8})
+    campaign.tell(better, pendulum.run(better))
+    assert campaign.best_test.number == better.number
+    assert campaign.controller is not controller and campaign.controller is campaign.controller
+    assert same_bits(campaign.controller.genes, better.genes)
 
 
 # What is told about the twin and the tests
@@ -344,7 +373,9 @@ def test_an_interrupted_campaign_keeps_the_best_so_far_and_goes_on_with_the_same
     monkeypatch, new_campaign, pendulum, call
 ):
     monkeypatch.setattr("twinloop.search.CHUNK_SECONDS", 0.0)
-    campaign = new_campaign(progress=StopAt(call)).run(pendulum, 3)
+    campaign = new_campaign(progress=StopAt(call))
+    with pytest.raises(KeyboardInterrupt):
+        campaign.run(pendulum, 3)
     assert campaign.interrupted
     if campaign.experiments:
         assert len(campaign.twin.errors) == len(campaign.experiments)
@@ -364,7 +395,9 @@ def test_an_interrupted_iteration_is_in_the_history_with_the_generations_it_had(
     monkeypatch, new_campaign, pendulum
 ):
     monkeypatch.setattr("twinloop.search.CHUNK_SECONDS", 0.0)
-    campaign = new_campaign(progress=StopAt(5)).run(pendulum, 3)  # one experiment, then four generations
+    campaign = new_campaign(progress=StopAt(5))
+    with pytest.raises(KeyboardInterrupt):
+        campaign.run(pendulum, 3)  # one experiment, then four generations
     assert [(r.iteration, r.generations) for r in campaign.history] == [(0, 0), (1, 4)]
     evaluations = campaign.models.evaluations
     _ = campaign.twin

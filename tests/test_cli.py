@@ -102,6 +102,13 @@ def test_options_reach_the_campaign():
     assert len(result["iterations"][1]["asked"][0]["objectives"]) == 3
 
 
+def test_a_term_with_a_comma_inside_brackets_is_one_term():
+    done = invoke(
+        *QUICK, "--set", "seed_terms=max(roll, 0.1), min(roll, max(yaw, 0))", "--experiments", "1", "--json"
+    )
+    assert json.loads(done.stdout)["options"]["seed_terms"] == ["max(roll, 0.1)", "min(roll, max(yaw, 0))"]
+
+
 def test_the_result_is_written_where_it_was_asked_for(tmp_path):
     file = tmp_path / "result.json"
     done = invoke(*SMALL, "--json", "--output", str(file))
@@ -300,8 +307,57 @@ def test_a_failure_exits_with_its_code_and_one_line(monkeypatch, failure, code):
     assert re.fullmatch(r"twinloop: [^\n]+", done.stderr.strip())  # click ends the line of a ^C first
 
 
+TINY = [*PAPER, "--generations", "2", "--experiments", "1"]
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "ascii:strict", "latin-1", "cp1252:strict"])
+def test_an_output_that_cannot_print_every_letter_shows_the_result(encoding):
+    done = twinloop_command(*TINY, env={**os.environ, "PYTHONIOENCODING": encoding}, errors="replace")
+    assert done.returncode == 0 and "Traceback" not in done.stderr
+    assert "BEST CONTROLLER FLOWN" in done.stdout and "measured" in done.stdout
+    answer = twinloop_command(*TINY, "--json", env={**os.environ, "PYTHONIOENCODING": encoding})
+    assert json.loads(answer.stdout)["experiments"][0]["test"] == 0
+
+
+def closed(*arguments, streams):
+    """The command with standard streams closed, as by `2>&-`."""
+
+    def close():
+        for stream in streams:
+            os.close(stream)
+
+    return subprocess.run(
+        [sys.executable, "-m", "twinloop", *arguments], preexec_fn=close, text=True, timeout=120,
+        **{name: subprocess.PIPE for name, stream in (("stdout", 1), ("stderr", 2)) if stream not in streams},
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no way to close a stream of a child")
+def test_closed_streams_end_with_the_result_and_its_exit_code(tmp_path):
+    silent = closed(*TINY, "--json", streams=[2])
+    assert silent.returncode == 0 and len(json.loads(silent.stdout)["experiments"]) == 1
+    file = tmp_path / "result.json"
+    written = closed(*TINY, "--output", str(file), streams=[1, 2])
+    assert written.returncode == 0 and len(json.loads(file.read_text(encoding="utf-8"))["experiments"]) == 1
+    assert closed(*PAPER, "--set", "pagez=3", streams=[2]).returncode == 2
+    # Nobody flies for a result that nobody can see.
+    nowhere = closed(*TINY, streams=[1])
+    assert nowhere.returncode == 2 and "pass --output" in nowhere.stderr
+
+
+def test_a_result_that_cannot_be_written_is_printed(monkeypatch, tmp_path):
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("twinloop.cli.write_text", full)
+    done = invoke(*TINY, "--json", "--output", str(tmp_path / "result.json"))
+    assert done.exit_code == 1 and "No space left" in done.stderr
+    assert len(json.loads(done.stdout)["experiments"]) == 1
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
-def test_ctrl_c_ends_with_130_and_the_best_so_far(tmp_path):
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_and_sigterm_end_with_130_and_the_best_so_far(tmp_path, sent):
     file = tmp_path / "result.json"
     command = [
         sys.executable, "-m", "twinloop", *PAPER, "--json", "--experiments", "2",
@@ -319,7 +375,7 @@ def test_ctrl_c_ends_with_130_and_the_best_so_far(tmp_path):
         for line in working.stderr:  # until the models are being learnt
             if "generation of models" in line:
                 break
-        working.send_signal(signal.SIGINT)
+        working.send_signal(sent)
         answer, complaint = working.communicate(timeout=60)
     finally:
         working.kill()

@@ -122,7 +122,9 @@ def whole():
 
 @pytest.mark.parametrize("call", [1, 2, 3, 5, 7, 9, 12, 16, 20, 24])
 def test_an_interrupted_campaign_goes_on_with_the_same_bits(begin, pendulum, whole, call):
-    campaign = begin(progress=StopAt(call)).run(pendulum, 3)
+    campaign = begin(progress=StopAt(call))
+    with pytest.raises(KeyboardInterrupt):
+        campaign.run(pendulum, 3)
     assert campaign.interrupted
     # What is looked at in between is of what is known by then, and must not show in what comes.
     if campaign.experiments:
@@ -376,6 +378,8 @@ def test_the_last_experiment_of_a_budget_flies_the_best_gains_as_they_are(begin,
     campaign = begin().run(pendulum, 2)
     assert campaign.experiments[1].test.excitation is None
     assert campaign.experiments[1].test.reason.startswith("The best gains")
+    by_hand = told(begin(), pendulum).ask(last=True)
+    assert by_hand.same_as(replace(campaign.experiments[1].test, campaign=by_hand.campaign))
     explored = begin(options={"exploit_last": False}).run(pendulum, 2)
     assert not explored.experiments[1].test.reason.startswith("The best gains")
 

@@ -113,6 +113,7 @@ class Campaign:
             self._workers = _core.Workers(threads=self.threads)
         self._book = Logbook(self.setup)
         self._method = self._chosen()
+        self._controller: Controller | None = None
 
     @property
     def signals(self) -> Signals:
@@ -130,14 +131,17 @@ class Campaign:
         return self.setup.options
 
     def __copy__(self) -> Campaign:
-        """A campaign that goes on by itself from here, with the same bits; `progress` is called by both."""
+        """A campaign that goes on by itself from here, with the same bits.
+
+        Both call the same `progress`; the copy's `controller` is at rest.
+        """
         campaign = object.__new__(Campaign)
         campaign.setup, campaign.threads = self.setup, self.threads
         campaign.progress, campaign.interrupted = self.progress, self.interrupted
         campaign._workers = _core.Workers(threads=self.threads)
         campaign._book = self._book.copied()
         campaign._method = campaign._chosen()
-        campaign._method.memory = self._method.memory
+        campaign._method.memory, campaign._controller = self._method.memory, None
         return campaign
 
     def __deepcopy__(self, memo: dict[int, object]) -> Campaign:
@@ -177,10 +181,14 @@ class Campaign:
             added = None
         return self._book.new_test(genes, excitation=added)
 
-    def ask(self) -> Test:
+    def ask(self, last: bool = False) -> Test:
         """Learns from all that was told, then picks the test on which the best models disagree.
 
         Asking again without telling learns nothing new and gives another test.
+
+        Args:
+            last: whether no other test will be asked for. The preset "default" then flies the best gains that it
+                knows as they are, unless its option `exploit_last` is off; to "paper" it means nothing.
 
         Returns:
             The test, to be flown and told, with its predicted quality, its risk and the reason for it.
@@ -188,7 +196,10 @@ class Campaign:
         Raises:
             NotAvailable: nothing was told yet.
         """
-        return self._asked(last=False)
+        self.interrupted = False
+        self._learn()
+        with self._interruptible():
+            return self._method.ask(self._book, bool(last))
 
     def tell(self, test: Test, trajectory: Trajectory) -> None:
         """Adds a run to what is to be learnt. Tests may be told in any order; one told again is a replicate.
@@ -212,7 +223,7 @@ class Campaign:
         self.interrupted = False
 
     def run(self, system: System, experiments: int = 4) -> Campaign:
-        """The whole loop. Ctrl-C ends it cleanly and keeps the best so far; `interrupted` says so.
+        """The whole loop; the last test is that of `ask(last=True)`.
 
         What was asked for and not told yet is flown first. Where nothing was told, the first test is the
         last one made by `campaign.test`, or that of `system.default_gains`.
@@ -225,7 +236,10 @@ class Campaign:
             The campaign.
 
         Raises:
-            InvalidInput: no system, or one that answers with something else than a usable trajectory.
+            InvalidInput: no system, one that answers with something else than a usable trajectory, or fewer experiments
+                than were told already.
+            KeyboardInterrupt: Ctrl-C. Nothing that was told is lost: `interrupted` says so, the results give the best
+                so far, and calling again goes on from there with the same bits.
             NotAvailable: there is no first test.
         """
         budget = whole("Campaign.run, experiments", experiments, least=1)
@@ -235,15 +249,19 @@ class Campaign:
                 "Campaign.run, system: expected an object with twinloop.Signals as `signals` and with `run(test)`, "
                 f"found {type(system).__name__}; add them."
             )
+        told = len(self._book.experiments)
+        if budget < told:
+            raise InvalidInput(
+                f"Campaign.run, experiments: expected at least the {told} runs that were told already, found {budget};"
+                f" every run counts, so for one more say {told + 1}."
+            )
         self.interrupted = False
-        try:
+        with self._interruptible():
             while len(self._book.experiments) < budget:
                 test = self._next(system, last=len(self._book.experiments) + 1 == budget)
                 check_signals(test, system.signals)
                 self._report_experiment()
                 self.tell(test, system.run(test))
-        except KeyboardInterrupt:
-            self.interrupted = True
         return self
 
     # What came out
@@ -269,8 +287,15 @@ class Campaign:
 
     @property
     def controller(self) -> Controller:
-        """That of `best_test`, for a real loop: `.parameters`, `.reset()`, `.command(state, target)`."""
-        return self.best_test.controller()
+        """That of `best_test`, for a real loop: `.parameters`, `.reset()`, `.command(state, target)`.
+
+        It is one object with one memory for as long as the gains of `best_test` are the same: call `reset` before each
+        run. Other gains, which only something that was told can bring, are another controller, at rest.
+        """
+        best = self.best_test
+        if self._controller is None or self._controller.genes.tobytes() != best.genes.tobytes():
+            self._controller = best.controller()
+        return self._controller
 
     @property
     def committee(self) -> tuple[_core.Model, ...]:
@@ -320,12 +345,6 @@ class Campaign:
         with self._interruptible():
             self._method.learn(self._book, at_once=self.interrupted)
 
-    def _asked(self, last: bool) -> Test:
-        self.interrupted = False
-        self._learn()
-        with self._interruptible():
-            return self._method.ask(self._book, last)
-
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
         try:
@@ -339,7 +358,7 @@ class Campaign:
         if waiting is not None:
             return waiting
         if self._book.experiments:
-            return self._asked(last)
+            return self.ask(last)
         gains = getattr(system, "default_gains", None)
         if gains is None:
             raise NotAvailable(

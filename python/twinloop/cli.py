@@ -23,6 +23,7 @@ from twinloop.reproduce.command import reproduce
 from twinloop.result import Result, quality_unit, summary, to_json
 from twinloop.run_info import Stopwatch
 from twinloop.systems import BUILT_IN, Quadrotor
+from twinloop.terminal import is_closed, is_utf_8, prepared
 from twinloop.text import quality_words, render
 
 Answer = TypeVar("Answer")
@@ -36,7 +37,8 @@ class OneSentence(click.Group):
         if not extra.pop("standalone_mode", True):
             return super().main(args, prog_name, standalone_mode=False, **extra)
         try:
-            code = super().main(args, prog_name, standalone_mode=False, **extra)
+            with prepared():
+                code = super().main(args, prog_name, standalone_mode=False, **extra)
         except click.ClickException as misuse:
             _fail(misuse.format_message(), misuse.exit_code)
         except (InvalidInput, NotAvailable) as misuse:
@@ -133,18 +135,25 @@ def run(
     )
     if output is not None:
         check_writable(output, [".json"])
+    elif is_closed():
+        raise InvalidInput(
+            "Standard output: expected somewhere to print the result, found it closed; open it, or pass --output."
+        )
     if plot is not None:
         check_picture(plot)
 
     stopwatch = Stopwatch(campaign.threads)
     result = _worked(campaign, rig, watch, experiments, _described(system, rig), stopwatch)
-    if output is not None:
-        write_text(output, to_json(result))
-        click.echo(f"Result: {output}", err=True)
+    try:
+        if output is not None:
+            write_text(output, to_json(result))
+            click.echo(f"Result: {output}", err=True)
+    finally:  # a full disk must not take the result with it
+        text = to_json(result, ascii_only=not is_utf_8()) if as_json else render(result)
+        click.echo(text, nl=False)
     if plot is not None:
         _uninterrupted(lambda: _draw(campaign, plot))
         click.echo(f"Picture: {plot}", err=True)
-    click.echo(to_json(result) if as_json else render(result), nl=False)
     context.exit(130 if campaign.interrupted else 0)
 
 
@@ -160,15 +169,11 @@ def _worked(
     system: dict[str, object],
     clock: Stopwatch,
 ) -> Result:
-    with watch:
+    with watch, suppress(KeyboardInterrupt):
         campaign.run(rig, experiments)
-        if not campaign.experiments or (campaign.interrupted and _knows_nothing(campaign)):
-            raise KeyboardInterrupt
-        if not campaign.interrupted:
-            with suppress(KeyboardInterrupt):
-                _ = campaign.best_test
-            if _knows_nothing(campaign):
-                raise KeyboardInterrupt
+        _ = campaign.best_test  # learns the last flight
+    if not campaign.experiments or _knows_nothing(campaign):
+        raise KeyboardInterrupt
     return _uninterrupted(lambda: summary(campaign, system, clock.info()))
 
 

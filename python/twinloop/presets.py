@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, overload
 
@@ -253,7 +253,7 @@ def parsed(preset: str, name: str, text: str) -> object:
     Args:
         preset: whose option it is.
         name: of the option.
-        text: such as "300", "true", "none" or "+,-,*".
+        text: such as "300", "true", "none" or "+,-,*"; a comma inside brackets, as in "max(a, b)", separates nothing.
 
     Returns:
         A value of the option's type.
@@ -270,13 +270,24 @@ def parsed(preset: str, name: str, text: str) -> object:
     if kind == "str":
         return text
     if kind.startswith("tuple"):
-        items = [item.strip() for item in text.split(",") if item.strip()]
+        items = [item.strip() for item in _split(text) if item.strip()]
         return tuple(_number(name, item) for item in items) if "float" in kind else tuple(items)
     if kind == "bool" and text.lower() in ("true", "false"):
         return text.lower() == "true"
     if kind.endswith("None") and text.lower() == "none":
         return None
     return _number(name, text, kind)
+
+
+def _split(text: str) -> Iterator[str]:
+    """Parts of a list, between the commas outside all brackets."""
+    start = depth = 0
+    for i, letter in enumerate(text):
+        depth += (letter in "([") - (letter in ")]")
+        if letter == "," and depth == 0:
+            yield text[start:i]
+            start = i + 1
+    yield text[start:]
 
 
 def _number(name: str, text: str, kind: str = "float") -> float:

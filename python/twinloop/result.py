@@ -312,13 +312,14 @@ def plain(value: object) -> Value:
     raise TypeError(f"expected numbers, texts, lists and dicts, found {type(value).__name__}")
 
 
-def to_json(result: Mapping[str, object]) -> str:
+def to_json(result: Mapping[str, object], ascii_only: bool = False) -> str:
     """One JSON object, two spaces deep, with a last line break.
 
     Args:
         result: a plain dictionary.
+        ascii_only: whether all other letters are written as escapes.
 
     Returns:
         The text.
     """
-    return json.dumps(plain_dict(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(plain_dict(result), indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n"

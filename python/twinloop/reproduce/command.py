@@ -14,6 +14,7 @@ from twinloop.reproduce import figure6, table1, table2, table3
 from twinloop.reproduce.study import Setting
 from twinloop.result import to_json
 from twinloop.run_info import Stopwatch
+from twinloop.terminal import is_utf_8
 
 STUDIES = {"table1": table1, "table2": table2, "table3": table3, "figure6": figure6}
 RUNS = {"table1": 1, "table2": 5, "table3": 25, "figure6": 5}
@@ -78,7 +79,7 @@ def reproduce(
     if picture is not None:
         figure6.draw(result, picture)
     if as_json:
-        click.echo(to_json(result), nl=False)
+        click.echo(to_json(result, ascii_only=not is_utf_8()), nl=False)
     else:
         click.echo(STUDIES[study].render(result))
         click.echo(_footer(result, picture))

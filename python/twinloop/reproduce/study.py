@@ -108,8 +108,6 @@ def finished_runs(setting: Setting) -> Iterator[Run]:
             watch.begin(number)
             run = begin(setting, number, watch)
             run.campaign.run(run.system, ITERATIONS)
-            if run.campaign.interrupted:
-                raise KeyboardInterrupt
             _ = run.campaign.models  # learns the last flight
             yield run
 

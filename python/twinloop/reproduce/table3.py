@@ -60,8 +60,6 @@ def compute(setting: Setting) -> Result:
         try:
             for iterations in STAGES:
                 run.campaign.run(run.system, iterations)
-                if run.campaign.interrupted:
-                    raise KeyboardInterrupt
                 models = run.campaign.models
                 stages.append({
                     name: _distances(setting, run, models, third, watch) for name, third in VERSIONS.items()
