@@ -226,10 +226,10 @@ def same_bits(a, b):
 
 
 def evaluate(text, values):
-    """The value of one printed expression; ÷ binds like a division and is the protected one."""
-    calls = {"min": lambda a, b: operate("min", a, b), "max": lambda a, b: operate("max", a, b)}
+    """The value of one printed expression; divisions are protected."""
+    calls = {"Min": lambda a, b: operate("min", a, b), "Max": lambda a, b: operate("max", a, b)}
     calls |= {name: (lambda a, name=name: operate(name, a)) for name in UNARY}
-    symbols = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.FloorDiv: "/"}
+    symbols = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 
     def value(node):
         match node:
@@ -239,15 +239,15 @@ def evaluate(text, values):
                 return values[name]
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return -value(operand)
-            case ast.BinOp(left=left, op=ast.Div(), right=right):
-                return value(left) / value(right)
+            case ast.BinOp(left=base, op=ast.Pow(), right=ast.Constant(value=int() as exponent)):
+                return value(base) ** exponent
             case ast.BinOp(left=left, op=op, right=right):
                 return operate(symbols[type(op)], value(left), value(right))
             case ast.Call(func=ast.Name(id=name), args=arguments):
                 return calls[name](*map(value, arguments))
         raise AssertionError(f"cannot read {ast.dump(node)} in {text!r}")
 
-    return value(ast.parse(text.replace("÷", "//"), mode="eval").body)
+    return value(ast.parse(text, mode="eval").body)
 
 
 def final_distance(state, target):

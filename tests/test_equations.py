@@ -1,34 +1,56 @@
-"""The printed equations, read again by a small parser, give what the engine computes."""
+"""The printed equations, read again by a small parser and by SymPy, give what the engine computes."""
 
 import re
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+import sympy
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
 from oracles import EXACT, evaluate, registers_of, same_bits
 from strategies import exact_programs, program_text, programs, rows
 from twinloop import _core
-from twinloop.equations import equations
+from twinloop.law.equations import equations
+from twinloop.law.law import Law
 
 SIGNALS = tl.Signals(
     states=[tl.State("x", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="x")],
     commands=[tl.Command("u", "V", (-2.0, 2.0)), tl.Command("t1", "V", (-1.0, 1.0))],
     dt=0.1,
 )
+NAMES = ["x", "v", "u_scaled", "t1"]
+
+
+def law_of(program, form="absolute", **actuation):
+    return Law.of(_core.Model(program, form, SIGNALS.engine, **actuation), SIGNALS)
+
+
+def parsed(inputs, outputs, registers, *pages):
+    return _core.Program.parse(program_text(inputs, outputs, registers, list(pages)))
+
+
+def written(text):
+    """Left and right side of each equation, lines that go on joined and notes taken away."""
+    found = []
+    for line in text.splitlines():
+        bare = line.split("#")[0].rstrip()
+        if not bare:
+            continue
+        if " = " in bare:
+            found.append(list(bare.split(" = ", 1)))
+        else:
+            assert bare.lstrip()[0] in "+-", "a line that goes on begins with a sign"
+            found[-1][1] += " " + bare.lstrip()
+    return found
 
 
 def read(text, inputs):
-    """Values of the equations' right sides in order, and the lines; inputs (rows, 4), commands scaled."""
-    names = ["x", "v", "u_scaled", "t1"]
-    values = dict(zip(names, np.asarray(inputs, dtype=float).T, strict=True))
+    """Values of the equations' right sides in order; inputs (rows, 4), commands scaled."""
+    values = dict(zip(NAMES, np.asarray(inputs, dtype=float).T, strict=True))
     found = []
-    for line in text.splitlines():
-        if not line or line.startswith("#"):
-            continue
-        left, right = line.split(" = ", 1)
+    for left, right in written(text):
         value = np.broadcast_to(evaluate(right, values), len(inputs))
         if left.isidentifier():
             assert left not in values, f"{left} is defined twice"
@@ -38,14 +60,50 @@ def read(text, inputs):
     return np.array(found).T
 
 
+def read_by_sympy(text, inputs):
+    """The same, each line read by SymPy."""
+    symbols = {name: sympy.Symbol(name, real=True) for name in NAMES}
+    parts, found = {}, []
+    for left, right in written(text):
+        whole = sympy.sympify(right, locals=symbols | parts)
+        if left.isidentifier():
+            parts[left] = whole
+            continue
+        compute = sympy.lambdify([symbols[name] for name in NAMES], whole, "numpy")
+        with np.errstate(all="ignore"):
+            found.append(np.broadcast_to(compute(*np.asarray(inputs, dtype=float).T), len(inputs)))
+    return np.array(found, dtype=float).T
+
+
+def each_line_is_read_by_sympy(text):
+    for line in text.splitlines():
+        bare = line.split("#")[0].strip()
+        if bare:
+            sympy.sympify(bare.split(" = ", 1)[-1])
+
+
+def tame(program, inputs, size=1e3):
+    """Whether no register is large, and no divisor so small that a division is protected, or nearly."""
+    effective = program.effective()
+    banks = list(registers_of(effective, inputs))
+    with np.errstate(all="ignore"):
+        if not all((np.abs(bank) < size).all() for bank in banks):
+            return False
+        for bank, (name, _, _, second) in zip(banks, effective.instructions, strict=False):
+            divisor = bank[second] if isinstance(second, int) else second
+            if name == "/" and (np.abs(divisor) < 1e-2).any():
+                return False
+    return True
+
+
 @given(st.data())
 def test_the_exact_equations_give_what_the_program_computes(data):
     program = data.draw(exact_programs(inputs=4, outputs=2))
     inputs = data.draw(rows(4, size=50.0))
-    effective = program.effective()
-    assume(all(np.isfinite(bank).all() for bank in registers_of(effective, inputs)))
-    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS, digits=17)
+    assume(all(np.isfinite(bank).all() for bank in registers_of(program.effective(), inputs)))
+    text = equations(law_of(program), digits=17)
     np.testing.assert_array_equal(read(text, inputs), program.run(inputs))
+    assert all(len(line) <= 100 for line in text.splitlines())
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -53,7 +111,7 @@ def test_equations_of_whole_random_programs_give_what_they_compute(seed):
     program = _core.Grammar(4, 2, operations=[*EXACT]).random(seed)[0]
     inputs = np.random.default_rng(seed).normal(size=(12, 4))
     assume(all(np.isfinite(bank).all() for bank in registers_of(program.effective(), inputs)))
-    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS, digits=17)
+    text = equations(law_of(program), digits=17)
     np.testing.assert_array_equal(read(text, inputs), program.run(inputs))
 
 
@@ -62,60 +120,154 @@ def test_functions_are_written_by_their_names(program):
     inputs = np.random.default_rng(0).uniform(-1.0, 1.0, (6, 4))
     banks = [*registers_of(program.effective(), inputs)]
     assume(all((np.abs(bank) < 1e3).all() for bank in banks))
-    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS, digits=17)
+    text = equations(law_of(program), digits=17)
     np.testing.assert_allclose(read(text, inputs), program.run(inputs), rtol=1e-6, atol=1e-6)
 
 
-def test_sums_are_written_without_brackets_where_the_order_may_be_turned():
+@settings(deadline=None)
+@given(programs(inputs=4, outputs=2), st.sampled_from([16, 17]))
+def test_sympy_reads_the_equations_and_computes_what_the_program_does(program, digits):
+    inputs = np.random.default_rng(0).uniform(-1.5, 1.5, (8, 4))
+    assume(tame(program, inputs))
+    text = equations(law_of(program), digits=digits)
+    each_line_is_read_by_sympy(text)
+    np.testing.assert_allclose(read_by_sympy(text, inputs), program.run(inputs), rtol=1e-9, atol=1e-9)
+    assert all(len(line) <= 100 for line in text.splitlines())
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6))
+def test_equations_of_a_long_program_fit_their_lines(seed, digits):
+    program = _core.Grammar(4, 2, page_length=30, pages=6).random(seed)[0]
+    for asked in (digits, 17):
+        text = equations(law_of(program), digits=asked)
+        assert all(len(line) <= 100 for line in text.splitlines())
+        written(text)
+
+
+def test_products_of_sums_are_multiplied_out_and_like_terms_collected():
+    lines = ["r6 = r0 - r1", "r7 = r0 + r1", "r4 = r6 * r7", "r5 = r4 - r6", "r6 = r0 * r0", "r4 = r4 - r6"]
+    text = equations(law_of(parsed(4, 2, 8, lines)))
+    assert written(text) == [["x[k+1]", "-v**2"], ["v[k+1]", "x**2 - x - v**2 + v"]]
+    lines = ["r6 = r2 * 3.0", "r6 = r6 + 0.5", "r4 = r6 * r6", "r5 = r0 / 0.25", "r5 = r5 - 1.0"]
+    text = equations(law_of(parsed(4, 2, 8, lines)))
+    assert written(text) == [["x[k+1]", "9*u_scaled**2 + 3*u_scaled + 0.25"], ["v[k+1]", "4*x - 1"]]
+
+
+def test_quotients_are_not_cancelled_for_they_are_protected():
+    text = equations(law_of(parsed(4, 2, 6, ["r4 = r0 / r0", "r5 = r0 * r1", "r5 = r5 / r1"])))
+    assert written(text) == [["x[k+1]", "x/x"], ["v[k+1]", "x*v/v"]]
+    assert "# a/b is protected: a / b where |b| > 1e-06, otherwise a" in text
+
+
+def test_exact_sums_are_written_without_brackets_where_the_order_may_be_turned():
     lines = ["r6 = r0 - r1", "r6 = r2 + r6", "r4 = r6 - r3", "r7 = r0 + r1", "r8 = r2 + r3", "r5 = r7 + r8"]
-    program = _core.Program.parse(program_text(4, 2, 9, [lines]))
-    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS)
+    text = equations(law_of(parsed(4, 2, 9, lines)), digits=17)
     assert "x[k+1] = x - v + u_scaled - t1" in text
     assert "v[k+1] = x + v + (u_scaled + t1)" in text  # which rounds otherwise than from left to right
 
 
 def test_an_increment_is_written_as_the_state_and_what_is_added():
-    program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r0 * 0.5", "r5 = r1 / r2"]]))
-    model = _core.Model(program, "increment", SIGNALS.engine)
+    law = law_of(parsed(4, 2, 6, ["r4 = r0 * 0.5", "r5 = r1 / r2"]), "increment")
     inputs = np.array([[1.0, 2.0, 0.5, 0.1], [3.0, -2.0, 0.0, 0.1]])
-    found = read(equations(model, SIGNALS, digits=17), inputs)
+    found = read(equations(law, digits=17), inputs)
     scales = np.array([2.0, 1.0])
-    assert same_bits(found, model.step(inputs[:, :2], inputs[:, 2:] * scales))
+    assert same_bits(found, law.model().step(inputs[:, :2], inputs[:, 2:] * scales))
+    assert "x[k+1] = x + 0.5*x" in equations(law)
 
 
 def test_an_acceleration_is_written_as_derivatives():
-    program = _core.Program.parse(program_text(4, 1, 5, [["r4 = r0 * -0.5", "r4 = r4 + r2"]]))
-    text = equations(_core.Model(program, "acceleration", SIGNALS.engine), SIGNALS)
+    text = equations(law_of(parsed(4, 1, 5, ["r4 = r0 * -0.5", "r4 = r4 + r2"]), "acceleration"))
     assert "d x / dt = v" in text
-    assert "d v / dt = x * (-0.5) + u_scaled" in text
+    assert "d v / dt = -0.5*x + u_scaled" in text
     assert same_bits(read(text, [[2.0, 7.0, 0.25, 0.0]]), [[7.0, -0.75]])
 
 
 def test_the_legend_says_what_the_symbols_mean():
-    program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r2 / r3", "r5 = sqrt(r0)"]]))
-    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS)
+    text = equations(law_of(parsed(4, 2, 6, ["r4 = r2 / r3", "r5 = sqrt(r0)"])))
     assert "# u_scaled = u / 2, u in V" in text
-    assert "# a ÷ b = a / b where |b| > 1e-06, otherwise a" in text
-    assert "# sqrt(a) = √|a|" in text
+    assert "# a/b is protected: a / b where |b| > 1e-06, otherwise a" in text
+    assert "sqrt(abs(x))" in text
     assert "0.1 s later" in text and "x in m" in text
 
 
 def test_what_is_used_twice_gets_one_name_that_no_signal_has():
-    page = ["r4 = r0 * r1", "r5 = sqrt(r4)", "r4 = r4 + r5"]
-    program = _core.Program.parse(program_text(4, 2, 6, [page]))
-    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS)
+    law = law_of(parsed(4, 2, 6, ["r4 = r0 * r1", "r5 = sqrt(r4)", "r4 = r4 + r5"]))
+    text = equations(law, digits=17)
     names = [line.split(" = ")[0] for line in text.splitlines() if re.match(r"t_+\d+ = ", line)]
     assert len(names) == len(set(names)) > 0
-    assert text.count("x * v") == 1
+    assert text.count("x*v") == 1
+    lines = [
+        "r6 = r0 * 0.125",
+        "r6 = r6 + r1",
+        "r7 = r2 * 0.25",
+        "r6 = r6 + r7",
+        "r4 = tanh(r6)",
+        "r5 = r4 * r0",
+    ]
+    long = equations(law_of(parsed(4, 2, 8, lines)))
+    assert written(long)[0] == ["t_1", "tanh(0.125*x + v + 0.25*u_scaled)"]
 
 
 def test_introns_are_not_written():
-    program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r1 * 99.0", "r4 = r0 + 1.0"]]))
-    assert "99" not in equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS)
+    assert "99" not in equations(law_of(parsed(4, 2, 6, ["r4 = r1 * 99.0", "r4 = r0 + 1.0"])))
 
 
 @pytest.mark.parametrize("digits", [1, 3, 6])
 def test_digits_round_the_constants(digits):
-    program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r0 * 0.123456789"]]))
-    text = equations(_core.Model(program, "absolute", SIGNALS.engine), SIGNALS, digits)
-    assert f"x[k+1] = x * {0.123456789:.{digits}g}" in text
+    text = equations(law_of(parsed(4, 2, 6, ["r4 = r0 * 0.123456789"])), digits=digits)
+    assert f"x[k+1] = {0.123456789:.{digits}g}*x" in text
+
+
+# The committee's ±
+
+
+def member(drag, lag=0.0, inside=None, extra=()):
+    lines = [f"r4 = r1 * {drag}", *extra]
+    if inside is not None:
+        lines += [f"r5 = r0 * {inside}", "r5 = sin(r5)", "r5 = r5 * -3.0", "r4 = r4 + r5"]
+    actuators = [(lag, 0, None), (0.0, 0, None)] if lag else None
+    return law_of(parsed(4, 1, 6, lines), "acceleration", actuators=actuators)
+
+
+def test_each_constant_has_the_standard_deviation_of_its_term_over_the_committee():
+    drags = [-0.5, -0.52, -0.47]
+    extra = ["r5 = r0 * 0.25", "r4 = r4 + r5"]
+    members = [member(drag, extra=extra if i < 2 else ()) for i, drag in enumerate(drags)]
+    text = equations(members[0], members)
+    (line,) = (line for line in text.splitlines() if "0.5*v" in line)
+    assert line.endswith(f"# ± {np.std(drags, ddof=1):.2g}")
+    (line,) = (line for line in text.splitlines() if "0.25*x" in line)
+    assert line.endswith("# ± 0 (2 of 3)")
+    assert "3 models of the committee" in text
+    each_line_is_read_by_sympy(text)
+    alone = equations(members[0], [members[0], members[2], members[2]])
+    assert any("0.25*x" in line and line.endswith("# (1 of 3)") for line in alone.splitlines())
+
+
+def test_constants_inside_functions_and_lags_have_theirs():
+    insides, lags = [2.0, 2.1, 1.9, 2.05], [0.05, 0.06, 0.055, 0.05]
+    members = [member(-0.5, lag, inside) for lag, inside in zip(lags, insides, strict=True)]
+    text = equations(members[0], members)
+    (line,) = (line for line in text.splitlines() if "sin(2*x)" in line)
+    assert f"± 0, inside ± {np.std(insides, ddof=1):.2g}" in line
+    assert f"a lag of 0.05 ± {np.std(lags, ddof=1):.2g} s" in text
+
+
+def test_terms_that_share_a_constant_share_a_line_and_its_deviation():
+    def pair(weight):
+        lines = ["r5 = r2 * r2", "r6 = r3 * r3", "r5 = r5 - r6", f"r4 = r5 * {weight}"]
+        return law_of(parsed(4, 1, 7, lines), "acceleration")
+
+    text = equations(pair(3.5), [pair(3.5), pair(3.7)])
+    assert f"d v / dt = 3.5*u_scaled**2 - 3.5*t1**2  # ± {np.std([3.5, 3.7], ddof=1):.2g}" in text
+
+
+def test_a_hidden_state_has_an_equation_that_sympy_reads():
+    program = parsed(5, 1, 6, ["r5 = r4 * 2.0"])
+    hidden = [((0, 1), True, 0.25, 3.0)]
+    model = _core.Model(program, "acceleration", SIGNALS.engine, [(0.0, 0, None)] * 2, hidden)
+    text = equations(Law.of(model, SIGNALS, (0.004, 0.0)))
+    assert "d hidden / dt = u_scaled**2/2 + t1**2/2 - 0.25 - hidden/3" in text
+    assert "# x is read 0.004 s later" in text
+    each_line_is_read_by_sympy(text)

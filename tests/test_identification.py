@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import UNARY, operate, same_bits
 from twinloop import _core
-from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import chains
 from twinloop.identification.fitting import Fitting
 from twinloop.identification.identify import identify_runs
@@ -21,6 +20,7 @@ from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.identification.structure import all_judged, prices
+from twinloop.law.actuation import Actuation, Actuator
 from twinloop.presets import options_of
 
 WORKERS = _core.Workers()
@@ -461,7 +461,7 @@ def test_a_hidden_state_that_commands_fill_is_found():
     assert found.misfit == pytest.approx(1.0, abs=0.2)
     assert found.chains[0].motion[1] < 0.1 * blind.chains[0].motion[1]
     text = tl.Twin(found.model, signals).equations(3)
-    assert "d hidden / dt = (left² + right²) / 2 - 1 - hidden / 0." in text
+    assert "d hidden / dt = left**2/2 + right**2/2 - 1 - hidden/0." in text
     assert all(len(member.hidden) == 1 for member in found.members)
     alone = identified(runs, signals, rests=rests, workers=_core.Workers(threads=1), form="acceleration")
     assert alone.model.hidden == found.model.hidden
@@ -547,7 +547,7 @@ def test_parts_are_searched_with_the_fewest_moves_too():
 
 def test_a_part_begins_with_the_effects_that_its_commands_have_there():
     signals, [run] = fans(1, fading=3.0)
-    whole = Actuation(((0.06, 1, None), (0.0, 2, 0.5)))
+    whole = Actuation((Actuator(0.06, 1, None), Actuator(0.0, 2, 0.5)))
     effects = _core.command_effects(whole.actuators, (), [1.0, 1.0], signals.dt, run.commands)[0]
     found = parts(run, signals, whole)
     assert [len(part.commands) for part, _ in found] == [105, 105, 75, 75]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +13,10 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop.arrays import Floats, floats
 from twinloop.controllers import PID, Mixer
-from twinloop.equations import equations
 from twinloop.errors import engine_input
 from twinloop.flight import fly
+from twinloop.law.equations import equations
+from twinloop.law.law import Law
 from twinloop.signals import Signals
 from twinloop.streams import Purpose, stream
 from twinloop.test import Test, check_signals
@@ -122,6 +124,7 @@ class Twin:
         noise: of sensors and disturbances, for the band.
         seed: of the band's random numbers.
         inflation: factor on the spread of the members, where they were found to be too sure.
+        offsets: by how much later than those of the driven states each state is read (n_x,), s; empty: none.
     """
 
     def __init__(
@@ -134,7 +137,9 @@ class Twin:
         noise: Noise | None = None,
         seed: int = 0,
         inflation: float = 1.0,
+        offsets: Sequence[float] = (),
     ) -> None:
+        self.offsets = tuple(offsets)
         self.inflation = inflation
         self.members = tuple(members)
         self.noise = noise
@@ -144,19 +149,26 @@ class Twin:
         self.errors = ErrorTable(errors)
         self.divergence_factor = divergence_factor
 
+    @cached_property
+    def law(self) -> Law:
+        """Equations, kinematics, actuators, hidden states, sensors' offsets and integrator, as a value."""
+        return Law.of(self.model, self.signals, self.offsets)
+
     def equations(self, digits: int = 6) -> str:
-        """The twin as text.
+        """The twin as text that SymPy reads, too.
 
         Args:
             digits: significant digits of constants; 17 give every bit back.
 
         Returns:
-            A legend, the parts that are used several times, and one equation a state.
+            A legend, then the equations, multiplied out, with the ± of each constant where a committee stands behind
+            the twin. With 17 digits they are as the program computes them.
 
         Raises:
             InvalidInput: digits out of range.
         """
-        return equations(self.model, self.signals, digits)
+        members = [Law.of(member, self.signals, self.offsets) for member in self.members]
+        return equations(self.law, members, digits)
 
     def simulate(self, test: Test) -> Trajectory:
         """Flies a test on the twin instead of the system.

@@ -10,7 +10,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
-from twinloop.identification.actuation import Actuation, groups
+from twinloop.identification.actuation import groups
 from twinloop.identification.bounds import Limits, bounded_model, excludes_zero
 from twinloop.identification.chains import Chain
 from twinloop.identification.pool import Pool
@@ -18,6 +18,7 @@ from twinloop.identification.records import Run
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Sum, Weights, prices, total
 from twinloop.identification.told import Told
+from twinloop.law.actuation import Actuation
 from twinloop.signals import Bounds, Signals
 
 PRUNINGS = 3
@@ -231,7 +232,7 @@ class Fitting:
         """
         free = list(range(len(model.constants))) if self.form == "absolute" else self._layout(sums)[0]
         actuation = self.actuation(model)
-        lags = [group for group in groups(self.signals) if actuation.actuators[group[0]][0] > 0.0]
+        lags = [group for group in groups(self.signals) if actuation.actuators[group[0]].lag > 0.0]
         lags += [[self.signals.n_u + j] for j in range(len(actuation.hidden))]
         limits = self._limits(sums) if self.options.tuning else {}
         # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.

@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.identification.actuation import Actuation, Hidden, groups
+from twinloop.identification.actuation import groups
 from twinloop.identification.directions import Direction, together
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum, total
+from twinloop.law.actuation import Actuation, HiddenState
 from twinloop.signals import Signals
 
 TIMES = (0.25, 1.0, 4.0)
@@ -46,7 +47,7 @@ def enter_directions(pool: Pool, found: Sequence[Direction]) -> None:
 def search_hidden(
     signals: Signals,
     base: Actuation,
-    known: Sequence[Hidden],
+    known: Sequence[HiddenState],
     rests: Sequence[Floats | None],
     longest: float,
     judge: Callable[[Actuation], list[Sum]],
@@ -65,20 +66,20 @@ def search_hidden(
         The actuation with it, and the sums.
     """
 
-    def tried(hidden: Hidden) -> tuple[float, Actuation, list[Sum]]:
+    def tried(hidden: HiddenState) -> tuple[float, Actuation, list[Sum]]:
         actuation = replace(base, hidden=(hidden,))
         sums = judge(actuation)
         return total(sums), actuation, sums
 
-    kinds: list[Hidden] = [
-        (tuple(group), squared, _mean(signals, group, squared, rest), TIMES[1] * longest)
+    kinds: list[HiddenState] = [
+        HiddenState(tuple(group), squared, _mean(signals, group, squared, rest), TIMES[1] * longest)
         for group in groups(signals)
         for squared in (False, True)
         for rest in rests
     ]
     found = [tried(hidden) for hidden in [*kinds, *known]]
-    commands, squared, level, _ = min(found, key=lambda answer: answer[0])[1].hidden[0]
-    found += [tried((commands, squared, level, time * longest)) for time in (TIMES[0], TIMES[2])]
+    best = min(found, key=lambda answer: answer[0])[1].hidden[0]
+    found += [tried(best._replace(time=time * longest)) for time in (TIMES[0], TIMES[2])]
     _, actuation, sums = min(found, key=lambda answer: answer[0])
     return actuation, sums
 

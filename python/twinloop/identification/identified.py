@@ -8,11 +8,11 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import Chain
 from twinloop.identification.noise import exact
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum
+from twinloop.law.actuation import Actuation
 from twinloop.models import Noise
 from twinloop.signals import Signals
 

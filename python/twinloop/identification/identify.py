@@ -16,7 +16,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.identification.actuation import Actuation
 from twinloop.identification.chains import Chain
 from twinloop.identification.committee import committee
 from twinloop.identification.directions import directions
@@ -34,6 +33,7 @@ from twinloop.identification.remarks import held_at_bounds, late_sensors, other_
 from twinloop.identification.selection import Selection
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Sum, total
+from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
 
 LAGS_AGAIN = 4

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from twinloop.arrays import Floats
-from twinloop.identification.actuation import Actuation, Actuator, groups
+from twinloop.identification.actuation import groups
 from twinloop.identification.structure import Sum, total
+from twinloop.law.actuation import Actuation, Actuator
 from twinloop.signals import Signals
 
 LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
@@ -68,7 +69,7 @@ def _tried(
 ) -> tuple[float, Actuation, list[Sum]]:
     actuators: list[Actuator] = list(base.actuators)
     for i in group:
-        actuators[i] = (lag * signals.dt, delay, None if rest is None else float(rest[i]))
+        actuators[i] = Actuator(lag * signals.dt, delay, None if rest is None else float(rest[i]))
     tried = Actuation(tuple(actuators))
     found = judge(tried)
     return total(found), tried, found

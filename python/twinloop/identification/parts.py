@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from twinloop.identification.actuation import Actuation
 from twinloop.identification.records import Run
+from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
 
 SHARES = ((0.0, 0.7), (0.3, 1.0), (0.0, 0.5), (0.5, 1.0))
@@ -34,9 +34,9 @@ def parts(run: Run, signals: Signals, actuation: Actuation) -> list[tuple[Run, A
     for first, last in ((int(begins * steps), int(ends * steps)) for begins, ends in SHARES):
         if last - first < SHORTEST:
             continue
-        rests = effects[first].tolist() if first else [rest for _, _, rest in actuation.actuators]
+        rests = effects[first].tolist() if first else [actuator.rest for actuator in actuation.actuators]
         begun = tuple(
-            (lag, delay, rest) for (lag, delay, _), rest in zip(actuation.actuators, rests, strict=True)
+            actuator._replace(rest=rest) for actuator, rest in zip(actuation.actuators, rests, strict=True)
         )
         found.append((run.part(first, last), replace(actuation, actuators=begun)))
     return found

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.identification.actuation import Actuation
+from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
 
 

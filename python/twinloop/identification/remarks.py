@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.equations import hidden_names
 from twinloop.identification.bounds import Limits
 from twinloop.identification.chains import Chain
 from twinloop.identification.noise import BEST_SENSOR, exact
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.structure import Sum
+from twinloop.law.law import hidden_names
 from twinloop.signals import Signals
 
 TWINS = 4.0

@@ -303,6 +303,7 @@ class IdentifyAndPlan:
             noise=noise,
             seed=self.setup.seed,
             inflation=inflation,
+            offsets=found.offsets.tolist(),
         )
 
     def _calibrated(self, known: Learnt, book: Logbook) -> tuple[float, ...]:
@@ -435,10 +436,11 @@ class IdentifyAndPlan:
             readings=known.readings,
             ignored=known.ignored,
             sensors=tuple(known.sensors(self.setup.signals.n_x).tolist()),
-            lags=tuple(lag for lag, _, _ in known.actuation.actuators),
-            delays=tuple(delay for _, delay, _ in known.actuation.actuators),
+            lags=tuple(actuator.lag for actuator in known.actuation.actuators),
+            delays=tuple(actuator.delay for actuator in known.actuation.actuators),
             hidden=tuple(
-                (tuple(of), squared, rest, time) for of, squared, rest, time in known.actuation.hidden
+                (hidden.commands, hidden.squared, hidden.rest, hidden.time)
+                for hidden in known.actuation.hidden
             ),
             offsets=tuple(known.offsets.tolist()),
             closed_loop=tuple(free),

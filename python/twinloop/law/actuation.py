@@ -1,0 +1,84 @@
+"""What stands between commands and a law: actuators that lag or delay, and hidden states that commands fill."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.signals import Signals
+
+
+class Actuator(NamedTuple):
+    """The way from one command to its effect.
+
+    Args:
+        lag: time constant of a first-order lag, s; 0 for none.
+        delay: whole periods before a command begins to act.
+        rest: command whose effect is there at the start of a run, in its unit; None: the first one.
+    """
+
+    lag: float = 0.0
+    delay: int = 0
+    rest: float | None = None
+
+    @property
+    def direct(self) -> bool:
+        """Whether a command acts at once."""
+        return self.lag == 0.0 and self.delay == 0
+
+
+class HiddenState(NamedTuple):
+    """A state h that commands fill and nobody measures: dh/dt = level − rest − h / time, 0 at the start of a run.
+
+    The level is the mean over its commands of what each gives, in units of its scale.
+
+    Args:
+        commands: places of those that fill it.
+        squared: whether they do so with their squares.
+        rest: level at which it neither fills nor empties; None: that of the first period.
+        time: after which 1/e of it is left, s.
+    """
+
+    commands: tuple[int, ...]
+    squared: bool
+    rest: float | None
+    time: float
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What a model sees of commands: their effects, then the states that they fill.
+
+    Args:
+        actuators: one a command.
+        hidden: states that commands fill.
+    """
+
+    actuators: tuple[Actuator, ...]
+    hidden: tuple[HiddenState, ...] = ()
+
+    @staticmethod
+    def direct(signals: Signals) -> Actuation:
+        """Commands that act at once."""
+        return Actuation((Actuator(),) * signals.n_u)
+
+    @staticmethod
+    def of(model: _core.Model, signals: Signals) -> Actuation:
+        """That of a model, with an actuator for each command even where all act at once."""
+        if not model.actuators:
+            return Actuation.direct(signals)
+        hidden = (HiddenState(tuple(of), squared, rest, time) for of, squared, rest, time in model.hidden)
+        return Actuation(tuple(Actuator(*actuator) for actuator in model.actuators), tuple(hidden))
+
+    def effects(self, signals: Signals, commands: Floats) -> list[Floats]:
+        """What arrives of commands (n, n_u), then hidden states, at the start, middle and end of each period."""
+        scales = np.array([command.size for command in signals.commands])
+        return _core.command_effects(self.actuators, self.hidden, scales, signals.dt, commands)
+
+    def bare(self) -> Actuation:
+        """The same without hidden states."""
+        return replace(self, hidden=())

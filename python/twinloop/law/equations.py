@@ -1,0 +1,266 @@
+"""A law as text: a legend of the conventions, shared parts, one equation a state; each constant with its ±."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.errors import InvalidInput
+from twinloop.law.actuation import Actuator
+from twinloop.law.expansion import Expansion, Polynomial, ordered, written
+from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
+from twinloop.law.law import Law
+from twinloop.law.spread import Spread, spreads
+from twinloop.law.writing import Term, Writer
+
+WIDTH = 100
+"""Columns of a line."""
+NOTE = 22
+"""Columns of a note behind an equation; longer ones stand below it."""
+LONG_NAME = 32
+"""Columns of a left side above which lines that go on do not begin under its equals sign."""
+EXACT = 17
+"""Digits that give every bit of a constant back."""
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Terms of an equation that share a constant, and what is noted behind them."""
+
+    terms: list[Term]
+    note: str = ""
+
+
+def equations(law: Law, members: Sequence[Law] = (), digits: int = 6) -> str:
+    """A law as text that SymPy reads, too.
+
+    Sums are multiplied out and like terms collected, unless every bit is asked for. A line that goes on begins with the
+    sign of its first term.
+
+    Args:
+        law: to be written.
+        members: of the committee; behind each constant stands its standard deviation over those that have its term.
+        digits: significant digits of constants; 17 give every bit back, as the program computes it and without ±.
+
+    Returns:
+        Lines of at most 100 columns, where the names of the signals allow it.
+
+    Raises:
+        InvalidInput: digits out of range.
+    """
+    if not 1 <= digits <= EXACT:
+        raise InvalidInput(f"Equations, digits: expected 1 to 17, found {digits}; 17 are exact.")
+    page = _Page(law, members, digits)
+    return "\n".join([*page.legend(), "", *page.body()])
+
+
+class _Page:
+    """One law on its way to text."""
+
+    def __init__(self, law: Law, members: Sequence[Law], digits: int) -> None:
+        self.law, self.signals = law, law.signals
+        self.exact = digits == EXACT
+        self.members = () if self.exact else tuple(members)
+        self.expressions = law.expressions if self.exact else Expressions()
+        self.polynomials: list[Polynomial] = []
+        if self.exact:
+            self.outputs = list(law.outputs)
+        else:
+            for place in range(law.inputs):
+                self.expressions.input(place)
+            self.polynomials = _expanded(law, self.expressions)
+            self.outputs = [written(self.expressions, polynomial) for polynomial in self.polynomials]
+        self.of_members = [_expanded(member, self.expressions) for member in self.members]
+        prefix = _unused("t", law.symbols)
+        self.writer = Writer(self.expressions, self.outputs, law.symbols, digits, prefix, self.exact)
+
+    # The legend
+
+    def legend(self) -> list[str]:
+        dt, signals = self.signals.dt, self.signals
+        kinds = {
+            "absolute": f"the state one period of {dt:g} s later",
+            "increment": f"the state one period of {dt:g} s later, as the state and what is added to it",
+            "acceleration": f"derivatives, integrated by one Runge-Kutta step of {dt:g} s",
+        }
+        units = ", ".join(f"{state.name} in {state.unit or 'units'}" for state in signals.states)
+        lines = [f"Form {self.law.form!r}: {kinds[self.law.form]}; {units}."]
+        lines += [
+            f"{symbol} = {command.name} / {self.writer.number(command.size)}, {command.name} in"
+            f" {command.unit or '1'}"
+            for symbol, command in zip(self.law.command_symbols, signals.commands, strict=True)
+            if symbol != command.name
+        ]
+        if self.writer.protected:
+            lines.append(f"a/b is protected: a / b where |b| > {SMALLEST_DIVISOR:g}, otherwise a")
+        if self.members:
+            lines.append(
+                f"±: standard deviation of a constant over the {len(self.members)} models of the committee, or"
+                " over as many of them as have the term, where a number of them is given"
+            )
+        lines += self._actuators() + self._offsets()
+        return [part for line in lines for part in _comment(line)]
+
+    def _actuators(self) -> list[str]:
+        """What stands between commands and their effect, one line for those that are alike."""
+        alike: dict[Actuator, list[int]] = {}
+        for place, actuator in enumerate(self.law.actuation.actuators):
+            if not actuator.direct:
+                alike.setdefault(actuator, []).append(place)
+        lines = []
+        for (lag, delay, rest), places in alike.items():
+            lags = [member.actuation.actuators[places[0]].lag for member in self.members]
+            parts = [f"a lag of {self.writer.number(lag)}{self._deviation(lags)} s"] if lag > 0.0 else []
+            parts += [f"a delay of {delay} period{'s' if delay > 1 else ''}"] if delay else []
+            start = "the first command" if rest is None else self.writer.number(rest)
+            names = ", ".join(self.signals.command_names[place] for place in places)
+            lines.append(f"{names}: act with {' and '.join(parts)}, from {start} at the start")
+        return lines
+
+    def _deviation(self, values: Sequence[float]) -> str:
+        return f" ± {np.std(values, ddof=1):.2g}" if len(values) > 1 else ""
+
+    def _offsets(self) -> list[str]:
+        return [
+            f"{name} is read {abs(offset):.3g} s {'later' if offset > 0.0 else 'earlier'} than the states that"
+            " outputs drive"
+            for name, offset in zip(self.signals.state_names, self.law.offsets, strict=True)
+            if offset != 0.0
+        ]
+
+    # The equations
+
+    def body(self) -> list[str]:
+        named = self.writer.names.items()
+        lines = [
+            line
+            for node, name in named
+            for line in _equation(name, [_Piece(self.writer.terms(node, define=True))])
+        ]
+        for left, pieces in self._states():
+            lines += _equation(left, pieces)
+        for number, name in enumerate(self.law.hidden_symbols):
+            lines += self._filling(name, number)
+        return lines
+
+    def _states(self) -> list[tuple[str, list[_Piece]]]:
+        names = self.signals.state_names
+        pieces = [self._pieces(output) for output in range(len(self.outputs))]
+        if self.law.form == "acceleration":
+            roots = self.law.derivatives()
+            turned = Writer(self.law.expressions, roots, self.law.symbols, EXACT, "", False)
+            return [
+                (f"d {name} / dt", pieces[self.signals.driven.index(place)])
+                if place in self.signals.driven
+                else (f"d {name} / dt", [_Piece(turned.terms(root))])
+                for place, (name, root) in enumerate(zip(names, roots, strict=True))
+            ]
+        if self.law.form == "increment":
+            bracket = [self._added(place) for place in range(len(names))]
+            return [(f"{name}[k+1]", piece) for name, piece in zip(names, bracket, strict=True)]
+        return [(f"{name}[k+1]", piece) for name, piece in zip(names, pieces, strict=True)]
+
+    def _added(self, place: int) -> list[_Piece]:
+        """A state, and what is added to it; the sum of that comes first, which rounding may show."""
+        name, pieces = self.signals.state_names[place], self._pieces(place)
+        if not self.exact:
+            return [_Piece([("+", name)]), *pieces]
+        return [_Piece([*pieces[0].terms, ("+", name)])]
+
+    def _pieces(self, output: int) -> list[_Piece]:
+        """An output, in pieces that share a constant where a committee stands behind it."""
+        if not self.members or not self.polynomials[output]:
+            return [_Piece(self.writer.terms(self.outputs[output]))]
+        found = spreads(
+            self.expressions,
+            self.polynomials[output],
+            [polynomials[output] for polynomials in self.of_members],
+        )
+        pieces: dict[tuple[str, str], list[Term]] = {}
+        terms = self.writer.terms(self.outputs[output])
+        for (monomial, coefficient), term in zip(ordered(self.polynomials[output]), terms, strict=True):
+            key = self.writer.number(abs(coefficient)), _note(found[monomial])
+            pieces.setdefault(key, []).append(term)
+        return [_Piece(terms, note) for (_, note), terms in pieces.items()]
+
+    def _filling(self, name: str, number: int) -> list[str]:
+        """The equation of a hidden state that commands fill."""
+        hidden = self.law.actuation.hidden[number]
+        symbols = [self.law.command_symbols[place] + "**2" * hidden.squared for place in hidden.commands]
+        share = len(symbols)
+        given = [("+", symbol if share == 1 else f"{symbol}/{share}") for symbol in symbols]
+        start = "from 0 at the start"
+        if hidden.rest is None:
+            rest = f"{name}_rest"
+            start += f"; {rest}: the terms before it in the first period"
+        else:
+            rest = self.writer.number(hidden.rest)
+        times = [member.actuation.hidden[number].time for member in self.members if self._alike(member)]
+        deviation = self._deviation(times)
+        note = f"{start}; its time {self.writer.number(hidden.time)}{deviation} s" if deviation else start
+        terms = [*given, ("-", rest), ("-", f"{name}/{self.writer.number(hidden.time)}")]
+        return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
+
+    def _alike(self, member: Law) -> bool:
+        """Whether a member has hidden states like those of the law."""
+        return len(member.actuation.hidden) == len(self.law.actuation.hidden)
+
+
+def _expanded(law: Law, target: Expressions) -> list[Polynomial]:
+    expansion = Expansion(law.expressions, target)
+    return [expansion.polynomial(output) for output in law.outputs]
+
+
+def _note(spread: Spread) -> str:
+    """± of the constants of a term, and how many members have it if not all do."""
+    having = "" if spread.having == spread.members else f" ({spread.having} of {spread.members})"
+    if spread.sds is None:
+        return having.strip()
+    coefficient, *inside = (f"± {sd:.2g}" for sd in spread.sds)
+    return coefficient + (f", inside {', '.join(inside)}" if inside else "") + having
+
+
+def _equation(left: str, pieces: Sequence[_Piece]) -> list[str]:
+    """Lines of one equation; where there are notes each piece begins a line, and its note stands behind its last."""
+    noted = any(piece.note for piece in pieces)
+    if not noted:
+        pieces = [_Piece([term for piece in pieces for term in piece.terms])]
+    room = WIDTH - (NOTE + len("  # ") if noted else 0)
+    indent = " " * (len(left) if len(left) < LONG_NAME else len("   "))
+    rows, notes, row = [], {}, f"{left} ="
+    for number, piece in enumerate(pieces):
+        for place, (sign, text) in enumerate(piece.terms):
+            first = number == place == 0
+            part = (text if sign == "+" else f"-{text}") if first else f"{sign} {text}"
+            if not first and row.strip() and len(row) + 1 + len(part) > room:
+                rows.append(row)
+                row = indent
+            row = f"{row} {part}"
+        notes[len(rows)] = piece.note
+        rows.append(row)
+        row = indent
+    column = 2 + max(len(rows[place]) for place in notes)
+    lines = []
+    for place, row in enumerate(rows):
+        note = notes.get(place)
+        if note and len(note) <= NOTE:
+            lines.append(f"{row:<{column}}# {note}")
+        else:
+            lines += (
+                [row, *(f"{indent} {line}" for line in _comment(note, len(indent) + 1))] if note else [row]
+            )
+    return lines
+
+
+def _comment(text: str, indent: int = 0) -> list[str]:
+    return textwrap.wrap(text, WIDTH - indent, initial_indent="# ", subsequent_indent="#   ")
+
+
+def _unused(prefix: str, taken: Sequence[str]) -> str:
+    """A prefix with which no name is made that is taken."""
+    while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in taken):
+        prefix += "_"
+    return prefix

@@ -1,0 +1,143 @@
+"""A law: the equations of a twin with all that makes a simulator of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from twinloop import _core
+from twinloop.errors import engine_input
+from twinloop.law.actuation import Actuation
+from twinloop.law.expressions import UPRIGHT, Expressions, Node
+from twinloop.signals import RigidBody, Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """Equations, kinematics, actuators, hidden states, sensors' offsets and the integrator of a twin.
+
+    The inputs of the expressions are the states, the effects of the commands in units of their scales, and the hidden
+    states. With the form "acceleration", outputs are the derivatives of the states that no others give, integrated by
+    one Runge-Kutta step of order four a period, to which effects and hidden states are known at its start, middle and
+    end; with "absolute" they are the next state, with "increment" what is added to the state, under the effects in the
+    middle of the period.
+
+    Args:
+        signals: of the system.
+        form: "absolute", "increment" or "acceleration".
+        expressions: where the equations are.
+        outputs: their nodes, in the order of the states that they drive.
+        actuation: actuators and hidden states.
+        offsets: by how much later than those of the driven states each state is read (n_x,), s.
+    """
+
+    signals: Signals
+    form: str
+    expressions: Expressions
+    outputs: tuple[int, ...]
+    actuation: Actuation
+    offsets: tuple[float, ...]
+
+    @staticmethod
+    def of(model: _core.Model, signals: Signals, offsets: Sequence[float] = ()) -> Law:
+        """The law of a model.
+
+        Args:
+            model: of the engine.
+            signals: what it is a model of.
+            offsets: of the sensors (n_x,), s; empty: none.
+
+        Returns:
+            Equations with the bits of the model's program.
+        """
+        expressions = Expressions()
+        outputs = expressions.entered(model.program)
+        actuation = Actuation.of(model, signals)
+        offsets = tuple(offsets) or (0.0,) * signals.n_x
+        return Law(signals, model.form, expressions, outputs, actuation, offsets)
+
+    def model(self) -> _core.Model:
+        """The engine's model of this law, which roll-outs run."""
+        program = self.expressions.program(self.outputs, self.inputs)
+        with engine_input():
+            return _core.Model(
+                program, self.form, self.signals.engine, self.actuation.actuators, self.actuation.hidden
+            )
+
+    @property
+    def inputs(self) -> int:
+        """States, commands and hidden states together."""
+        return self.signals.n_x + self.signals.n_u + len(self.actuation.hidden)
+
+    @cached_property
+    def command_symbols(self) -> tuple[str, ...]:
+        """What the equations call the effect of each command in units of its scale."""
+        return tuple(_scaled(command.name, command.size, self.signals) for command in self.signals.commands)
+
+    @cached_property
+    def hidden_symbols(self) -> tuple[str, ...]:
+        """What the equations call the hidden states."""
+        return tuple(hidden_names(self.signals, len(self.actuation.hidden)))
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """A name for each input of the equations."""
+        return (*self.signals.state_names, *self.command_symbols, *self.hidden_symbols)
+
+    def derivatives(self) -> tuple[int, ...]:
+        """With the form "acceleration", the node of each state's derivative (n_x,)."""
+        signals, remaining = self.signals, iter(self.outputs)
+        rates: dict[str | None, int] = {
+            state.derivative_of: self.expressions.input(place)
+            for place, state in enumerate(signals.states)
+            if state.derivative_of is not None
+        }
+        if signals.kinematics is not None:
+            rates |= _turning(self.expressions, signals, signals.kinematics)
+        return tuple(rates[name] if name in rates else next(remaining) for name in signals.state_names)
+
+
+def hidden_names(signals: Signals, count: int) -> list[str]:
+    """Symbols of hidden states, none of which is a signal's.
+
+    Args:
+        signals: of the system.
+        count: how many there are.
+
+    Returns:
+        As many names.
+    """
+    prefix = "hidden"
+    while any(name.startswith(prefix) for name in signals.state_names + signals.command_names):
+        prefix += "_"
+    return [prefix if count == 1 else f"{prefix}_{number + 1}" for number in range(count)]
+
+
+def _scaled(name: str, size: float, signals: Signals) -> str:
+    if size == 1.0:
+        return name
+    symbol = f"{name}_scaled"
+    while symbol in signals.state_names + signals.command_names:
+        symbol += "_"
+    return symbol
+
+
+def _turning(expressions: Expressions, signals: Signals, body: RigidBody) -> dict[str | None, int]:
+    """How body rates turn roll, pitch and yaw (z-y-x angles; Diebel 2006, equation 79)."""
+
+    def make(operation: str, *operands: int) -> int:
+        return expressions.enter(Node(operation, operands))
+
+    place = signals.state_names.index
+    roll, pitch, _ = (expressions.input(place(name)) for name in body.angles)
+    p, q, r = (expressions.input(place(name)) for name in body.rates)
+    sin, cos = make("sin", roll), make("cos", roll)
+    yawing = make("+", make("*", q, sin), make("*", r, cos))
+    upright = make(UPRIGHT, make("cos", pitch))
+    turned = make("/", make("*", yawing, make("sin", pitch)), upright)
+    return {
+        body.angles[0]: make("+", p, turned),
+        body.angles[1]: make("-", make("*", q, cos), make("*", r, sin)),
+        body.angles[2]: make("/", yawing, upright),
+    }

@@ -1,0 +1,187 @@
+"""Writes expressions as text that a person, Python and SymPy read alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from twinloop.law.expressions import BINARY, CONSTANT, INPUT, POWER, UPRIGHT, Expressions
+
+SUM, PRODUCT, HIGH, ATOM = 1, 2, 3, 4
+"""How tightly an expression binds."""
+LONGEST_PART = 60
+"""Characters above which a part of an expression gets a name."""
+WORTH_A_NAME = 24
+"""Characters above which a part that is written several times gets a name."""
+SPELLINGS = {"min": "Min", "max": "Max"}
+"""Functions whose name in SymPy is another than in a program."""
+
+Term = tuple[str, str]
+"""Sign, "+" or "-", and what is added or subtracted."""
+
+
+class Writer:
+    """Writes nodes; parts that are used several times, or are long, are written by name.
+
+    Args:
+        expressions: of which some are written.
+        roots: those, as sums of terms.
+        symbols: a name for each input.
+        digits: significant digits of constants; 17 are exact.
+        prefix: what the names of parts begin with.
+        every: whether each part that is used twice gets a name, however short.
+    """
+
+    def __init__(
+        self,
+        expressions: Expressions,
+        roots: Sequence[int],
+        symbols: Sequence[str],
+        digits: int,
+        prefix: str,
+        every: bool,
+    ) -> None:
+        self.expressions, self.symbols, self.digits = expressions, symbols, digits
+        self._texts: dict[int, tuple[str, int]] = {}
+        self.names: dict[int, str] = {}
+        """Of parts, in the order in which they must be defined."""
+        named = self._chosen(roots, every)
+        self.names = {number: f"{prefix}{i + 1}" for i, number in enumerate(sorted(named))}
+        self._texts = {}
+        # Without recursion on what is deep: operands come first.
+        for number in expressions.needed(roots):
+            self._texts[number] = self._composed(number)
+
+    @property
+    def protected(self) -> bool:
+        """Whether a division by something other than a constant is written."""
+        nodes = (self.expressions[number] for number in self._texts)
+        divisors = (self.expressions[n.operands[1]] for n in nodes if n.operation == "/")
+        return any(divisor.operation not in (CONSTANT, UPRIGHT) for divisor in divisors)
+
+    def number(self, value: float) -> str:
+        """A constant as text."""
+        return repr(value) if self.digits == 17 else f"{value:.{self.digits}g}"
+
+    def text(self, number: int) -> str:
+        """A node as text, by its name if it has one, without outer brackets."""
+        return self.names.get(number) or self._texts[number][0]
+
+    def terms(self, number: int, define: bool = False) -> list[Term]:
+        """What a node is the sum of, from left to right.
+
+        Args:
+            number: the node.
+            define: write what it stands for even if it has a name.
+
+        Returns:
+            The terms; the first one has a sign, too.
+        """
+        found: list[Term] = []
+        while self._is_plain_sum(number) or (define and self._is_sum(number)):
+            operation, operands, _ = self.expressions[number]
+            number, second = self._in_order(operation, operands)
+            sign, text = _signed(self._bracketed(second, PRODUCT))
+            found.append((sign if operation == "+" else _opposite(sign), text))
+            define = False
+        found.append(_signed(self._texts[number][0] if define else self.text(number)))
+        return found[::-1]
+
+    def _chosen(self, roots: Sequence[int], every: bool) -> set[int]:
+        """Parts that get a name; while they are chosen all are called alike."""
+        counts = self.expressions.counts(roots)
+        for number, count in counts.items():
+            operation, operands, _ = self.expressions[number]
+            self._texts[number] = self._composed(number)
+            if operation in (INPUT, CONSTANT):
+                continue
+            if operation in ("+", "-"):
+                # Where a sum stands at the left of another one, a line may be broken between its terms.
+                parts = [self._in_order(operation, operands)[1]]
+                long = len(self.text(parts[0])) > LONGEST_PART
+            else:
+                parts = sorted(set(operands), key=lambda operand: -len(self.text(operand)))
+                long = len(self._texts[number][0]) > LONGEST_PART
+            for part in parts:
+                if long and self.expressions[part].operation not in (INPUT, CONSTANT):
+                    self.names[part] = "t00"
+                    self._texts[number] = self._composed(number)
+                    long = operation not in ("+", "-") and len(self._texts[number][0]) > LONGEST_PART
+            if count > 1 and (every or self._pays(number)):
+                self.names[number] = "t00"
+        return set(self.names)
+
+    def _pays(self, number: int) -> bool:
+        """Whether a part that is used twice gets a name, where short ones do not."""
+        whole = self.expressions[number].operation not in ("*", "/", "+", "-", POWER)
+        return whole and len(self._texts[number][0]) > WORTH_A_NAME
+
+    def _composed(self, number: int) -> tuple[str, int]:
+        """A node as text of its operands, and how tightly it binds."""
+        operation, operands, value = self.expressions[number]
+        if operation == INPUT:
+            return self.symbols[int(value)], ATOM
+        if operation == CONSTANT:
+            return self.number(value), ATOM
+        if operation == UPRIGHT:
+            return self.text(operands[0]), ATOM
+        if operation == POWER:
+            return f"{self._bracketed(operands[0], ATOM)}**{int(value)}", HIGH
+        if operation == "sqrt":
+            return f"sqrt(abs({self.text(operands[0])}))", ATOM
+        if operation not in BINARY or operation in SPELLINGS:
+            inside = ", ".join(self.text(operand) for operand in operands)
+            return f"{SPELLINGS.get(operation, operation)}({inside})", ATOM
+        if operation in ("+", "-"):
+            return self._sum(operation, operands)
+        first, second = operands
+        if operation == "*" and self.expressions.constant_value(second) is not None:
+            first, second = second, first  # a product commutes to the bit
+        # The right operand keeps its brackets even where algebra would not need them: rounding does.
+        return f"{self._factor(first, PRODUCT)}{operation}{self._bracketed(second, HIGH)}", PRODUCT
+
+    def _sum(self, operation: str, operands: tuple[int, ...]) -> tuple[str, int]:
+        first, second = self._in_order(operation, operands)
+        if operation == "-" and self.expressions.constant_value(first) == 0.0:
+            text = self._bracketed(second, PRODUCT)
+            return f"-({text})" if text.startswith("-") else f"-{text}", SUM
+        sign, text = _signed(self._bracketed(second, PRODUCT))
+        sign = sign if operation == "+" else _opposite(sign)
+        return f"{self._factor(first, SUM)} {sign} {text}", SUM
+
+    def _in_order(self, operation: str, operands: tuple[int, ...]) -> tuple[int, int]:
+        """Operands of a sum as they are written: it commutes to the bit, a - b + c for c + (a - b)."""
+        first, second = operands
+        if operation == "+" and self._is_plain_sum(second) and not self._is_plain_sum(first):
+            return second, first
+        return first, second
+
+    def _is_plain_sum(self, number: int) -> bool:
+        """Whether a node is written as a sum where it stands."""
+        return number not in self.names and self._is_sum(number)
+
+    def _is_sum(self, number: int) -> bool:
+        """Whether a node is a sum, and not the negative of something."""
+        operation, operands, _ = self.expressions[number]
+        if operation not in ("+", "-"):
+            return False
+        return not (operation == "-" and self.expressions.constant_value(operands[0]) == 0.0)
+
+    def _factor(self, number: int, level: int) -> str:
+        """The first operand, that may begin with a sign."""
+        text, own = (self.names[number], ATOM) if number in self.names else self._texts[number]
+        return f"({text})" if own < level else text
+
+    def _bracketed(self, number: int, level: int) -> str:
+        """An operand that something stands before; a constant or a product may begin with a sign."""
+        text, own = (self.names[number], ATOM) if number in self.names else self._texts[number]
+        if text.startswith("-") and (level > PRODUCT or own < PRODUCT):
+            return f"({text})"
+        return f"({text})" if own < level else text
+
+
+def _signed(text: str) -> Term:
+    return ("-", text[1:]) if text.startswith("-") else ("+", text)
+
+
+def _opposite(sign: str) -> str:
+    return "+" if sign == "-" else "-"
