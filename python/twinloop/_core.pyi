@@ -8,6 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 _Floats = NDArray[np.float64]
 _Integers = NDArray[np.int64]
+_Instruction = tuple[str, int, int, int | float | None]
+"""(operation, destination, first, second): a register an int, a constant a float, no operand None."""
+_Counters = tuple[int, int, int, int, int, int]
+"""Seed, iteration, generation, evaluations, spared offspring, generations with a capped archive."""
 _Actuator = tuple[float, int, float | None]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
 _Hidden = tuple[Sequence[int], bool, float | None, float]
@@ -81,6 +85,9 @@ class Workers:
 class Program:
     """Pages of instructions over registers: inputs first, then outputs, then spare ones."""
 
+    def __new__(
+        cls, inputs: int, outputs: int, registers: int, pages: Sequence[Sequence[_Instruction]]
+    ) -> Program: ...
     @staticmethod
     def parse(text: str) -> Program: ...
     @property
@@ -92,8 +99,7 @@ class Program:
     @property
     def page_lengths(self) -> list[int]: ...
     @property
-    def instructions(self) -> list[tuple[str, int, int, int | float | None]]:
-        """(operation, destination, first, second): a register an int, a constant a float, no operand None."""
+    def instructions(self) -> list[_Instruction]: ...
     @property
     def intron_share(self) -> float: ...
     def effective(self) -> Program: ...
@@ -536,9 +542,25 @@ class ModelSearch:
         workers: Workers,
     ) -> ModelSearch:
         """A random population, evaluated, and its non-dominated set."""
+    @staticmethod
+    def restored(
+        grammar: Grammar,
+        form: str,
+        variation: Variation,
+        signals: Signals,
+        counters: _Counters,
+        population: Sequence[Program],
+        population_objectives: ArrayLike,
+        archive: Sequence[Program],
+        archive_objectives: ArrayLike,
+        workers: Workers,
+    ) -> ModelSearch:
+        """The search that these were read off."""
     def learn(self, selected: SelectedTests, workers: Workers) -> ModelSearch:
         """The same population and non-dominated set, judged on more tests: a new iteration, generation 0."""
     def advance(self, selected: SelectedTests, generations: int, workers: Workers) -> ModelSearch: ...
+    @property
+    def counters(self) -> _Counters: ...
     @property
     def iteration(self) -> int: ...
     @property
@@ -607,7 +629,26 @@ class TestSearch:
         workers: Workers,
     ) -> TestSearch:
         """A random population of tests over a committee whose first member is the best trade-off."""
+    @staticmethod
+    def restored(
+        committee: Sequence[Model],
+        family: Family,
+        task: Task,
+        signals: Signals,
+        settings: TestSettings,
+        variation: Variation,
+        counters: _Counters,
+        flat: bool,
+        population: ArrayLike,
+        population_objectives: ArrayLike,
+        archive: ArrayLike,
+        archive_objectives: ArrayLike,
+        workers: Workers,
+    ) -> TestSearch:
+        """The search that these were read off, over the same committee."""
     def advance(self, generations: int, workers: Workers) -> TestSearch: ...
+    @property
+    def counters(self) -> _Counters: ...
     @property
     def generation(self) -> int: ...
     @property
@@ -616,6 +657,11 @@ class TestSearch:
     def capped_generations(self) -> int: ...
     @property
     def archive_size(self) -> int: ...
+    @property
+    def population(self) -> _Floats:
+        """Genes (population, size)."""
+    @property
+    def population_objectives(self) -> _Floats: ...
     @property
     def archive_genes(self) -> _Floats: ...
     @property

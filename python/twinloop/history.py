@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.records import Recorded
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(Recorded, kind="experiment", given=("test",)):
     """One run on the system.
 
     Args:
@@ -53,7 +54,7 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class TestLoop:
+class TestLoop(Recorded, kind="test_loop"):
     """One turn of the test loop.
 
     Args:
@@ -83,7 +84,7 @@ class TestLoop:
 
 
 @dataclass(frozen=True)
-class Planned:
+class Planned(Recorded, kind="planned"):
     """A test that the preset `default` has proposed.
 
     Args:
@@ -112,7 +113,7 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class Lesson:
+class Lesson(Recorded, kind="lesson"):
     """One identification of the preset `default`, and the tests planned after it.
 
     Args:
@@ -157,7 +158,7 @@ class Lesson:
 
 
 @dataclass(frozen=True)
-class Iteration:
+class Iteration(Recorded, kind="iteration"):
     """One turn of the model loop, and the tests asked for after it; iteration 0 is the random population.
 
     Args:

@@ -2,35 +2,42 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop.arrays import Floats, floats, number, whole
 from twinloop.controllers import Family, UnboundFamily
-from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.identification.formulas import parsed_term
 from twinloop.identification.pool import Pool
 from twinloop.identification.told import told
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS, Quality, quality_of
 from twinloop.presets import AnyOptions, DefaultOptions, Options, options_of
+from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.search import grammar, settings_of_tests, variation
 from twinloop.signals import Signals
 
+MOST_STEPS = 10_000_000
+"""Of a test in a record."""
+
 
 @dataclass(frozen=True, eq=False)
-class Setup:
+class Setup(Recorded, kind="setup"):
     """The question of a campaign.
 
     Args:
         signals: of the system.
-        family: of the controllers.
+        controller: the family of controllers as it was described.
+        family: the same, bound to the signals.
         initial_state: where every test starts (n_x,), SI units, radians.
         target_state: where every test should end (n_x,), the same units.
         steps: of a test.
@@ -42,6 +49,7 @@ class Setup:
     """
 
     signals: Signals
+    controller: UnboundFamily
     family: Family
     initial_state: Floats
     target_state: Floats
@@ -56,6 +64,57 @@ class Setup:
     def task(self) -> _core.Task:
         """Start, target and length, for the native engine."""
         return _core.Task(self.initial_state, self.target_state, self.steps)
+
+    @classmethod
+    def recorded_fields(cls) -> tuple[str, ...]:
+        """Names of the fields that a record has, in order."""
+        return (
+            *("signals", "controller", "initial_state", "target_state", "steps"),
+            *("preset", "options", "seed", "goal", "quality"),
+        )
+
+    def to_record(self) -> Record:
+        """The arguments of the campaign, every option by name, those at their defaults too.
+
+        Raises:
+            NotAvailable: controllers without a plain form.
+        """
+        if not isinstance(self.controller, Recorded):
+            raise NotAvailable(
+                f"Campaign: expected controllers with a plain form, such as a PID, found"
+                f" {type(self.controller).__name__}, which cannot be written down; use one of twinloop.controllers."
+            )
+        options = {field.name: plain(getattr(self.options, field.name)) for field in _fields(self.options)}
+        named = {name: plain(getattr(self, name)) for name in self.recorded_fields()[:6]}
+        return {
+            **self._head(),
+            **named,
+            "options": options,
+            "seed": self.seed,
+            "goal": self.goal,
+            "quality": self.quality.kind,
+        }
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Setup:
+        found = checked_record(record, cls, cls.recorded_fields(), where)
+        signals = read(Signals, found["signals"], f"{where}.signals")
+        steps = read(int, found["steps"], f"{where}.steps")
+        if not 2 <= steps <= MOST_STEPS:
+            raise InvalidInput(f"Record {where}.steps: expected 2 to {MOST_STEPS}, found {steps}.")
+        return checked(
+            signals,
+            read(UnboundFamily, found["controller"], f"{where}.controller"),
+            read(Floats, found["initial_state"], f"{where}.initial_state"),
+            read(Floats, found["target_state"], f"{where}.target_state"),
+            steps * signals.dt,
+            read(str, found["preset"], f"{where}.preset"),
+            read(dict[str, Any], found["options"], f"{where}.options"),
+            read(int, found["seed"], f"{where}.seed"),
+            read(str, found["goal"], f"{where}.goal"),
+            read(str, found["quality"], f"{where}.quality"),
+            None,
+        )
 
     def none_selected(self) -> _core.SelectedTests:
         """No tests yet, for the native engine."""
@@ -128,7 +187,9 @@ def checked(
     chosen = options_of(preset, changes)
     purpose, measure = _purpose(preset, goal, quality, chosen, signals)
     family = controller.bind(signals)
-    setup = Setup(signals, family, start, target, steps, preset, chosen, known_seed, purpose, measure)
+    setup = Setup(
+        signals, controller, family, start, target, steps, preset, chosen, known_seed, purpose, measure
+    )
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
     for what, state in (("initial_state", start), ("target_state", target)):
@@ -210,6 +271,10 @@ def _check_inside(what: str, values: Floats, signals: Signals, margin: float) ->
                     f"{what}: expected {state.name} within {low + kept:g} to {high - kept:g} {state.unit}, its envelope"
                     f" less the margin of {margin:g}, found {value:g}; declare a wider envelope, or move it."
                 )
+
+
+def _fields(options: AnyOptions) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(options)
 
 
 def refuse_arguments(where: str, found: Mapping[str, object], known: Sequence[str]) -> None:

@@ -10,12 +10,13 @@ from keyword import iskeyword
 from twinloop import _core
 from twinloop.arrays import number
 from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.records import Recorded
 
 Bounds = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class State:
+class State(Recorded, kind="state"):
     """One component of the state.
 
     Args:
@@ -48,7 +49,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Command:
+class Command(Recorded, kind="command"):
     """One component of the command.
 
     Args:
@@ -82,7 +83,7 @@ class Command:
 
 
 @dataclass(frozen=True)
-class RigidBody:
+class RigidBody(Recorded, kind="rigid_body"):
     """A prior: three angles of a rigid body are turned by its three body rates.
 
     Args:
@@ -107,7 +108,7 @@ class RigidBody:
 
 
 @dataclass(frozen=True)
-class Signals:
+class Signals(Recorded, kind="signals"):
     """The states and commands of a system, and the period at which commands are sent.
 
     Args:

@@ -12,11 +12,12 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, whole
 from twinloop.controllers.family import Controller, Family
 from twinloop.errors import InvalidInput
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 
 @dataclass(frozen=True, eq=False)
-class Test:
+class Test(Recorded, kind="test", given=("family",)):
     """One candidate experiment; run it with `system.run(test)`, or by hand with `test.controller()`.
 
     Args:

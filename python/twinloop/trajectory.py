@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop.arrays import Floats, floats
 from twinloop.errors import InvalidInput, unknown
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 ENDINGS = ("completed", "aborted", "diverged")
@@ -16,7 +17,7 @@ JITTER = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Recorded, kind="trajectory"):
     """A recorded or simulated run of n steps; `commands[k]` is held from `t[k]` to `t[k + 1]`.
 
     Args:

@@ -3,7 +3,11 @@
 //! A search is a value. `advance` makes a new one out of an old one and its data, with the same bits for any number of
 //! threads and however its generations are cut into calls.
 
+mod snapshot;
+
 use std::sync::Arc;
+
+pub use snapshot::Snapshot;
 
 use crate::error::{Result, invalid};
 use crate::pareto::{Archive, Distance, LinearRanking, Objectives, Ranking, best_tradeoff};

@@ -32,7 +32,7 @@ pub use actuators::{Actuation, Actuator, effects};
 pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid, StateFeedback};
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};
-pub use evolution::{Problem, Search, Variation};
+pub use evolution::{Problem, Search, Snapshot, Variation};
 pub use flights::{
     Candidate, Disagreement, Draws, Envelope, Flights, Judged, Quality, QualityKind, disagreements, qualities,
 };

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::evolution::{Problem, Search, Variation};
+use crate::evolution::{Problem, Search, Snapshot, Variation};
 use crate::lgp::{Code, Grammar, Program};
 use crate::model::{Form, Frame, Model};
 use crate::objective::of_model;
 use crate::pareto::{crowding_distances, order};
 use crate::rng::{Purpose, Stream};
 use crate::selected::SelectedTests;
+use crate::signals::Signals;
 use crate::workers::Workers;
 
 /// A program and its effective part, found once.
@@ -89,11 +90,31 @@ impl ModelSearch {
     ) -> Result<Self> {
         some_test(selected)?;
         let (grammar, variation) = (grammar.validated()?, variation.validated()?);
-        let frame = Frame::new(form, selected.signals());
-        let empty = Program::new(grammar.shape, vec![])?;
-        Model::check(&empty, form, selected.signals(), 0)?;
+        let frame = frame(&grammar, form, selected.signals())?;
         let problem = Models { grammar: &grammar, frame: &frame, selected };
         let search = Search::start(&problem, &variation, seed, 1, workers);
+        Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), variation })
+    }
+
+    /// The search that a snapshot was taken of.
+    pub fn restored(
+        grammar: Grammar,
+        form: Form,
+        variation: Variation,
+        signals: &Signals,
+        snapshot: Snapshot<Learnt>,
+        workers: &Workers,
+    ) -> Result<Self> {
+        let (grammar, variation) = (grammar.validated()?, variation.validated()?);
+        let frame = frame(&grammar, form, signals)?;
+        let programs = snapshot.population.iter().chain(&snapshot.members);
+        programs.map(|learnt| &learnt.program).try_for_each(|program| grammar.check(program))?;
+        if !snapshot.objectives.columns().is_multiple_of(2) {
+            return crate::error::invalid(
+                "model search: expected two objectives a test, found an odd number",
+            );
+        }
+        let search = Search::restored(snapshot, &variation, workers)?;
         Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), variation })
     }
 
@@ -151,6 +172,13 @@ impl ModelSearch {
         let population = self.search.population();
         population.iter().map(|learnt| learnt.program.intron_share()).sum::<f64>() / population.len() as f64
     }
+}
+
+/// What makes programs of a grammar dynamics.
+fn frame(grammar: &Grammar, form: Form, signals: &Signals) -> Result<Frame> {
+    let empty = Program::new(grammar.shape, vec![])?;
+    Model::check(&empty, form, signals, 0)?;
+    Ok(Frame::new(form, signals))
 }
 
 fn some_test(selected: &SelectedTests) -> Result<()> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::controller::Family;
 use crate::error::{Result, invalid};
-use crate::evolution::{Problem, Search, Variation};
+use crate::evolution::{Problem, Search, Snapshot, Variation};
 use crate::model::{Frame, Model};
 use crate::model_loop::Learnt;
 use crate::objective::{discrimination, final_distances, instability};
@@ -54,6 +54,35 @@ struct Tests {
 }
 
 impl Tests {
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        committee: Vec<Arc<Learnt>>,
+        frame: Arc<Frame>,
+        family: Arc<Family>,
+        task: Task,
+        signals: &Signals,
+        settings: TestSettings,
+        seed: u64,
+        iteration: u64,
+    ) -> Result<Self> {
+        settings.check()?;
+        if committee.is_empty() {
+            return invalid("test search: expected a committee of one model or more, found none");
+        }
+        family.check(signals)?;
+        if task.target.len() != family.states() {
+            let (expected, found) = (family.states(), task.target.len());
+            return invalid(format!("test search: expected a task of {expected} states, found {found}"));
+        }
+        if task.distance() == 0.0 {
+            return invalid(
+                "test search: expected a target away from the initial state, found both the same",
+            );
+        }
+        let limits = signals.limits(settings.divergence_factor);
+        Ok(Self { committee, frame, family, task, limits, settings, seed, iteration })
+    }
+
     /// Final distances (models × candidates) on the first `models` members of the committee.
     fn distances(&self, models: usize, candidates: &[&[f64]], workers: &Workers) -> Vec<Vec<f64>> {
         let members = self.committee[..models].iter();
@@ -153,27 +182,41 @@ impl TestSearch {
         iteration: u64,
         workers: &Workers,
     ) -> Result<Self> {
-        settings.check()?;
         let variation = variation.validated()?;
-        if committee.is_empty() {
-            return invalid("test search: expected a committee of one model or more, found none");
-        }
-        family.check(signals)?;
-        if task.target.len() != family.states() {
-            let (expected, found) = (family.states(), task.target.len());
-            return invalid(format!("test search: expected a task of {expected} states, found {found}"));
-        }
-        if task.distance() == 0.0 {
-            return invalid(
-                "test search: expected a target away from the initial state, found both the same",
-            );
-        }
-        let limits = signals.limits(settings.divergence_factor);
-        let tests = Tests { committee, frame, family, task, limits, settings, seed, iteration };
+        let tests = Tests::new(committee, frame, family, task, signals, settings, seed, iteration)?;
         let search = Search::start(&tests, &variation, seed, iteration, workers);
         let candidates: Vec<&[f64]> = search.population().iter().map(|genome| &genome[..]).collect();
         let on_best = tests.distances(1, &candidates, workers).concat();
         let flat = on_best.iter().all(|distance| *distance == on_best[0]);
+        Ok(Self { search, tests: Arc::new(tests), variation, flat })
+    }
+
+    /// The search that a snapshot was taken of, over the same committee; `flat` as it was found at its start.
+    #[allow(clippy::too_many_arguments)]
+    pub fn restored(
+        committee: Vec<Arc<Learnt>>,
+        frame: Arc<Frame>,
+        family: Arc<Family>,
+        task: Task,
+        signals: &Signals,
+        settings: TestSettings,
+        variation: Variation,
+        snapshot: Snapshot<Vec<f64>>,
+        flat: bool,
+        workers: &Workers,
+    ) -> Result<Self> {
+        let variation = variation.validated()?;
+        let (seed, iteration) = (snapshot.seed, snapshot.iteration);
+        let tests = Tests::new(committee, frame, family, task, signals, settings, seed, iteration)?;
+        let parameters = tests.family.parameters();
+        if !snapshot.population.iter().chain(&snapshot.members).all(|genes| parameters.hold(genes)) {
+            return invalid("test search: expected genes within the bounds of the family, found others");
+        }
+        if snapshot.objectives.columns() != tests.objectives() {
+            let (expected, found) = (tests.objectives(), snapshot.objectives.columns());
+            return invalid(format!("test search: expected {expected} objectives, found {found}"));
+        }
+        let search = Search::restored(snapshot, &variation, workers)?;
         Ok(Self { search, tests: Arc::new(tests), variation, flat })
     }
 

@@ -10,7 +10,7 @@ use crate::arrays::{Matrix, to_integers, to_matrix, to_vector};
 use crate::error::{Result, misuse};
 
 /// The one door at which numbers that are not finite are refused.
-fn matrix(array: &Matrix<'_>) -> Result<Objectives> {
+pub fn matrix(array: &Matrix<'_>) -> Result<Objectives> {
     let array = array.as_array();
     Ok(Objectives::new(array.ncols(), array.iter().copied().collect())?)
 }

@@ -5,11 +5,13 @@ use std::sync::Arc;
 use numpy::PyArray2;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
-use twinloop_core::{Grammar, Learnt, Operand, Operation, Program, Purpose, Shape, Stream, run_rows};
+use pyo3::types::{PyFloat, PyTuple};
+use twinloop_core::{
+    Grammar, Instruction, Learnt, Operand, Operation, Page, Program, Purpose, Shape, Stream, run_rows,
+};
 
 use crate::arrays::{Matrix, rows, to_matrix, views};
-use crate::error::Result;
+use crate::error::{Result, misuse};
 use crate::workers::{PyWorkers, or_default};
 
 /// Pages of instructions over registers: inputs first, then outputs, then spare ones.
@@ -28,8 +30,28 @@ impl From<Program> for PyProgram {
     }
 }
 
+/// Operation, destination, first operand, second operand, as `PyProgram::instructions` gives them.
+type InstructionParts<'py> = (String, i64, i64, Option<Bound<'py, PyAny>>);
+
 #[pymethods]
 impl PyProgram {
+    #[new]
+    fn new(
+        inputs: usize,
+        outputs: usize,
+        registers: usize,
+        pages: Vec<Vec<InstructionParts<'_>>>,
+    ) -> Result<Self> {
+        let Some(spare) = registers.checked_sub(inputs.saturating_add(outputs)) else {
+            return Err(misuse(format!(
+                "program: expected registers for {inputs} inputs and {outputs} outputs, found {registers}"
+            )));
+        };
+        let shape = Shape::new(inputs, outputs, spare)?;
+        let page = |page: Vec<_>| Ok(Page(page.into_iter().map(instruction).collect::<Result<_>>()?));
+        Ok(Program::new(shape, pages.into_iter().map(page).collect::<Result<_>>()?)?.into())
+    }
+
     #[staticmethod]
     fn parse(text: &str) -> Result<Self> {
         Ok(text.parse::<Program>()?.into())
@@ -102,6 +124,26 @@ impl PyProgram {
     fn __repr__(&self) -> String {
         format!("<Program of {} instructions, {} of them effective>", self.0.program.len(), self.0.code.len())
     }
+}
+
+fn instruction((operation, destination, first, second): InstructionParts<'_>) -> Result<Instruction> {
+    let operand = |value: Bound<'_, PyAny>| -> Result<Operand> {
+        match value.cast::<PyFloat>() {
+            Ok(constant) => Ok(Operand::Constant(constant.value())),
+            Err(_) => Ok(Operand::Register(register(value.extract().unwrap_or(-1))?)),
+        }
+    };
+    Ok(Instruction {
+        operation: operation.parse()?,
+        destination: register(destination)?,
+        first: register(first)?,
+        second: second.map(operand).transpose()?,
+    })
+}
+
+fn register(number: i64) -> Result<u16> {
+    let register = u16::try_from(number);
+    register.map_err(|_| misuse(format!("instruction: expected the number of a register, found {number}")))
 }
 
 /// What programs may look like and how they vary.

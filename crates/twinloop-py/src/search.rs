@@ -5,13 +5,15 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::pareto::Objectives;
-use twinloop_core::{Frame, ModelSearch, Signals, TestSearch, TestSettings, Variation};
+use twinloop_core::{
+    Frame, Learnt, ModelSearch, Search, Signals, Snapshot, TestSearch, TestSettings, Variation,
+};
 
-use crate::arrays::{to_matrix, to_vector};
+use crate::arrays::{Matrix, rows, to_matrix, to_vector};
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
 use crate::model::{PyModel, PySignals};
-use crate::pareto::distance;
+use crate::pareto::{distance, matrix as objectives_of};
 use crate::program::{PyGrammar, PyProgram};
 use crate::rollout::PyTask;
 use crate::selected::PySelectedTests;
@@ -72,6 +74,42 @@ impl PyModelSearch {
     }
 }
 
+/// Seed, iteration, generation, evaluations, spared, generations with a capped archive.
+type Counters = (u64, u64, u64, u64, u64, u64);
+
+fn counters<G: Send + Sync>(search: &Search<G>) -> Counters {
+    (
+        search.seed(),
+        search.iteration(),
+        search.generation(),
+        search.evaluations(),
+        search.spared(),
+        search.capped_generations(),
+    )
+}
+
+fn snapshot<G>(
+    (seed, iteration, generation, evaluations, spared, capped_generations): Counters,
+    population: Vec<Arc<G>>,
+    objectives: &Matrix<'_>,
+    members: Vec<Arc<G>>,
+    points: &Matrix<'_>,
+) -> Result<Snapshot<G>> {
+    let (objectives, points) = (objectives_of(objectives)?, objectives_of(points)?);
+    Ok(Snapshot {
+        seed,
+        iteration,
+        generation,
+        evaluations,
+        spared,
+        capped_generations,
+        population,
+        objectives,
+        members,
+        points,
+    })
+}
+
 /// Objectives as an array.
 fn array<'py>(py: Python<'py>, objectives: &Objectives) -> Bound<'py, PyArray2<f64>> {
     to_matrix(py, objectives.columns(), objectives.rows().flatten().copied().collect())
@@ -95,6 +133,30 @@ impl PyModelSearch {
         Ok(Self { search, signals: selected.0.signals().clone() })
     }
 
+    #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "what a search is made with, and what it consists of")]
+    fn restored(
+        grammar: &PyGrammar,
+        form: &str,
+        variation: &PyVariation,
+        signals: &PySignals,
+        counters: Counters,
+        population: Vec<Bound<'_, PyProgram>>,
+        population_objectives: Matrix<'_>,
+        archive: Vec<Bound<'_, PyProgram>>,
+        archive_objectives: Matrix<'_>,
+        workers: &PyWorkers,
+    ) -> Result<Self> {
+        let learnt = |programs: Vec<Bound<'_, PyProgram>>| -> Vec<Arc<Learnt>> {
+            programs.iter().map(|program| program.get().0.clone()).collect()
+        };
+        let (population, members) = (learnt(population), learnt(archive));
+        let parts = snapshot(counters, population, &population_objectives, members, &archive_objectives)?;
+        let (grammar, form, variation) = (grammar.0.clone(), form.parse()?, variation.0.clone());
+        let search = ModelSearch::restored(grammar, form, variation, &signals.0, parts, &workers.0)?;
+        Ok(Self { search, signals: signals.0.clone() })
+    }
+
     fn learn(&self, py: Python<'_>, selected: &PySelectedTests, workers: &PyWorkers) -> Result<Self> {
         let search = py.detach(|| self.search.clone().learn(&selected.0, &workers.0))?;
         Ok(Self { search, signals: self.signals.clone() })
@@ -109,6 +171,11 @@ impl PyModelSearch {
     ) -> Result<Self> {
         let search = py.detach(|| self.search.clone().advance(&selected.0, generations, &workers.0))?;
         Ok(Self { search, signals: self.signals.clone() })
+    }
+
+    #[getter]
+    fn counters(&self) -> Counters {
+        counters(self.search.search())
     }
 
     #[getter]
@@ -237,13 +304,7 @@ impl PyTestSearch {
         iteration: u64,
         workers: &PyWorkers,
     ) -> Result<Self> {
-        let frame = one_frame(&committee)?;
-        if !frame.fits(&signals.0) {
-            return Err(misuse(
-                "committee: expected models with the states and commands of the signals".into(),
-            ));
-        }
-        let committee = committee.iter().map(|model| model.get().learnt.clone()).collect();
+        let (committee, frame) = judges(&committee, signals)?;
         let (family, task, settings, variation) =
             (family.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
         let search = py.detach(|| {
@@ -254,8 +315,44 @@ impl PyTestSearch {
         Ok(Self(search))
     }
 
+    #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "what a search is made with, and what it consists of")]
+    fn restored(
+        committee: Vec<Bound<'_, PyModel>>,
+        family: &PyFamily,
+        task: &PyTask,
+        signals: &PySignals,
+        settings: &PyTestSettings,
+        variation: &PyVariation,
+        counters: Counters,
+        flat: bool,
+        population: Matrix<'_>,
+        population_objectives: Matrix<'_>,
+        archive: Matrix<'_>,
+        archive_objectives: Matrix<'_>,
+        workers: &PyWorkers,
+    ) -> Result<Self> {
+        let (committee, frame) = judges(&committee, signals)?;
+        let (family, task, settings, variation) =
+            (family.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
+        let genes = |genes: &Matrix<'_>| -> Result<Vec<Arc<Vec<f64>>>> {
+            Ok(rows("genes", genes, family.parameters().len())?.into_iter().map(Arc::new).collect())
+        };
+        let (population, members) = (genes(&population)?, genes(&archive)?);
+        let parts = snapshot(counters, population, &population_objectives, members, &archive_objectives)?;
+        let search = TestSearch::restored(
+            committee, frame, family, task, &signals.0, settings, variation, parts, flat, &workers.0,
+        )?;
+        Ok(Self(search))
+    }
+
     fn advance(&self, py: Python<'_>, generations: u64, workers: &PyWorkers) -> Self {
         Self(py.detach(|| self.0.clone().advance(generations, &workers.0)))
+    }
+
+    #[getter]
+    fn counters(&self) -> Counters {
+        counters(self.0.search())
     }
 
     #[getter]
@@ -280,9 +377,17 @@ impl PyTestSearch {
 
     #[getter]
     fn archive_genes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let members = self.0.search().archive().members();
-        let genes: Vec<f64> = members.iter().flat_map(|genes| genes.iter().copied()).collect();
-        to_matrix(py, genes.len() / members.len(), genes)
+        to_genes(py, self.0.search().archive().members())
+    }
+
+    #[getter]
+    fn population<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        to_genes(py, self.0.search().population())
+    }
+
+    #[getter]
+    fn population_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        array(py, self.0.search().objectives())
     }
 
     #[getter]
@@ -309,6 +414,20 @@ impl PyTestSearch {
     fn flat(&self) -> bool {
         self.0.flat()
     }
+}
+
+/// Genes of at least one test as an array, a row each.
+fn to_genes<'py>(py: Python<'py>, tests: &[Arc<Vec<f64>>]) -> Bound<'py, PyArray2<f64>> {
+    to_matrix(py, tests[0].len(), tests.iter().flat_map(|genes| genes.iter().copied()).collect())
+}
+
+/// The committee of a test search, with the frame that its models share.
+fn judges(committee: &[Bound<'_, PyModel>], signals: &PySignals) -> Result<(Vec<Arc<Learnt>>, Arc<Frame>)> {
+    let frame = one_frame(committee)?;
+    if !frame.fits(&signals.0) {
+        return Err(misuse("committee: expected models with the states and commands of the signals".into()));
+    }
+    Ok((committee.iter().map(|model| model.get().learnt.clone()).collect(), frame))
 }
 
 /// The frame that all models share.

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from twinloop.arrays import Floats, floats, number
 from twinloop.errors import InvalidInput
+from twinloop.records import Recorded
 
 
 @dataclass(frozen=True, eq=False)
-class Mixer:
+class Mixer(Recorded, kind="mixer"):
     """command = clip(sign(v) |v| ** power), v = matrix u + offset, with u one entry an axis.
 
     Args:

@@ -10,6 +10,7 @@ from twinloop.controllers.bounds import GainBounds, bounds_by_name, gain_units
 from twinloop.controllers.family import Family, Gain
 from twinloop.controllers.mixer import Mixer, check_output
 from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 TERMS = ("kp", "ki", "kd")
@@ -17,7 +18,7 @@ Axis = tuple[str, "str | None"]
 
 
 @dataclass(frozen=True, eq=False)
-class PID:
+class PID(Recorded, kind="pid"):
     """u = K_P e + K_I ∫e − K_D rate on every axis, where e = target − angle.
 
     The integral is updated before it is used. There is no anti-windup.

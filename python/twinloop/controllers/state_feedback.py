@@ -10,11 +10,12 @@ from twinloop.controllers.bounds import GainBounds, bounds_by_name, gain_bounds,
 from twinloop.controllers.family import Family, Gain
 from twinloop.controllers.mixer import Mixer, check_output
 from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 
 @dataclass(frozen=True, eq=False)
-class StateFeedback:
+class StateFeedback(Recorded, kind="state_feedback"):
     """u = K (target − x) + K_I ∫(target − x): every output answers the error of every state.
 
     The gain of "roll" on the first output is called "roll->u1", or "roll->torque" where there is no mixer and

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 Motion = tuple[float, float, float]
@@ -16,7 +17,7 @@ QUIET: Motion = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class Chain(Recorded, kind="chain"):
     """The states behind one output, and the noise of their sensors and of their motion.
 
     Args:

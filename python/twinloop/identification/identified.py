@@ -8,17 +8,19 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.errors import InvalidInput
 from twinloop.identification.chains import Chain
 from twinloop.identification.noise import exact
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum
 from twinloop.law.actuation import Actuation
 from twinloop.models import Noise
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 
 @dataclass(eq=False)
-class Identified:
+class Identified(Recorded, kind="identified"):
     """What was learnt from runs.
 
     Args:
@@ -50,6 +52,41 @@ class Identified:
     energy: float
     of_parts: bool = False
     remarks: list[str] = field(default_factory=list)
+
+    @classmethod
+    def from_record(cls, record: object, *given: object) -> Identified:
+        """What a record was written of.
+
+        Args:
+            record: such as `to_record` gives, or JSON gives back.
+            given: the signals of the system.
+
+        Returns:
+            The same, to the bit.
+
+        Raises:
+            InvalidInput: another kind, a newer version, an unknown or missing key, or values that do not fit together.
+        """
+        found = super().from_record(record, *given)
+        signals = next(value for value in given if isinstance(value, Signals))
+        states = {
+            state for chain in (*found.chains, *(sum_.chain for sum_ in found.sums)) for state in chain.states
+        }
+        subsets = [subset for sum_ in found.sums for subset in (sum_.weights, *(s for s, _ in sum_.others))]
+        fits = (
+            all(0 <= state < signals.n_x for state in states)
+            and all(0 <= node < len(found.pool) for subset in subsets for node in subset)
+            and found.offsets.shape == (signals.n_x,)
+            and len(found.actuation.actuators) == signals.n_u
+            and found.pool.inputs == signals.n_x + signals.n_u
+            and len(found.members) > 0
+        )
+        if not fits:
+            raise InvalidInput(
+                "Record identified: expected states, commands and nodes that there are, found others; it belongs to"
+                " other signals, or is damaged."
+            )
+        return found
 
     @property
     def terms(self) -> int:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.errors import InvalidInput, unknown
+from twinloop.records import Record, Recorded, checked_record, plain, read
 
 Node = tuple[str, int, "int | float | None"]
 """(operation, operand, second operand): a number of a node, a constant, or None under a unary operation.
@@ -15,12 +18,18 @@ Node = tuple[str, int, "int | float | None"]
 ("hidden", i, None) is a hidden state by its number: a further input, where a model has one.
 """
 
+Instruction = tuple[str, int, int, "int | float | None"]
+"""(operation, destination, first operand, second operand): a register an int, a constant a float."""
+
 UNARY = ("abs", "sqrt", "sin", "cos", "tanh", "exp")
+BINARY = ("+", "-", "*", "/", "min", "max")
 ONE = ("one", 0, None)
 """The node whose value is 1 everywhere."""
+MOST_LEAVES = 10_000
+"""Inputs and constants of one expression: a record with more is refused, for it would never be worked through."""
 
 
-class Pool:
+class Pool(Recorded, kind="pool"):
     """Nodes by number; operands come before what uses them. The first ones are the inputs.
 
     `rungs` says on which rung of the ladder a term stands; `found`, what an expression costs (nats) that was read off a
@@ -44,6 +53,47 @@ class Pool:
 
     def __len__(self) -> int:
         return self.inputs + len(self.nodes)
+
+    @classmethod
+    def recorded_fields(cls) -> tuple[str, ...]:
+        """Names of the fields that a record has, in order."""
+        return "inputs", "operations", "nodes", "rungs", "found"
+
+    def to_record(self) -> Record:
+        """The pool as numbers, texts, lists and dicts; a constant is {"constant": value}, for 2 is a node."""
+        return {
+            **self._head(),
+            "inputs": self.inputs,
+            "operations": self.operations,
+            "nodes": [
+                [operation, a, {"constant": plain(b)} if isinstance(b, float) else b]
+                for operation, a, b in self.nodes
+            ],
+            "rungs": [[number, rung] for number, rung in self.rungs.items()],
+            "found": [[number, plain(price)] for number, price in self.found.items()],
+        }
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Pool:
+        found = checked_record(record, cls, cls.recorded_fields(), where)
+        pool = cls(
+            _below(1 << 12, read(int, found["inputs"], f"{where}.inputs"), where),
+            _below(2**31, read(int, found["operations"], f"{where}.operations"), where),
+        )
+        leaves = [1] * pool.inputs
+        for i, node in enumerate(read(list[Any], found["nodes"], f"{where}.nodes")):
+            at = f"{where}.nodes[{i}]"
+            entered = _node(node, pool.inputs + i, at)
+            if pool.add(entered) != pool.inputs + i:
+                raise InvalidInput(f"Record {at}: expected 1 first and each node once, found another order.")
+            leaves.append(1 + sum(leaves[operand] for operand in pool.operands(pool.inputs + i)))
+            if leaves[-1] > MOST_LEAVES:
+                raise InvalidInput(f"Record {at}: expected an expression of {MOST_LEAVES} parts at most.")
+        pool.rungs = read(dict[int, int], found["rungs"], f"{where}.rungs")
+        pool.found = read(dict[int, float], found["found"], f"{where}.found")
+        for number in (*pool.rungs, *pool.found):
+            _below(len(pool), number, where)
+        return pool
 
     def add(self, node: Node) -> int:
         """The number of a node, new or known; sums and products do not depend on the order of operands.
@@ -206,9 +256,8 @@ class Pool:
             return np.ascontiguousarray(rows[:, [self._input(number) for number in numbers]])
         inputs = rows.shape[1]
         place = {number: i for i, number in enumerate(order)}
-        lines = [self._instruction(number, place, inputs) for number in order]
-        text = _text(inputs, len(order), inputs + len(order), lines)
-        computed = _core.Program.parse(text).run(rows)
+        page = [self._instruction(number, place, inputs) for number in order]
+        computed = _core.Program(inputs, len(order), inputs + len(order), [page]).run(rows)
         columns = [rows[:, self._input(n)] if self._is_input(n) else computed[:, place[n]] for n in numbers]
         return np.ascontiguousarray(np.stack(columns, axis=1))
 
@@ -227,39 +276,52 @@ class Pool:
         first = inputs + len(outputs)
         place = {number: i for i, number in enumerate(order)}
         spare = first + len(order)
-        lines = [self._instruction(number, place, first) for number in order]
+        page = [self._instruction(number, place, first) for number in order]
         for i, terms in enumerate(outputs):
             target, started = inputs + i, False
             for number, weight in terms.items():
                 if number == self.one:
-                    lines.append(f"r{target} = r{target} + {float(weight)!r}")
+                    page.append(("+", target, target, float(weight)))
                 elif not started:
-                    lines.append(f"r{target} = {self._register(number, place, first)} * {float(weight)!r}")
+                    page.append(("*", target, self._register(number, place, first), float(weight)))
                 else:
-                    lines.append(f"r{spare} = {self._register(number, place, first)} * {float(weight)!r}")
-                    lines.append(f"r{target} = r{target} + r{spare}")
+                    page.append(("*", spare, self._register(number, place, first), float(weight)))
+                    page.append(("+", target, target, spare))
                 started = True
-        return _core.Program.parse(_text(inputs, len(outputs), spare + 1, lines))
+        return _core.Program(inputs, len(outputs), spare + 1, [page])
 
-    def _register(self, number: int, place: Mapping[int, int], first: int) -> str:
+    def _register(self, number: int, place: Mapping[int, int], first: int) -> int:
         """Where a node is found, where those that are computed stand from a first register on."""
-        return f"r{self._input(number) if self._is_input(number) else first + place[number]}"
+        return self._input(number) if self._is_input(number) else first + place[number]
 
-    def _instruction(self, number: int, place: Mapping[int, int], first: int) -> str:
+    def _instruction(self, number: int, place: Mapping[int, int], first: int) -> Instruction:
         node = self.node(number)
         assert node is not None
         operation, a, b = node
         target = self._register(number, place, first)
         if node == ONE:
-            return f"{target} = {target} + 1.0"
-        if operation in UNARY:
-            return f"{target} = {operation}({self._register(a, place, first)})"
-        second = self._register(b, place, first) if isinstance(b, int) else repr(float(b or 0.0))
-        if operation in ("min", "max"):
-            return f"{target} = {operation}({self._register(a, place, first)}, {second})"
-        return f"{target} = {self._register(a, place, first)} {operation} {second}"
+            return "+", target, target, 1.0
+        second = self._register(b, place, first) if isinstance(b, int) else b
+        return operation, target, self._register(a, place, first), second
 
 
-def _text(inputs: int, outputs: int, registers: int, lines: Sequence[str]) -> str:
-    body = "\n".join(f"  {line}" for line in lines)
-    return f"program inputs={inputs} outputs={outputs} registers={registers}\npage 1\n{body}\n"
+def _node(value: object, number: int, where: str) -> Node:
+    """A node from its plain form; operands come before it."""
+    operation, a, b = read(tuple[str, int, Any], value, where)
+    if operation == "one" and (a, b) == (0, None):
+        return ONE
+    if operation == "hidden" and b is None:
+        return operation, _below(2**31, a, where), None
+    if operation in UNARY and b is None:
+        return operation, _below(number, a, where), None
+    if operation not in BINARY:
+        raise unknown(f"operation in the record {where}", operation, (*BINARY, *UNARY, "one", "hidden"))
+    if isinstance(b, Mapping) and set(b) == {"constant"}:
+        return operation, _below(number, a, where), read(float, b["constant"], f"{where}.constant")
+    return operation, _below(number, a, where), _below(number, read(int, b, where), where)
+
+
+def _below(limit: int, number: int, where: str) -> int:
+    if not 0 <= number < limit:
+        raise InvalidInput(f"Record {where}: expected a number from 0 to {limit - 1}, found {number}.")
+    return number

@@ -16,6 +16,7 @@ from twinloop.identification.chains import Chain
 from twinloop.identification.noise import floor_of
 from twinloop.identification.pool import Pool
 from twinloop.identification.problem import Problem
+from twinloop.records import Recorded
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
@@ -39,7 +40,7 @@ RUNG = 20.0
 
 
 @dataclass(eq=False)
-class Sum:
+class Sum(Recorded, kind="sum"):
     """A sum of terms that drives a chain.
 
     Args:

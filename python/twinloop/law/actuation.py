@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 
@@ -50,7 +51,7 @@ class HiddenState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Actuation:
+class Actuation(Recorded, kind="actuation"):
     """What a model sees of commands: their effects, then the states that they fill.
 
     Args:

@@ -15,6 +15,7 @@ from twinloop.flight import fly
 from twinloop.signals import Command, Signals, State
 from twinloop.systems.base import System
 from twinloop.systems.gusts import as_disturbance, gust_accelerations
+from twinloop.systems.repeatable import Repeatable
 from twinloop.systems.sensors import attitude_noise, run_stream
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
@@ -29,7 +30,7 @@ GUSTS = 1
 """Which of a run's streams the gusts are drawn from; the sensors' own stream does not know of them."""
 
 
-class Quadrotor(System):
+class Quadrotor(Repeatable, System, kind="quadrotor"):
     """Six states (three angles, three rates), four rotor speeds, 20 ms a command, the paper's task of 2 s.
 
     The constants are those of the OS4 (S. Bouabdallah, EPFL thesis, 2007); the paper's own are not public.

@@ -17,6 +17,7 @@ from twinloop.flight import fly
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems.base import System
 from twinloop.systems.quadrotor import ANGLES, gains_from_frequency
+from twinloop.systems.repeatable import Repeatable
 from twinloop.systems.sensors import attitude_noise, run_stream
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
@@ -33,7 +34,7 @@ FIRST_INTEGRAL = 0.5
 """K_I of the first controller over the axis's inertia, 1/s³."""
 
 
-class RotorPy(System):
+class RotorPy(Repeatable, System, kind="rotorpy"):
     """Roll, pitch, yaw and body rates under four commanded rotor speeds, 20 ms a command, 2 s.
 
     The vehicle is RotorPy's own object with its published parameters: lagging motors, drag of body and
@@ -55,9 +56,9 @@ class RotorPy(System):
     def __init__(self, vehicle: str = "hummingbird", *, noise: float = 0.0, seed: int = 0) -> None:
         if vehicle not in VEHICLES:
             raise unknown("vehicle of RotorPy", vehicle, VEHICLES)
-        self.vehicle = vehicle
         self.noise = at_least_zero("RotorPy, noise (rad)", noise)
         self.seed = whole("RotorPy, seed", seed)
+        self.vehicle = vehicle
         self.runs = 0
         self._multirotor = _multirotor(vehicle)
         self.inertia = np.diag(self._multirotor.inertia).copy()

@@ -75,6 +75,12 @@ impl Parameters {
         self.0.is_empty()
     }
 
+    /// Whether a vector has a value for each parameter, within its bounds.
+    pub fn hold(&self, values: &[f64]) -> bool {
+        let within = |(interval, value): (&Interval, &f64)| (interval.low..=interval.high).contains(value);
+        values.len() == self.len() && self.0.iter().zip(values).all(within)
+    }
+
     /// A vector drawn uniformly, on each parameter's scale.
     pub fn uniform(&self, stream: &mut Stream) -> Vec<f64> {
         self.0.iter().map(|interval| interval.at(stream.uniform())).collect()

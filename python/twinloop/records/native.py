@@ -1,0 +1,88 @@
+"""Plain forms of what the native module holds: programs as their text, models as programs in a form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from twinloop import _core
+from twinloop.errors import InvalidInput, engine_input
+from twinloop.records.reading import (
+    keys,
+    read_flag,
+    read_list,
+    read_number,
+    read_text,
+    read_whole,
+)
+
+MODEL_KEYS = ("program", "form", "actuators", "hidden")
+ACTUATOR_KEYS = ("lag", "delay", "rest")
+HIDDEN_KEYS = ("commands", "squared", "rest", "time")
+
+
+def read_program(value: object, where: str) -> _core.Program:
+    """A program from its text."""
+    text = read_text(value, where)
+    with engine_input():
+        return _core.Program.parse(text)
+
+
+def model_record(model: _core.Model) -> dict[str, Any]:
+    """A model without its signals: program, form, lags and delays of each command, hidden states."""
+    return {
+        "program": str(model.program),
+        "form": model.form,
+        "actuators": [dict(zip(ACTUATOR_KEYS, actuator, strict=True)) for actuator in model.actuators],
+        "hidden": [dict(zip(HIDDEN_KEYS, hidden, strict=True)) for hidden in model.hidden],
+    }
+
+
+def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Model:
+    """The model that a record was written of, over the signals that are given."""
+    engines = (getattr(value, "engine", None) for value in given)
+    signals = next((engine for engine in engines if isinstance(engine, _core.Signals)), None)
+    if signals is None:
+        raise InvalidInput(
+            f"Record {where}: expected the signals of the model beside the record, found none; pass them."
+        )
+    found = keys(value, MODEL_KEYS, where)
+    program = read_program(found["program"], f"{where}.program")
+    actuators = [
+        _actuator(item, f"{where}.actuators[{i}]")
+        for i, item in enumerate(read_list(found["actuators"], f"{where}.actuators"))
+    ]
+    hidden = [
+        _hidden(item, f"{where}.hidden[{i}]")
+        for i, item in enumerate(read_list(found["hidden"], f"{where}.hidden"))
+    ]
+    with engine_input():
+        form = read_text(found["form"], f"{where}.form")
+        return _core.Model(program, form, signals, actuators or None, hidden)
+
+
+def _actuator(value: object, where: str) -> tuple[float, int, float | None]:
+    found = keys(value, ACTUATOR_KEYS, where)
+    delay = read_whole(found["delay"], f"{where}.delay")
+    return read_number(found["lag"], f"{where}.lag"), _count(delay, where), _rest(found["rest"], where)
+
+
+def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, float]:
+    found = keys(value, HIDDEN_KEYS, where)
+    commands = [
+        _count(read_whole(item, where), where) for item in read_list(found["commands"], f"{where}.commands")
+    ]
+    squared, time = (
+        read_flag(found["squared"], f"{where}.squared"),
+        read_number(found["time"], f"{where}.time"),
+    )
+    return commands, squared, _rest(found["rest"], where), time
+
+
+def _rest(value: object, where: str) -> float | None:
+    return None if value is None else read_number(value, f"{where}.rest")
+
+
+def _count(number: int, where: str) -> int:
+    if not 0 <= number < 2**31:
+        raise InvalidInput(f"Record {where}: expected a number from 0 to 2**31, found {number}.")
+    return number
