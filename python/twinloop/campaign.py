@@ -19,7 +19,8 @@ from twinloop.methods import Coevolution, IdentifyAndPlan, Method
 from twinloop.models import Twin
 from twinloop.objectives import closed_loop
 from twinloop.presets import AnyOptions, Options
-from twinloop.setup import checked, refuse_arguments
+from twinloop.records import Record, Recorded, checked_record
+from twinloop.setup import Setup, checked, refuse_arguments
 from twinloop.signals import Signals
 from twinloop.systems import System
 from twinloop.test import Test, check_signals
@@ -44,7 +45,7 @@ GENTLE = "gentle"
 """The excitation of a first test where nothing else is asked for: the preset's own."""
 
 
-class Campaign:
+class Campaign(Recorded, kind="campaign"):
     """Learns a twin and a controller from as few experiments as possible.
 
     Args:
@@ -87,7 +88,7 @@ class Campaign:
         **other: object,
     ) -> None:
         refuse_arguments("Campaign", other, ARGUMENTS)
-        self.setup = checked(
+        setup = checked(
             signals,
             controller,
             initial_state,
@@ -100,6 +101,10 @@ class Campaign:
             quality,
             operators,
         )
+        self._begin(setup, threads, progress)
+
+    def _begin(self, setup: Setup, threads: int | None, progress: Callable[[Progress], None] | None) -> None:
+        self.setup = setup
         self.threads = (
             available_threads() if threads is None else whole("Campaign, threads", threads, least=1)
         )
@@ -129,6 +134,53 @@ class Campaign:
     def options(self) -> AnyOptions:
         """Of the preset, with those that were changed."""
         return self.setup.options
+
+    @classmethod
+    def recorded_fields(cls) -> tuple[str, ...]:
+        """Names of the fields that a record has, in order."""
+        return "setup", "logbook", "memory"
+
+    def to_record(self) -> Record:
+        """The campaign as numbers, texts, lists and dicts: its setup, all that was told, all that was learnt.
+
+        Raises:
+            NotAvailable: its controllers have no plain form.
+        """
+        return {
+            **self._head(),
+            "setup": self.setup.to_record(),
+            "logbook": self._book.to_record(),
+            "memory": self._method.to_record(),
+        }
+
+    @classmethod
+    def from_record(
+        cls,
+        record: object,
+        *given: object,
+        threads: int | None = None,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> Campaign:
+        """The campaign that a record was written of; it goes on with the same bits.
+
+        Args:
+            record: such as `to_record` gives, or JSON gives back.
+            given: nothing; a campaign is whole.
+            threads: how many the engine may use, by default all that there are.
+            progress: called with a `Progress` a few times a second while the loops run.
+
+        Returns:
+            A campaign of its own.
+
+        Raises:
+            InvalidInput: another kind, a newer version, an unknown or missing key, or a value that cannot be used.
+        """
+        found = checked_record(record, cls, cls.recorded_fields(), cls.KIND)
+        campaign = object.__new__(cls)
+        campaign._begin(Setup.from_record(found["setup"]), threads, progress)
+        campaign._book = Logbook.from_record(found["logbook"], campaign.setup)
+        campaign._method.restore(found["memory"], campaign._book)
+        return campaign
 
     def __copy__(self) -> Campaign:
         """A campaign that goes on by itself from here, with the same bits.

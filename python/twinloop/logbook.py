@@ -6,7 +6,7 @@ import dataclasses
 import math
 import uuid
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.history import Experiment, Iteration, Lesson, Planned, TestLoop
 from twinloop.objectives import frozen_error
+from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.setup import Setup
 from twinloop.test import Test, check_signals, final_distance
 from twinloop.trajectory import Trajectory, check_recorded
@@ -26,7 +27,7 @@ NEXT = 9
 Asked = TypeVar("Asked", TestLoop, Planned)
 
 
-class Logbook:
+class Logbook(Recorded, kind="logbook"):
     """Tests by number, experiments in the order they were told.
 
     Args:
@@ -40,6 +41,67 @@ class Logbook:
         self.asked: list[tuple[int, TestLoop | Planned]] = []
         self.selected = setup.none_selected()
         self._identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
+
+    @classmethod
+    def recorded_fields(cls) -> tuple[str, ...]:
+        """Names of the fields that a record has, in order."""
+        return "identity", "tests", "experiments", "asked"
+
+    def to_record(self) -> Record:
+        """All entries: experiments with the number of their test, what was asked with that of the iteration."""
+        return {
+            **self._head(),
+            "identity": self._identity,
+            "tests": plain(self.tests),
+            "experiments": [[run.test.number, run.to_record()] for run in self.experiments],
+            "asked": plain(self.asked),
+        }
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Logbook:
+        found = checked_record(record, cls, cls.recorded_fields(), where)
+        (setup,) = (value for value in given if isinstance(value, Setup))
+        book = cls(setup)
+        book._identity = read(str, found["identity"], f"{where}.identity")
+        book.tests = read(list[Test], found["tests"], f"{where}.tests", (setup.family,))
+        for number, test in enumerate(book.tests):
+            if (test.number, test.campaign) != (number, book._identity):
+                raise InvalidInput(
+                    f"Record {where}.tests[{number}]: expected test {number} of this campaign, found test"
+                    f" {test.number} of another place; keep the tests in their order."
+                )
+        runs = read(list[tuple[int, Any]], found["experiments"], f"{where}.experiments")
+        for i, (number, run) in enumerate(runs):
+            at = f"{where}.experiments[{i}]"
+            if not 0 <= number < len(book.tests):
+                raise InvalidInput(f"Record {at}: expected the number of a test, found {number}.")
+            book._enter(Experiment.from_record(run, book.tests[number]))
+        book.asked = read(list[tuple[int, TestLoop | Planned]], found["asked"], f"{where}.asked")
+        if not all(0 <= asked.test < len(book.tests) for _, asked in book.asked):
+            raise InvalidInput(
+                f"Record {where}.asked: expected numbers of tests that there are, found others."
+            )
+        return book
+
+    def first(self, told: int) -> Logbook:
+        """The same tests with the first experiments only.
+
+        Args:
+            told: how many.
+
+        Raises:
+            InvalidInput: there are fewer.
+        """
+        if not 0 < told <= len(self.experiments):
+            raise InvalidInput(
+                f"Logbook: expected 1 to {len(self.experiments)} experiments, found {told}; what was learnt belongs to"
+                " another campaign."
+            )
+        book = self.copied()
+        book.experiments, book.selected = [], self.setup.none_selected()
+        for run in self.experiments[:told]:
+            book._enter(run)
+        return book
 
     def copied(self) -> Logbook:
         """The same entries in a book of its own."""
@@ -143,19 +205,13 @@ class Logbook:
         known = self._known(test)
         check_recorded(trajectory, self.setup.signals, known.steps, self.setup.options.divergence_factor)
         _check_first_reading(trajectory, known)
-        with engine_input():
-            states, commands = trajectory.states, trajectory.commands
-            run = (known.genes, known.target_state, states, commands, known.excitation)
-            selected = self.selected.with_test(*run)
-            before = judge(self.setup.none_selected().with_test(*run))
+        before = judge(_with_run(self.setup.none_selected(), known, trajectory))
         complete = trajectory.ended == "completed" and trajectory.steps == known.steps
         distance = final_distance(trajectory.states[-1], known.target_state) if complete else None
         quality = distance
         if complete and self.setup.preset != "paper":
             quality = self.setup.quality.flown(trajectory, known.target_state)
-        experiment = Experiment(known, trajectory, before, frozen_error(trajectory), distance, quality)
-        self.selected = selected
-        self.experiments.append(experiment)
+        self._enter(Experiment(known, trajectory, before, frozen_error(trajectory), distance, quality))
 
     def measured(self, test: int) -> float | None:
         """Quality of a test on the system, mean over complete runs; None if there was none.
@@ -245,6 +301,13 @@ class Logbook:
             if after == iteration and isinstance(asked, kind)
         )
 
+    def _enter(self, run: Experiment) -> None:
+        check_recorded(
+            run.trajectory, self.setup.signals, run.test.steps, self.setup.options.divergence_factor
+        )
+        self.selected = _with_run(self.selected, run.test, run.trajectory)
+        self.experiments.append(run)
+
     def _known(self, test: object) -> Test:
         check_signals(test, self.setup.signals)
         assert isinstance(test, Test)  # check_signals has refused everything else
@@ -255,6 +318,11 @@ class Logbook:
                 "tell it to the campaign that made it, or make it here with campaign.test(gains)."
             )
         return self.tests[test.number]
+
+
+def _with_run(selected: _core.SelectedTests, test: Test, run: Trajectory) -> _core.SelectedTests:
+    with engine_input():
+        return selected.with_test(test.genes, test.target_state, run.states, run.commands, test.excitation)
 
 
 def _check_first_reading(trajectory: Trajectory, test: Test) -> None:

@@ -10,6 +10,7 @@ from twinloop.arrays import Floats
 from twinloop.history import Iteration, Lesson
 from twinloop.logbook import Logbook
 from twinloop.models import Twin
+from twinloop.records import Record
 from twinloop.test import Test
 
 
@@ -18,6 +19,22 @@ class Method(Protocol):
 
     memory: Any
     """All that it remembers: one value that never changes, so that a copy of a campaign may share it."""
+
+    def to_record(self) -> Record:
+        """What it remembers, as numbers, texts, lists and dicts."""
+        ...
+
+    def restore(self, record: object, book: Logbook) -> None:
+        """Remembers what a record holds.
+
+        Args:
+            record: such as `to_record` gives, or JSON gives back.
+            book: with all that was told when it was written.
+
+        Raises:
+            InvalidInput: no such record, or one of another campaign; what was remembered is so still.
+        """
+        ...
 
     @property
     def iteration(self) -> int:

@@ -13,9 +13,11 @@ from twinloop.history import Iteration, Progress
 from twinloop.learning import Learner, Learning
 from twinloop.logbook import Logbook
 from twinloop.methods.errors import errors
+from twinloop.methods.written import WrittenMemory
 from twinloop.models import Twin
 from twinloop.objectives import final_distances
 from twinloop.presets import Options
+from twinloop.records import Record
 from twinloop.search import chunks, committee, start_tests
 from twinloop.setup import Setup
 from twinloop.test import Test
@@ -55,6 +57,15 @@ class Coevolution:
         self.memory = Memory()
         self.learner = Learner(setup.signals, options, setup.seed, workers)
         self._told = 0
+
+    def to_record(self) -> Record:
+        """What is remembered, as plain values; an iteration that is running too."""
+        return WrittenMemory.of(self.memory.asked, self.memory.latest).to_record()
+
+    def restore(self, record: object, book: Logbook) -> None:
+        """Remembers what a record holds."""
+        written = WrittenMemory.from_record(record)
+        self.memory = Memory(*written.restored(book, self.learner))
 
     @property
     def iteration(self) -> int:

@@ -26,6 +26,7 @@ from twinloop.planning.gains import load_ahead
 from twinloop.planning.judging import Committee, Task, expected, risk
 from twinloop.planning.planner import Flown, Planner
 from twinloop.presets import DefaultOptions
+from twinloop.records import Record, Recorded
 from twinloop.setup import Setup
 from twinloop.test import Test
 
@@ -51,7 +52,7 @@ WRONG = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Learnt:
+class Learnt(Recorded, kind="learnt"):
     """What was learnt from the first experiments of a campaign.
 
     Args:
@@ -75,7 +76,7 @@ class Learnt:
 
 
 @dataclass(frozen=True, eq=False)
-class Memory:
+class Memory(Recorded, kind="memory_of_default"):
     """What the preset `default` remembers; all of it are values that never change.
 
     Args:
@@ -125,6 +126,18 @@ class IdentifyAndPlan:
             workers=workers,
             watch=self._watch,
         )
+
+    def to_record(self) -> Record:
+        """What is remembered, as plain values."""
+        return self.memory.to_record()
+
+    def restore(self, record: object, book: Logbook) -> None:
+        """Remembers what a record holds."""
+        memory = Memory.from_record(record, self.setup.signals, self.setup.family)
+        for learnt in (memory.asked, memory.latest):
+            if learnt is not None:
+                book.first(learnt.told)
+        self.memory = memory
 
     @property
     def iteration(self) -> int:
