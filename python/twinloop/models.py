@@ -17,6 +17,7 @@ from twinloop.errors import engine_input
 from twinloop.flight import fly
 from twinloop.law.equations import equations
 from twinloop.law.law import Law
+from twinloop.linear.plant import Linear, linearised, resting, trimmed
 from twinloop.signals import Signals
 from twinloop.streams import Purpose, stream
 from twinloop.test import Test, check_signals
@@ -265,6 +266,31 @@ class Twin:
         with engine_input():
             following = self.model.step(x, u)
         return following[0] if single else following
+
+    def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
+        """The twin around a point, by exact derivatives of its equations.
+
+        Actuators are at rest under the command there, hidden states at 0.
+
+        Args:
+            at: state (n_x,), SI units, radians.
+            command: (n_u,), in the units of the commands; None: under which the state stays as much as it can, near
+                the middle of the bounds or where the actuators rest.
+            discrete: how a period moves on instead of the derivative at an instant.
+
+        Returns:
+            A and B with the names of their states and commands; delays stand beside them in continuous time.
+
+        Raises:
+            InvalidInput: shapes that do not fit.
+            NotAvailable: no finite derivatives there, or a twin that only steps and no `discrete=True`.
+        """
+        state = floats("State to linearise at", at, (self.signals.n_x,))
+        if command is None:
+            point = trimmed(self.law, state, resting(self.law))
+        else:
+            point = floats("Command to linearise at", command, (self.signals.n_u,))
+        return linearised(self.law, state, point, discrete)
 
     def simulate_commands(self, initial_state: ArrayLike, commands: ArrayLike) -> Trajectory:
         """A free run under given commands, without a controller; lags and hidden states begin at rest, as in a flight.

@@ -9,13 +9,15 @@ from twinloop import _core
 
 SMALLEST_DIVISOR = 1e-6
 """A divisor whose magnitude is not above this leaves the dividend as it is (specification, section 4)."""
+GIMBAL = 1e-3
+"""cos of the pitch below which Euler's angles are taken to have no more meaning: it is kept there."""
 UNARY = ("abs", "sqrt", "sin", "cos", "tanh", "exp")
 """Functions of one operand that a program computes; sqrt(a) is √|a|."""
 BINARY = ("+", "-", "*", "/", "min", "max")
 """Operations on two operands that a program computes; a / b is protected, see `SMALLEST_DIVISOR`."""
 COMMUTING = ("+", "*")
 INPUT, CONSTANT, POWER, UPRIGHT = "input", "constant", "**", "upright"
-"""Leaves, whole powers, and a cosine kept away from 0 (see `kinematics.py`)."""
+"""Leaves, whole powers, and a cosine kept away from 0 (see `GIMBAL`), which programs do not have."""
 
 
 class Node(NamedTuple):

@@ -1,0 +1,249 @@
+"""Laws and controllers around a point: beside differences of what the twin predicts, SciPy and python-control."""
+
+import math
+
+import control
+import numpy as np
+import pytest
+import scipy.linalg
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import twinloop as tl
+from strategies import program_text, programs
+from twinloop import _core
+from twinloop.errors import NotAvailable
+from twinloop.law.expressions import Expressions
+from twinloop.law.law import Law
+from twinloop.linear.controller import linear_controller
+from twinloop.linear.jacobian import jacobian
+from twinloop.linear.margins import Loops
+from twinloop.linear.plant import linearised, trimmed
+
+SIGNALS = tl.Signals(
+    states=[tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 8.0, derivative_of="angle")],
+    commands=[tl.Command("torque", "N m", (-2.0, 2.0)), tl.Command("fan", "V", (0.0, 5.0))],
+    dt=0.05,
+)
+PENDULUM = ["r4 = sin(r0)", "r4 = r4 * -9.0", "r5 = r1 * 0.4", "r4 = r4 - r5", "r5 = r2 * 11.0", "r4 = r4 + r5",
+            "r5 = r3 * r3", "r5 = r5 * r0", "r4 = r4 + r5"]  # fmt: skip
+
+
+def twin(lines, form="acceleration", actuators=None, hidden=(), inputs=4, signals=SIGNALS):
+    outputs = 1 if form == "acceleration" else signals.n_x
+    text = program_text(inputs, outputs, inputs + outputs + 6, [lines])
+    model = _core.Model(_core.Program.parse(text), form, signals.engine, actuators, hidden)
+    return tl.Twin(model, signals)
+
+
+def differences(function, point, step=1e-6):
+    columns = []
+    for i in range(len(point)):
+        nudge = np.zeros(len(point))
+        nudge[i] = step
+        columns.append((function(point + nudge) - function(point - nudge)) / (2.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+@settings(deadline=None)
+@given(programs(inputs=3, outputs=2), st.integers(0, 2**32 - 1))
+def test_derivatives_are_those_of_differences(program, seed):
+    point = np.random.default_rng(seed).uniform(-1.5, 1.5, 3)
+    store = Expressions()
+    roots = store.entered(program)
+    values, slopes = jacobian(store, roots, point)
+    with np.errstate(all="ignore"):
+        coarse, fine = (differences(lambda x: program.run(x[np.newaxis])[0], point, h) for h in (1e-5, 1e-6))
+        # Away from kinks, jumps and roots of 0 both differences agree.
+        assume(np.abs(fine).max() < 1e3 and np.abs(fine - coarse).max() < 1e-6)
+    np.testing.assert_allclose(values, program.run(point[np.newaxis])[0], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(slopes, fine, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+def test_over_a_period_it_moves_as_the_twin_predicts(form):
+    lines = PENDULUM if form == "acceleration" else [*PENDULUM, "r5 = r0 * 0.9"]
+    model = twin(lines, form)
+    state, command = np.array([0.4, -0.3]), np.array([0.5, 2.0])
+    found = model.linearise(state, command, discrete=True)
+    np.testing.assert_allclose(found.A, differences(lambda x: model.predict(x, command), state), atol=1e-8)
+    np.testing.assert_allclose(found.B, differences(lambda u: model.predict(state, u), command), atol=1e-8)
+    np.testing.assert_allclose(found.drift, model.predict(state, command) - state, atol=1e-12)
+    assert found.states == ("angle", "rate") and found.commands == ("torque", "fan") and found.dt == 0.05
+
+
+def test_kinematics_are_among_the_equations():
+    body = tl.Signals(
+        states=[tl.State(name, "rad", 1.0) for name in ("roll", "pitch", "yaw")]
+        + [tl.State(name, "rad/s", 1.0) for name in ("p", "q", "r")],
+        commands=[tl.Command("torque", "N m", (-2.0, 2.0))],
+        dt=0.05,
+        kinematics=tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "r")),
+    )
+    program = _core.Program.parse(program_text(7, 3, 12, [["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"]]))
+    model = tl.Twin(_core.Model(program, "acceleration", body.engine), body)
+    for pitch in (0.4, math.pi / 2 - 1e-5):
+        state = np.array([0.3, pitch, -0.2, 0.5, -0.7, 0.9])
+        found = model.linearise(state, [0.3], discrete=True)
+        expected = differences(lambda x: model.predict(x, [0.3]), state, 1e-7)
+        np.testing.assert_allclose(found.A, expected, rtol=1e-4, atol=1e-5)
+
+
+ACTUATED = {
+    "actuators": [(0.08, 2, None), (0.0, 1, 2.0)],
+    "hidden": [((0, 1), True, None, 0.7)],
+    "inputs": 5,
+}
+FILLED = ["r5 = r4 * 3.0", "r6 = r2 * 11.0", "r5 = r5 + r6", "r6 = r3 * r0", "r5 = r5 - r6"]
+
+
+def test_lags_delays_and_hidden_states_are_states_of_a_period():
+    model = twin(FILLED, **ACTUATED)
+    state, command = np.array([6.875, 0.0]), np.array([0.5, 2.0])  # 11 · 0.5 / 2 = 6.875 · 2 / 5: at rest
+    found = model.linearise(state, command, discrete=True)
+    np.testing.assert_allclose(found.drift, 0.0, atol=1e-12)
+    assert found.states[2:] == (
+        "torque_effect",
+        "hidden",
+        "torque_2_before",
+        "torque_1_before",
+        "fan_1_before",
+    )
+    rng = np.random.default_rng(0)
+    small = 1e-6 * rng.normal(size=(30, 2))
+    small[0] = 0.0
+    runs = [model.simulate_commands(state, command + sign * small).states for sign in (1.0, -1.0)]
+    expected = (runs[0] - runs[1]) / 2.0
+    departed, seen = np.zeros(len(found.A)), []
+    for u in small:
+        seen.append(departed[:2])
+        departed = found.A @ departed + found.B @ u
+    np.testing.assert_allclose([*seen, departed[:2]], expected, atol=1e-11)
+
+
+def test_in_continuous_time_it_is_the_derivative_and_delays_stand_beside():
+    model = twin(FILLED, **ACTUATED)
+    found = model.linearise([0.2, -0.1], [0.5, 2.0])
+    np.testing.assert_allclose(found.delays, [0.1, 0.05])
+    assert found.states == ("angle", "rate", "torque_effect", "hidden") and found.dt is None
+    expected = [
+        [0.0, 1.0, 0.0, 0.0],
+        [-2.0 / 5.0, 0.0, 11.0 / 2.0, 3.0],
+        [0, 0, -1 / 0.08, 0],
+        [0, 0, 0, -1 / 0.7],
+    ]
+    np.testing.assert_allclose(found.A, expected, atol=1e-12)
+    np.testing.assert_allclose(found.B[1], [0.0, -0.2 / 5.0], atol=1e-12)
+    np.testing.assert_allclose(found.B[3], [2 * 0.25 * 0.5 / 2, 2 * 0.4 * 0.2 / 2], atol=1e-12)
+    free = twin(PENDULUM)
+    continuous, discrete = (free.linearise([0.4, 0.0], [0.5, 2.0], discrete=d) for d in (False, True))
+    both = scipy.linalg.expm(0.05 * np.block([[continuous.A, continuous.B], [np.zeros((2, 4))]]))
+    np.testing.assert_allclose(discrete.A, both[:2, :2], atol=1e-4)
+    np.testing.assert_allclose(discrete.B, both[:2, 2:], atol=1e-4)
+
+
+def test_frequency_responses_are_those_of_python_control():
+    found = twin(FILLED, **ACTUATED).linearise([0.2, -0.1], [0.5, 2.0], discrete=True)
+    plant = control.ss(found.A, found.B, np.eye(len(found.A)), 0.0, found.dt)
+    frequencies = np.geomspace(0.1, 60.0, 20)
+    expected = control.frequency_response(plant, frequencies, squeeze=False).frdata
+    np.testing.assert_allclose(found.response(frequencies), np.moveaxis(expected, 2, 0), rtol=1e-9)
+    slow = twin(FILLED, **ACTUATED).linearise([0.2, -0.1], [0.5, 2.0])
+    near = slow.response(frequencies[:5])[:, :2]
+    np.testing.assert_allclose(near, found.response(frequencies[:5])[:, :2] * 1.0, rtol=0.2, atol=1e-3)
+
+
+def test_without_a_command_the_state_is_held():
+    model = twin(PENDULUM)
+    found = model.linearise([0.6, 0.0])
+    np.testing.assert_allclose(found.drift, 0.0, atol=1e-9)
+    law = Law.of(model.model, SIGNALS)
+    far = trimmed(law, np.array([1.5, 0.0]), np.array([0.0, 0.0]))
+    assert (far <= [2.0, 5.0]).all() and (far >= [-2.0, 0.0]).all()
+
+
+def test_what_has_no_derivative_is_refused():
+    with pytest.raises(NotAvailable, match="discrete=True"):
+        twin(["r4 = r0 * 0.9"], "absolute").linearise([0.0, 0.0], [0.0, 0.0])
+    with pytest.raises(NotAvailable, match="finite derivatives"):
+        twin(["r4 = sqrt(r0)"]).linearise([0.0, 0.0], [0.0, 0.0])
+    with pytest.raises(tl.InvalidInput):
+        twin(PENDULUM).linearise([0.0, 0.0, 0.0])
+
+
+# Controllers
+
+
+def pid(rate, mixer=None, ki=(0.0, 5.0)):
+    gains = {"angle.kp": (0.0, 5.0), "angle.ki": ki, "angle.kd": (0.0, 5.0)}
+    output = tl.controllers.Mixer([[1.0], [0.0]]) if mixer is None else mixer
+    return tl.controllers.PID(axes=[("angle", rate)], gains=gains, output=output).bind(SIGNALS)
+
+
+@pytest.mark.parametrize("rate", ["rate", None])
+def test_a_pid_is_realised_as_its_formula_says(rate):
+    family, genes = pid(rate), np.array([1.5, 0.8, 0.3])
+    found = linear_controller(family, genes, np.array([0.2, 0.0]))
+    frequencies = np.geomspace(0.01, 60.0, 9)
+    z = np.exp(1j * 0.05 * frequencies)
+    angle = -(1.5 + 0.8 * 0.05 * z / (z - 1.0))
+    angle = angle - 0.3 * (1.0 - 1.0 / z) / 0.05 if rate is None else angle
+    response = found.response(frequencies)
+    np.testing.assert_allclose(response[:, 0, 0], angle, rtol=1e-6)
+    np.testing.assert_allclose(response[:, 0, 1], 0.0 if rate is None else -0.3, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(response[:, 1], 0.0, atol=1e-9)
+    assert len(found.A) == (2 if rate is None else 1)
+
+
+def test_a_controller_on_a_bound_is_refused():
+    family = pid("rate", tl.controllers.Mixer([[1.0], [1.0]]))
+    with pytest.raises(NotAvailable, match="slope where it rests"):
+        linear_controller(family, np.array([1.0, 0.5, 0.2]), np.zeros(2))
+
+
+# Margins
+
+
+def loops(ki=0.5, kp=1.5, kd=0.3, actuators=((0.05, 1, None), (0.0, 0, None))):
+    law = Law.of(twin(PENDULUM, actuators=list(actuators)).model, SIGNALS)
+    target = np.array([0.4, 0.0])
+    family = pid("rate")
+    controller = linear_controller(family, np.array([kp, ki, kd]), target)
+    plant = linearised(law, target, trimmed(law, target, controller.rest), discrete=True)
+    return Loops(plant, controller, np.array([[1.0], [0.0]])), plant, controller
+
+
+def test_margins_are_those_of_python_control():
+    closed, plant, controller = loops()
+    found = closed.margins(0, "angle")
+    process = control.ss(plant.A, plant.B[:, :1], np.eye(len(plant.A))[:2], 0.0, 0.05)
+    law = control.ss(controller.A, controller.B, controller.C[:1], controller.D[:1], 0.05)
+    loop = -(law * process)
+    sampled = control.frequency_response(loop, np.geomspace(1e-3, 62.8, 4000))
+    gains, phases, nearest, _, crossovers, _ = control.stability_margins(sampled, returnall=True)
+    assert found.stable
+    assert found.gain == pytest.approx(min(g for g in gains if g > 1.0), rel=1e-5)
+    assert found.phase == pytest.approx(math.radians(min(abs(p) for p in phases)), rel=1e-5)
+    assert found.crossover == pytest.approx(max(crossovers), rel=1e-5)
+    assert 1.0 / found.sensitivity == pytest.approx(min(nearest), rel=1e-3)
+    delays = [math.radians(p % 360.0) / w for p, w in zip(phases, crossovers, strict=True)]
+    assert found.delay == pytest.approx(min(delays), rel=1e-5)
+    poles = np.sort_complex(control.feedback(loop, 1).poles())
+    ours = closed.closed_poles()
+    assert max(min(abs(pole - ours)) for pole in poles) < 1e-6
+
+
+def test_at_its_gain_margin_the_loop_stands_on_the_edge():
+    closed, _, _ = loops()
+    factor = closed.margins(0, "angle").gain
+    for share, stable in ((0.999, True), (1.001, False)):
+        stronger, _, _ = loops(0.5 * factor * share, 1.5 * factor * share, 0.3 * factor * share)
+        assert stronger.margins(0, "angle").stable is stable
+
+
+def test_at_its_delay_margin_too():
+    delay = loops(actuators=((0.05, 0, None), (0.0, 0, None)))[0].margins(0, "angle").delay
+    periods = delay / 0.05
+    below, above = math.floor(periods), math.ceil(periods)
+    for steps, stable in ((below, True), (above, False)):
+        assert loops(actuators=((0.05, steps, None), (0.0, 0, None)))[0].margins(0, "angle").stable is stable
