@@ -1,6 +1,6 @@
 //! Dynamics: what maps a state and a held command to the next state; a model and a plant are the same to a roll-out.
 
-use crate::lanes::Vector;
+use crate::lanes::{Apart, Vector};
 
 /// A discrete-time system, stepped on several lanes at once.
 pub trait Dynamics {
@@ -12,4 +12,30 @@ pub trait Dynamics {
 
     /// Replaces the state (n_x lanes) by the one a period later, under the command (n_u lanes) held for that period.
     fn step<V: Vector>(&self, workspace: &mut Self::Workspace<V>, state: &mut [V], command: &[V]);
+}
+
+/// A step as a function of its own: it is compiled once for each vector, and not once more in every loop that steps.
+struct Step<'a, D: Dynamics, V: Vector> {
+    dynamics: &'a D,
+    workspace: &'a mut D::Workspace<V>,
+    state: &'a mut [V],
+    command: &'a [V],
+}
+
+impl<D: Dynamics, V: Vector> Apart for Step<'_, D, V> {
+    #[inline(always)]
+    fn run(self) {
+        self.dynamics.step(self.workspace, self.state, self.command);
+    }
+}
+
+/// Steps the dynamics by a call.
+#[inline(always)]
+pub(crate) fn step_apart<D: Dynamics, V: Vector>(
+    dynamics: &D,
+    workspace: &mut D::Workspace<V>,
+    state: &mut [V],
+    command: &[V],
+) {
+    V::apart(Step { dynamics, workspace, state, command });
 }

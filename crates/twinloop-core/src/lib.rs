@@ -38,7 +38,7 @@ pub use flights::{
 };
 pub use hidden::Hidden;
 pub use integrator::{Field, Stages, rk4};
-pub use lanes::{Isa, Kernel, Piece, Scalar, Vector, Wide, Width, dispatch};
+pub use lanes::{Apart, Isa, Kernel, Piece, Scalar, Vector, Wide, Width, dispatch};
 pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};
 pub use model::{Form, Frame, Model};
 pub use model_loop::{Learnt, ModelSearch};
@@ -55,6 +55,6 @@ pub use selected::{Experiment, SelectedTests};
 pub use signals::{RigidBody, Signals};
 pub use task::{Task, distance};
 pub use test_loop::{TestSearch, TestSettings};
-pub use trajectory::{Influences, Trajectory, record};
+pub use trajectory::{Influences, Trajectory, record, record_one};
 pub use tuning::{Observed, Recorded, Tuned, Tuning};
 pub use workers::Workers;

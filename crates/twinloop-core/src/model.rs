@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::str::FromStr;
 
 use crate::actuators::{Actuation, Line};
-use crate::dynamics::Dynamics;
+use crate::dynamics::{Dynamics, step_apart};
 use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
 use crate::lanes::{Vector, vectors};
@@ -177,7 +177,7 @@ impl<'a> Model<'a> {
             return Cow::Borrowed(self.code.run(&mut workspace.bank, &inputs));
         }
         let mut state = vectors(state);
-        self.step(workspace, &mut state, &vectors::<V>(command));
+        step_apart(self, workspace, &mut state, &vectors::<V>(command));
         Cow::Owned(state)
     }
 

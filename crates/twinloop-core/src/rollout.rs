@@ -1,8 +1,8 @@
 //! The roll-out: closes the loop of a controller around dynamics. There is no second one.
 
 use crate::controller::{Family, Law};
-use crate::dynamics::Dynamics;
-use crate::lanes::Vector;
+use crate::dynamics::{Dynamics, step_apart};
+use crate::lanes::{Apart, Vector};
 
 /// What closed loops start from, one a lane.
 pub struct Start<'a, V> {
@@ -66,11 +66,17 @@ pub fn rollout<D: Dynamics, V: Vector>(
         if !noise.is_empty() {
             add(&mut reading, &noise[step * states..]);
         }
-        family.command(parameters, &mut memory, &reading, target, &mut command);
-        if !excitation.is_empty() {
-            family.excite(&mut command, &excitation[step * commands..]);
-        }
-        dynamics.step(&mut workspace, &mut state, &command);
+        let excitation = excitation.get(step * commands..).unwrap_or_default();
+        V::apart(Send {
+            family,
+            parameters,
+            memory: &mut memory,
+            reading: &reading,
+            target,
+            excitation,
+            command: &mut command,
+        });
+        step_apart(dynamics, &mut workspace, &mut state, &command);
         if !disturbance.is_empty() {
             add(&mut state, &disturbance[step * states..]);
         }
@@ -92,6 +98,28 @@ pub fn rollout<D: Dynamics, V: Vector>(
         }
     }
     lasted
+}
+
+/// What is sent in a period, as a function of its own: it is compiled once for each vector, not in every loop.
+struct Send<'a, V> {
+    family: &'a Family,
+    parameters: &'a [V],
+    memory: &'a mut [V],
+    reading: &'a [V],
+    target: &'a [V],
+    /// Of this step and those after it; empty for nothing.
+    excitation: &'a [V],
+    command: &'a mut [V],
+}
+
+impl<V: Vector> Apart for Send<'_, V> {
+    #[inline(always)]
+    fn run(self) {
+        self.family.command(self.parameters, self.memory, self.reading, self.target, self.command);
+        if !self.excitation.is_empty() {
+            self.family.excite(self.command, self.excitation);
+        }
+    }
 }
 
 /// Adds the first terms to as many sums.

@@ -1,6 +1,6 @@
 //! Rows: code and dynamics over many rows that know nothing of each other.
 
-use crate::dynamics::Dynamics;
+use crate::dynamics::{Dynamics, step_apart};
 use crate::lanes::{Isa, Kernel, Vector, Width, dispatch, pack};
 use crate::lgp::Code;
 
@@ -59,7 +59,7 @@ impl<D: Dynamics> Kernel for Step<'_, D> {
             // A fresh one: dynamics may remember, and a row knows nothing of the rows before it.
             let mut workspace = self.dynamics.workspace::<W::Of64>();
             let mut state: Vec<W::Of64> = pack(states);
-            self.dynamics.step(&mut workspace, &mut state, &pack::<W::Of64, _>(commands));
+            step_apart(self.dynamics, &mut workspace, &mut state, &pack::<W::Of64, _>(commands));
             for l in 0..states.len() {
                 rows.extend(state.iter().map(|state| state.lane(l)));
             }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::controller::Family;
 use crate::dynamics::Dynamics;
-use crate::lanes::{Isa, Kernel, Vector, Width, dispatch, groups, pack, with_lanes};
+use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, with_test_lanes};
 use crate::rollout::{Seen, Start, Watch, rollout};
 use crate::task::Task;
 
@@ -62,6 +62,19 @@ pub fn record<D: Dynamics>(
     runs.collect()
 }
 
+/// The same of one controller, one step after the other: for dynamics that have no lanes.
+pub fn record_one<D: Dynamics>(
+    dynamics: &D,
+    family: &Family,
+    parameters: &[f64],
+    task: &Task,
+    limits: &[f64],
+    influences: Influences<'_>,
+) -> Option<Trajectory> {
+    let parameters = &[parameters];
+    Record { dynamics, family, parameters, task, limits, influences }.lanes::<Scalar>().pop()
+}
+
 struct Record<'a, D> {
     dynamics: &'a D,
     family: &'a Family,
@@ -76,7 +89,7 @@ impl<D: Dynamics> Kernel for Record<'_, D> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Trajectory> {
-        with_lanes!(W, self.parameters.len(), self.lanes())
+        with_test_lanes!(W, self.parameters.len(), self.lanes())
     }
 }
 

@@ -4,9 +4,9 @@
 //! gains fade and it is an output-error fit over whole runs; with much of it they stay and it is one of single steps.
 //! The variants of a model that finite differences need are lanes of one run.
 
-use crate::dynamics::Dynamics;
+use crate::dynamics::step_apart;
 use crate::error::{Result, invalid};
-use crate::lanes::{Isa, Kernel, Vector, dispatch, pack, with_lanes};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, pack, with_test_lanes};
 use crate::lgp::Code;
 use crate::model::{Frame, Model};
 use crate::regression::{Chain, Cholesky, Noise, Record, Whitening};
@@ -398,7 +398,7 @@ impl Kernel for Part<'_> {
         let mut all = Run::default();
         for variants in self.variants.chunks(LANES) {
             let part = Part { variants, ..self };
-            let run = with_lanes!(W, variants.len(), part.lanes());
+            let run = with_test_lanes!(W, variants.len(), part.lanes());
             all.squares.extend(run.squares);
             all.diverged.extend(run.diverged);
             all.errors.extend(run.errors);
@@ -467,7 +467,7 @@ impl Part<'_> {
             for (command, &value) in command.iter_mut().zip(&record.commands[k * n_u..]) {
                 *command = V::splat(value);
             }
-            model.step(&mut workspace, &mut state, &command);
+            step_apart(&model, &mut workspace, &mut state, &command);
             for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
                 if whitening.inner > observed.states.len() {
                     for (&at, reach) in observed.states.iter().zip(observed.chain.reach()) {

@@ -38,6 +38,11 @@ impl Workers {
         if self.threads() == 1 || count <= 1 {
             return (0..count).map(work).collect();
         }
-        self.pool.install(|| (0..count).into_par_iter().map(&work).collect())
+        self.shared(count, &work)
+    }
+
+    /// The same by many threads. By a pointer: else all that shares out work is compiled again for each kind of it.
+    fn shared<T: Send>(&self, count: usize, work: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
+        self.pool.install(|| (0..count).into_par_iter().map(work).collect())
     }
 }

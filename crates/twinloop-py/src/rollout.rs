@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
-use twinloop_core::{Dynamics, Influences, Task, Trajectory, Vector as Lanes, record};
+use twinloop_core::{Dynamics, Influences, Task, Trajectory, Vector as Lanes, record, record_one};
 
 use crate::arrays::{
     Cube, Matrix, Vector, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
@@ -124,7 +124,7 @@ pub fn rollout(
         let mut runs = Vec::new();
         for (i, parameters) in parameters.iter().enumerate() {
             let influences = influences.of(&(i..i + 1));
-            runs.extend(record(&step, family, &[parameters], task, &limits, influences, width));
+            runs.extend(record_one(&step, family, parameters, task, &limits, influences));
             if let Some(error) = step.failure.take() {
                 return Err(error);
             }

@@ -4,7 +4,7 @@ use super::log_determinant::{log_determinant, place};
 use super::{Flights, Group};
 use crate::dynamics::Dynamics;
 use crate::error::{Result, invalid};
-use crate::lanes::{Isa, Kernel, Vector, dispatch, with_lanes};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, with_test_lanes};
 use crate::rollout::{Seen, Watch, rollout};
 use crate::workers::Workers;
 
@@ -76,7 +76,7 @@ impl<D: Dynamics> Kernel for Fly<'_, D> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<f64> {
-        with_lanes!(W, self.group.candidates, self.lanes())
+        with_test_lanes!(W, self.group.candidates, self.lanes())
     }
 }
 
@@ -128,7 +128,7 @@ impl Kernel for Compare<'_> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Disagreement> {
-        with_lanes!(W, self.candidates, self.lanes())
+        with_test_lanes!(W, self.candidates, self.lanes())
     }
 }
 

@@ -5,7 +5,7 @@ use super::quality::{Quality, Tally};
 use super::{Flights, Group};
 use crate::dynamics::Dynamics;
 use crate::error::{Result, invalid};
-use crate::lanes::{Isa, Kernel, Vector, dispatch, with_lanes};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, with_test_lanes};
 use crate::rollout::{Seen, Watch, rollout};
 use crate::workers::Workers;
 
@@ -102,7 +102,7 @@ impl<D: Dynamics> Kernel for OfGroup<'_, D> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Judged> {
-        with_lanes!(W, self.group.candidates, self.lanes())
+        with_test_lanes!(W, self.group.candidates, self.lanes())
     }
 }
 

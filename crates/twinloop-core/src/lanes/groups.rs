@@ -28,7 +28,7 @@ pub(crate) fn lanes_for(count: usize) -> usize {
     }
 }
 
-/// Calls a method with the vector of a width that has the fewest lanes for a group: [`lanes_for`] in types.
+/// Calls a method with the vector of a width that has the fewest lanes for a group of rows: [`lanes_for`] in types.
 macro_rules! with_lanes {
     ($width:ident, $count:expr, $this:ident.$method:ident($($argument:expr),*)) => {
         match $count {
@@ -41,6 +41,22 @@ macro_rules! with_lanes {
     };
 }
 pub(crate) use with_lanes;
+
+/// The same for a group of tests, which are 32 at most: each copy of a roll-out takes its time to compile.
+macro_rules! with_test_lanes {
+    ($width:ident, $count:expr, $this:ident.$method:ident($($argument:expr),*)) => {
+        match $count {
+            0..=1 => $this.$method::<$width::Of1>($($argument),*),
+            2..=4 => $this.$method::<$width::Of4>($($argument),*),
+            5..=8 => $this.$method::<$width::Of8>($($argument),*),
+            count => {
+                assert!(count <= 32, "a group has 32 tests at most, found {count}");
+                $this.$method::<$width::Of32>($($argument),*)
+            }
+        }
+    };
+}
+pub(crate) use with_test_lanes;
 
 /// Rows of equal length side by side: number j of row l goes to place `j * lanes + l`. The last row fills what is left.
 pub(crate) fn interleave<R: AsRef<[f64]>>(rows: &[R], lanes: usize) -> Vec<f64> {

@@ -8,7 +8,7 @@ mod piece;
 mod vector;
 mod width;
 
-pub(crate) use groups::{groups, interleave, lanes_for, pack, vectors, with_lanes};
-pub use piece::Piece;
+pub(crate) use groups::{groups, interleave, lanes_for, pack, vectors, with_lanes, with_test_lanes};
+pub use piece::{Apart, Piece};
 pub use vector::{Scalar, Vector, Wide};
 pub use width::{Isa, Kernel, Width, dispatch};

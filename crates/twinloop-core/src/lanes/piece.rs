@@ -3,6 +3,14 @@
 //! Instructions are named one by one, because a compiler that is left to find vectors in loops over arrays finds them
 //! across the wrong loop.
 
+/// Work that is compiled once for each piece and called, rather than inlined into each loop around it.
+///
+/// Implementations carry `#[inline(always)]`: what is inlined into [`Piece::apart`] gets the instructions of the piece.
+pub trait Apart {
+    /// The work.
+    fn run(self);
+}
+
 /// A few numbers in one register.
 pub trait Piece: Copy + Send + Sync + 'static {
     /// How many.
@@ -29,6 +37,8 @@ pub trait Piece: Copy + Send + Sync + 'static {
     fn select_less(self, other: Self, yes: Self, no: Self) -> Self;
     /// Whether self < other anywhere.
     fn any_less(self, other: Self) -> bool;
+    /// Calls work in a function of its own that has the instructions of this piece.
+    fn apart(work: impl Apart);
 }
 
 impl Piece for f64 {
@@ -77,12 +87,16 @@ impl Piece for f64 {
     fn any_less(self, other: Self) -> bool {
         self < other
     }
+    #[inline(never)]
+    fn apart(work: impl Apart) {
+        work.run();
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod x86 {
-    use super::Piece;
+    use super::{Apart, Piece};
     use std::arch::x86_64::*;
 
     // SAFETY, for every block below: a piece wider than the baseline is named only by the `Isa` of its width, and only
@@ -90,7 +104,7 @@ mod x86 {
     // unaligned and within a slice whose length was checked.
     // No closures: what is not inlined by force would not get the instructions of its width.
     macro_rules! piece {
-        ($piece:ident, $lanes:literal, $splat:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident,
+        ($piece:ident, $features:literal, $lanes:literal, $splat:ident, $load:ident, $store:ident, $add:ident, $sub:ident, $mul:ident,
          $div:ident, $sqrt:ident, abs($a:ident) = $abs:expr,
          select_less($x:ident, $y:ident, $yes:ident, $no:ident) = $select:expr,
          any_less($p:ident, $q:ident) = $any:expr) => {
@@ -143,12 +157,22 @@ mod x86 {
                     let ($p, $q) = (self, other);
                     unsafe { $any }
                 }
+                #[inline(always)]
+                fn apart(work: impl Apart) {
+                    #[target_feature(enable = $features)]
+                    #[inline(never)]
+                    fn call(work: impl Apart) {
+                        work.run();
+                    }
+                    unsafe { call(work) }
+                }
             }
         };
     }
 
     piece!(
         __m128d,
+        "sse2",
         2,
         _mm_set1_pd,
         _mm_loadu_pd,
@@ -167,6 +191,7 @@ mod x86 {
     );
     piece!(
         __m256d,
+        "avx2",
         4,
         _mm256_set1_pd,
         _mm256_loadu_pd,
@@ -182,6 +207,7 @@ mod x86 {
     );
     piece!(
         __m512d,
+        "avx512f,avx2",
         8,
         _mm512_set1_pd,
         _mm512_loadu_pd,

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use super::piece::Piece;
+use super::piece::{Apart, Piece};
 
 /// One number in each of several lanes.
 pub trait Vector:
@@ -41,6 +41,9 @@ pub trait Vector:
     fn select_less(self, other: Self, yes: Self, no: Self) -> Self;
     /// Whether self < other in any lane.
     fn any_less(self, other: Self) -> bool;
+
+    /// Calls work in a function of its own that has the instructions of these vectors.
+    fn apart(work: impl Apart);
 
     /// The nearest number from `low` to `high`; nothing is less than a NaN, so a NaN stays one.
     #[inline(always)]
@@ -138,6 +141,10 @@ impl<P: Piece, const N: usize> Vector for Wide<P, N> {
             any |= self.0[i].any_less(other.0[i]);
         }
         any
+    }
+    #[inline(always)]
+    fn apart(work: impl Apart) {
+        P::apart(work);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::divergence_penalty;
 use crate::dynamics::Dynamics;
-use crate::lanes::{Isa, Kernel, Vector, vectors, with_lanes};
+use crate::lanes::{Isa, Kernel, Vector, vectors, with_test_lanes};
 use crate::rollout::{Seen, Start, Watch, rollout};
 use crate::selected::{Loops, SelectedTests};
 
@@ -19,7 +19,7 @@ impl<D: Dynamics> Kernel for ClosedLoop<'_, D> {
     fn run<W: Isa>(self) -> Vec<f64> {
         let mut errors = Vec::with_capacity(self.selected.len());
         for loops in self.selected.loops() {
-            with_lanes!(W, loops.tests, self.of_group(loops, &mut errors));
+            with_test_lanes!(W, loops.tests, self.of_group(loops, &mut errors));
         }
         errors
     }

@@ -2,7 +2,7 @@
 
 use crate::controller::Family;
 use crate::dynamics::Dynamics;
-use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_lanes};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_test_lanes};
 use crate::rollout::{Seen, Start, Watch, rollout};
 use crate::task::Task;
 use crate::workers::Workers;
@@ -38,7 +38,7 @@ impl<D: Dynamics> Kernel for OfGroup<'_, D> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<f64> {
-        with_lanes!(W, self.parameters.len(), self.lanes())
+        with_test_lanes!(W, self.parameters.len(), self.lanes())
     }
 }
 
