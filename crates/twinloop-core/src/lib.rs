@@ -2,6 +2,7 @@
 //! on models. It knows numbers only: no files, no clock, no Python, no global state.
 
 mod actuators;
+mod any_dynamics;
 mod controller;
 mod dynamics;
 mod error;
@@ -29,6 +30,7 @@ mod tuning;
 mod workers;
 
 pub use actuators::{Actuation, Actuator, effects};
+pub use any_dynamics::{AnyDynamics, AnyWorkspace};
 pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid, StateFeedback};
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};

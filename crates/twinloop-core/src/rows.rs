@@ -54,12 +54,12 @@ impl<D: Dynamics> Kernel for Step<'_, D> {
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<f64> {
         let mut rows = Vec::new();
-        let chunks = self.states.chunks(W::Of64::LANES).zip(self.commands.chunks(W::Of64::LANES));
+        let chunks = self.states.chunks(W::Of32::LANES).zip(self.commands.chunks(W::Of32::LANES));
         for (states, commands) in chunks {
             // A fresh one: dynamics may remember, and a row knows nothing of the rows before it.
-            let mut workspace = self.dynamics.workspace::<W::Of64>();
-            let mut state: Vec<W::Of64> = pack(states);
-            step_apart(self.dynamics, &mut workspace, &mut state, &pack::<W::Of64, _>(commands));
+            let mut workspace = self.dynamics.workspace::<W::Of32>();
+            let mut state: Vec<W::Of32> = pack(states);
+            step_apart(self.dynamics, &mut workspace, &mut state, &pack::<W::Of32, _>(commands));
             for l in 0..states.len() {
                 rows.extend(state.iter().map(|state| state.lane(l)));
             }

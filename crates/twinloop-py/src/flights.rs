@@ -3,8 +3,8 @@
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Candidate, Disagreement, Draws, Envelope, Flights, Model, Quality, disagreements as core_disagreements,
-    qualities as core_qualities,
+    AnyDynamics, Candidate, Disagreement, Draws, Envelope, Flights, Model, Quality,
+    disagreements as core_disagreements, qualities as core_qualities,
 };
 
 use crate::arrays::{
@@ -139,11 +139,11 @@ pub fn qualities<'py>(
                     "expected flights with the states, commands and period of the plant".into(),
                 ));
             }
-            let plant = std::slice::from_ref(&plant.0);
-            (1, py.detach(|| core_qualities(plant, flights, quality, &envelope, draws, &workers))?)
+            let plant = [AnyDynamics::Quadrotor(&plant.0)];
+            (1, py.detach(|| core_qualities(&plant, flights, quality, &envelope, draws, &workers))?)
         }
         Members::Models(models) => {
-            let models = fitting(&models, flights)?;
+            let models: Vec<_> = fitting(&models, flights)?.into_iter().map(AnyDynamics::Model).collect();
             let judged =
                 py.detach(|| core_qualities(&models, flights, quality, &envelope, draws, &workers))?;
             (models.len(), judged)

@@ -4,7 +4,9 @@ use std::cell::RefCell;
 
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
-use twinloop_core::{Dynamics, Influences, Task, Trajectory, Vector as Lanes, record, record_one};
+use twinloop_core::{
+    AnyDynamics, Dynamics, Influences, Task, Trajectory, Vector as Lanes, record, record_one,
+};
 
 use crate::arrays::{
     Cube, Matrix, Vector, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
@@ -113,12 +115,11 @@ pub fn rollout(
     let (excitation, disturbance) = (views(&excitation), views(&disturbance));
     let influences = Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
     let (family, task, width) = (&*family.0, &task.0, workers.width());
-    let runs = if let Ok(model) = dynamics.cast::<PyModel>() {
-        let model = model.get();
-        py.detach(|| record(&model.core(), family, &parameters, task, &limits, influences, width))
-    } else if let Ok(plant) = dynamics.cast::<PyQuadrotor>() {
-        let plant = plant.get();
-        py.detach(|| record(&plant.0, family, &parameters, task, &limits, influences, width))
+    let known = dynamics.cast::<PyModel>().map(|model| AnyDynamics::Model(model.get().core()));
+    let known =
+        known.or_else(|_| dynamics.cast::<PyQuadrotor>().map(|plant| AnyDynamics::Quadrotor(&plant.get().0)));
+    let runs = if let Ok(known) = known {
+        py.detach(|| record(&known, family, &parameters, task, &limits, influences, width))
     } else {
         let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
         let mut runs = Vec::new();

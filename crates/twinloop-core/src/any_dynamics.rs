@@ -1,0 +1,45 @@
+//! Any dynamics: a model or a built-in plant, where both are flown by the same compiled loops.
+
+use crate::dynamics::Dynamics;
+use crate::lanes::Vector;
+use crate::model::Model;
+use crate::plants::Quadrotor;
+
+/// What can be flown. Loops over this one type serve models and plants alike, for each copy takes its time to compile.
+#[derive(Clone, Copy)]
+pub enum AnyDynamics<'a> {
+    /// Learnt.
+    Model(Model<'a>),
+    /// The built-in quadrotor.
+    Quadrotor(&'a Quadrotor),
+}
+
+/// The workspace of the one that is flown.
+pub enum AnyWorkspace<'a, V: Vector> {
+    /// Of a model.
+    Model(<Model<'a> as Dynamics>::Workspace<V>),
+    /// Of the quadrotor.
+    Quadrotor(<Quadrotor as Dynamics>::Workspace<V>),
+}
+
+impl<'a> Dynamics for AnyDynamics<'a> {
+    type Workspace<V: Vector> = AnyWorkspace<'a, V>;
+
+    fn workspace<V: Vector>(&self) -> AnyWorkspace<'a, V> {
+        match self {
+            Self::Model(model) => AnyWorkspace::Model(model.workspace()),
+            Self::Quadrotor(plant) => AnyWorkspace::Quadrotor(plant.workspace()),
+        }
+    }
+
+    #[inline(always)]
+    fn step<V: Vector>(&self, workspace: &mut AnyWorkspace<'a, V>, state: &mut [V], command: &[V]) {
+        match (self, workspace) {
+            (Self::Model(model), AnyWorkspace::Model(workspace)) => model.step(workspace, state, command),
+            (Self::Quadrotor(plant), AnyWorkspace::Quadrotor(workspace)) => {
+                plant.step(workspace, state, command);
+            }
+            _ => unreachable!("a workspace belongs to the dynamics that made it"),
+        }
+    }
+}
