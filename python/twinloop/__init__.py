@@ -3,7 +3,7 @@
 from twinloop import contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
 from twinloop.campaign import Campaign
-from twinloop.errors import InvalidInput, NotAvailable, SystemFailure, TwinloopError
+from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, SystemFailure, TwinloopError
 from twinloop.models import Twin
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems import System
@@ -18,6 +18,7 @@ __all__ = [
     "RigidBody",
     "Signals",
     "State",
+    "StoreFailure",
     "System",
     "SystemFailure",
     "Test",

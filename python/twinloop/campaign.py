@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import os
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from numpy.typing import ArrayLike
 
@@ -14,6 +16,7 @@ from twinloop.arrays import floats, whole
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.history import Experiment, Iteration, Lesson, Progress
+from twinloop.keeping import Keeping, look
 from twinloop.logbook import Logbook
 from twinloop.methods import Coevolution, IdentifyAndPlan, Method
 from twinloop.models import Twin
@@ -22,6 +25,7 @@ from twinloop.presets import AnyOptions, Options
 from twinloop.records import Record, Recorded, checked_record
 from twinloop.setup import Setup, checked, refuse_arguments
 from twinloop.signals import Signals
+from twinloop.store import Kept
 from twinloop.systems import System
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
@@ -40,6 +44,8 @@ ARGUMENTS = (
     "operators",
     "threads",
     "progress",
+    "store",
+    "name",
 )
 GENTLE = "gentle"
 """The excitation of a first test where nothing else is asked for: the preset's own."""
@@ -64,9 +70,15 @@ class Campaign(Recorded, kind="campaign"):
         operators: that evolved programs may use; by default the preset's.
         threads: how many the engine may use, by default all that there are; no result depends on it.
         progress: called with a `Progress` a few times a second while the loops run.
+        store: a file of SQLite, or the address of a database such as "postgresql+psycopg://user@host/database", where
+            all that is asked and told is committed before the call returns. A campaign of this name that is there
+            already, with the same arguments, goes on with the same bits. None: nothing outlives the process.
+        name: of the campaign in its store, which may hold several.
 
     Raises:
         InvalidInput: an argument that cannot be used, or that this version does not have.
+        NotAvailable: the packages of the extra `store` are missing.
+        StoreFailure: somebody else writes the campaign, or the store cannot be written.
     """
 
     def __init__(
@@ -85,6 +97,8 @@ class Campaign(Recorded, kind="campaign"):
         operators: Sequence[str] | None = None,
         threads: int | None = None,
         progress: Callable[[Progress], None] | None = None,
+        store: str | Path | None = None,
+        name: str = "campaign",
         **other: object,
     ) -> None:
         refuse_arguments("Campaign", other, ARGUMENTS)
@@ -102,6 +116,8 @@ class Campaign(Recorded, kind="campaign"):
             operators,
         )
         self._begin(setup, threads, progress)
+        if store is not None:
+            self._open(store, name)
 
     def _begin(self, setup: Setup, threads: int | None, progress: Callable[[Progress], None] | None) -> None:
         self.setup = setup
@@ -119,6 +135,25 @@ class Campaign(Recorded, kind="campaign"):
         self._book = Logbook(self.setup)
         self._method = self._chosen()
         self._controller: Controller | None = None
+        self._keeping: Keeping | None = None
+
+    def _open(self, where: str | Path, name: str) -> None:
+        """Goes on with what a store holds, and keeps there what comes."""
+        keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
+        try:
+            self._recall(keeping.kept)
+        except BaseException:
+            keeping.close()
+            raise
+        keeping.restored(self._method.memory)
+        self._keeping = keeping
+        # A campaign that nobody holds any more writes no more; the end of the process is one of those.
+        weakref.finalize(self, keeping.close)
+
+    def _recall(self, kept: Kept) -> None:
+        self._book = Logbook.from_record(kept.logbook, self.setup)
+        if kept.memory is not None:
+            self._method.restore(kept.memory, self._book)
 
     @property
     def signals(self) -> Signals:
@@ -194,11 +229,98 @@ class Campaign(Recorded, kind="campaign"):
         campaign._book = self._book.copied()
         campaign._method = campaign._chosen()
         campaign._method.memory, campaign._controller = self._method.memory, None
+        campaign._keeping = None  # a store has one writer
         return campaign
 
     def __deepcopy__(self, memo: dict[int, object]) -> Campaign:
         """As `copy.copy`: what both share are values that never change."""
         return copy.copy(self)
+
+    # Keeping
+
+    def save(self, where: str | Path, name: str = "campaign") -> None:
+        """Writes the campaign into a store, or what is new into one where it was saved before.
+
+        Args:
+            where: a file of SQLite, or the address of a database; made where there is none.
+            name: of the campaign there.
+
+        Raises:
+            InvalidInput: another campaign of that name is there, or no store.
+            NotAvailable: the packages of the extra `store` are missing.
+            StoreFailure: the store cannot be written.
+        """
+        keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
+        try:
+            mine, known = self._book.to_record(), keeping.kept.logbook
+            lists = [key for key, value in known.items() if isinstance(value, list)]
+            if known["identity"] != mine["identity"] or any(
+                mine[key][: len(known[key])] != known[key] for key in lists
+            ):
+                raise InvalidInput(
+                    f"Campaign.save: expected {keeping.name} to be this one as it was, found another one, or one that"
+                    " has gone on by itself; choose another name."
+                )
+            keeping.keep(self._book, self._method)
+        finally:
+            keeping.close()
+
+    @classmethod
+    def load(
+        cls,
+        where: str | Path,
+        name: str | None = None,
+        *,
+        read_only: bool = False,
+        threads: int | None = None,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> Campaign:
+        """A campaign from a store, where it is kept from now on too; it goes on with the same bits.
+
+        Args:
+            where: a file of SQLite, or the address of a database.
+            name: of the campaign there; None: the only one.
+            read_only: whether to look only: others may write it meanwhile, and what is done here is not kept.
+            threads: how many the engine may use, by default all that there are.
+            progress: called with a `Progress` a few times a second while the loops run.
+
+        Returns:
+            The campaign.
+
+        Raises:
+            InvalidInput: no store, no such campaign, or several and no name.
+            NotAvailable: the packages of the extra `store` are missing.
+            StoreFailure: somebody else writes the campaign, or the store cannot be read.
+        """
+        kept = look(where, name, read_only)
+        campaign = object.__new__(cls)
+        campaign._begin(Setup.from_record(kept.setup), threads, progress)
+        if read_only:
+            campaign._recall(kept)
+        else:
+            campaign._open(where, kept.name)
+        return campaign
+
+    def close(self) -> None:
+        """Lets others write the campaign in its store; nothing that is done afterwards is kept there."""
+        if self._keeping is not None:
+            self._keeping.close()
+            self._keeping = None
+
+    def _keep(self) -> None:
+        if self._keeping is not None:
+            self._keeping.keep(self._book, self._method)
+
+    @contextmanager
+    def _entering(self) -> Iterator[None]:
+        """What is entered in the book meanwhile is committed at the end, or taken back."""
+        book, memory = self._book.copied(), self._method.memory
+        try:
+            yield
+            self._keep()
+        except BaseException:
+            self._book, self._method.memory = book, memory
+            raise
 
     # Ask and tell
 
@@ -231,7 +353,8 @@ class Campaign(Recorded, kind="campaign"):
             added = floats("Campaign.test, excitation (steps, commands)", excitation, shape)
         else:
             added = None
-        return self._book.new_test(genes, excitation=added)
+        with self._entering():
+            return self._book.new_test(genes, excitation=added)
 
     def ask(self, last: bool = False) -> Test:
         """Learns from all that was told, then picks the test on which the best models disagree.
@@ -250,7 +373,7 @@ class Campaign(Recorded, kind="campaign"):
         """
         self.interrupted = False
         self._learn()
-        with self._interruptible():
+        with self._interruptible(), self._entering():
             return self._method.ask(self._book, bool(last))
 
     def tell(self, test: Test, trajectory: Trajectory) -> None:
@@ -271,7 +394,8 @@ class Campaign(Recorded, kind="campaign"):
                 return None
             return float(closed_loop([model], alone, self._workers)[0, 0])
 
-        self._book.tell(test, trajectory, error_so_far)
+        with self._entering():
+            self._book.tell(test, trajectory, error_so_far)
         self.interrupted = False
 
     def run(self, system: System, experiments: int = 4) -> Campaign:
@@ -308,6 +432,8 @@ class Campaign(Recorded, kind="campaign"):
                 f" every run counts, so for one more say {told + 1}."
             )
         self.interrupted = False
+        if self._keeping is not None:
+            self._keeping.fly(system)
         with self._interruptible():
             while len(self._book.experiments) < budget:
                 test = self._next(system, last=len(self._book.experiments) + 1 == budget)
@@ -396,6 +522,7 @@ class Campaign(Recorded, kind="campaign"):
             )
         with self._interruptible():
             self._method.learn(self._book, at_once=self.interrupted)
+            self._keep()
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
@@ -403,6 +530,7 @@ class Campaign(Recorded, kind="campaign"):
             yield
         except KeyboardInterrupt:
             self.interrupted = True
+            self._keep()
             raise
 
     def _next(self, system: System, last: bool) -> Test:
@@ -420,6 +548,8 @@ class Campaign(Recorded, kind="campaign"):
         return self.test(gains)
 
     def _report(self, progress: Progress) -> None:
+        if self._keeping is not None:
+            self._keeping.checkpoint(self._method)
         if self.progress is not None:
             self.progress(progress)
 

@@ -26,6 +26,10 @@ class SystemFailure(TwinloopError, RuntimeError):
     """The system under test raised, or answered with something that is no next state."""
 
 
+class StoreFailure(TwinloopError, RuntimeError):
+    """A store cannot be read or written now; what it held before it holds still."""
+
+
 class NotAvailable(TwinloopError, RuntimeError):
     """What was asked for does not exist yet, or not in this installation."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -40,7 +40,7 @@ class Logbook(Recorded, kind="logbook"):
         self.experiments: list[Experiment] = []
         self.asked: list[tuple[int, TestLoop | Planned]] = []
         self.selected = setup.none_selected()
-        self._identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
+        self.identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
@@ -49,12 +49,19 @@ class Logbook(Recorded, kind="logbook"):
 
     def to_record(self) -> Record:
         """All entries: experiments with the number of their test, what was asked with that of the iteration."""
+        return {**self._head(), "identity": self.identity, **self.entries({})}
+
+    def entries(self, known: Mapping[str, int]) -> dict[str, list[Any]]:
+        """Records of the entries of each list, which only grow.
+
+        Args:
+            known: how many of the first ones are left out, by list.
+        """
+        runs = self.experiments[known.get("experiments", 0) :]
         return {
-            **self._head(),
-            "identity": self._identity,
-            "tests": plain(self.tests),
-            "experiments": [[run.test.number, run.to_record()] for run in self.experiments],
-            "asked": plain(self.asked),
+            "tests": plain(self.tests[known.get("tests", 0) :]),
+            "experiments": [[run.test.number, run.to_record()] for run in runs],
+            "asked": plain(self.asked[known.get("asked", 0) :]),
         }
 
     @classmethod
@@ -62,10 +69,10 @@ class Logbook(Recorded, kind="logbook"):
         found = checked_record(record, cls, cls.recorded_fields(), where)
         (setup,) = (value for value in given if isinstance(value, Setup))
         book = cls(setup)
-        book._identity = read(str, found["identity"], f"{where}.identity")
+        book.identity = read(str, found["identity"], f"{where}.identity")
         book.tests = read(list[Test], found["tests"], f"{where}.tests", (setup.family,))
         for number, test in enumerate(book.tests):
-            if (test.number, test.campaign) != (number, book._identity):
+            if (test.number, test.campaign) != (number, book.identity):
                 raise InvalidInput(
                     f"Record {where}.tests[{number}]: expected test {number} of this campaign, found test"
                     f" {test.number} of another place; keep the tests in their order."
@@ -107,7 +114,7 @@ class Logbook(Recorded, kind="logbook"):
         """The same entries in a book of its own."""
         book = Logbook(self.setup)
         book.tests, book.experiments, book.asked = list(self.tests), list(self.experiments), list(self.asked)
-        book.selected, book._identity = self.selected, self._identity
+        book.selected, book.identity = self.selected, self.identity
         return book
 
     @property
@@ -150,7 +157,7 @@ class Logbook(Recorded, kind="logbook"):
             self.setup.steps,
             excitation,
             number=len(self.tests),
-            campaign=self._identity,
+            campaign=self.identity,
             predicted=predicted,
             spread=spread,
             risk=risk,

@@ -1,0 +1,278 @@
+"""A database of campaigns: opened, checked, brought up to date; its failures told in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, TwinloopError
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection, Engine
+
+BUSY_SECONDS = 30.0
+"""How long a transaction waits for another one; each takes milliseconds."""
+
+ROOM = ("room on the disk", "free some, then do the same again")
+RIGHT = ("the right to write", "give it for the file and its folder, or read with read_only=True")
+REFUSALS = (
+    ("full", *ROOM),
+    ("no space", *ROOM),
+    ("readonly", *RIGHT),
+    ("read-only", *RIGHT),
+    ("locked", "a turn to write", "end the program that holds the database, then do the same again"),
+    ("unable to open", "the right to open it", "give it for the file and its folder"),
+)
+"""Words of a database's refusal, what it misses, and what helps."""
+
+
+class Store:
+    """An open database whose tables are those of this version.
+
+    Args:
+        engine: of SQLAlchemy.
+        name: of the file, or the address without its password, for errors.
+        path: of the file; None for a server.
+        read_only: whether nothing is written.
+    """
+
+    def __init__(self, engine: Engine, name: str, path: Path | None, read_only: bool) -> None:
+        self.engine = engine
+        self.name = name
+        self.path = path
+        self.read_only = read_only
+
+    @contextmanager
+    def transaction(self) -> Iterator[Connection]:
+        """All of what is done in it is kept, or nothing.
+
+        Yields:
+            A connection.
+
+        Raises:
+            StoreFailure: the database refuses.
+        """
+        with self.sentences(), self.engine.begin() as connection:
+            yield connection
+
+    @contextmanager
+    def sentences(self) -> Iterator[None]:
+        """Tells failures of the database as what they mean to a person."""
+        from sqlalchemy.exc import SQLAlchemyError
+
+        try:
+            yield
+        except TwinloopError:
+            raise
+        except (SQLAlchemyError, OSError) as failure:
+            raise said(self.name, failure) from failure
+
+    def close(self) -> None:
+        """Closes all connections."""
+        self.engine.dispose()
+
+
+def opened(where: str | Path, *, create: bool = False, read_only: bool = False) -> Store:
+    """Opens a store; an older one is brought up to date, unless it is only read.
+
+    Args:
+        where: a file of SQLite, or the address of a server such as "postgresql+psycopg://user@host/database".
+        create: whether one is made where there is none.
+        read_only: whether nothing will be written.
+
+    Returns:
+        The store.
+
+    Raises:
+        InvalidInput: no store, a newer one, or a database of something else.
+        NotAvailable: SQLAlchemy, Alembic or the driver of the server is not installed.
+        StoreFailure: the database cannot be read or written.
+    """
+    require()
+    from sqlalchemy.exc import SQLAlchemyError
+
+    text = str(where)
+    path = None if "://" in text else Path(where).expanduser()
+    if path is not None:
+        _check_file(path, create)
+    store = _connected(text, path, read_only)
+    try:
+        with store.sentences():
+            if path is not None and not read_only:
+                _check_whole(store)
+            _bring_up_to_date(store, create)
+    except TwinloopError as refusal:
+        store.close()
+        if read_only and path is not None and isinstance(refusal.__cause__, SQLAlchemyError):
+            return _from_still_medium(path, refusal)
+        raise
+    return store
+
+
+def require() -> None:
+    """Refuses to work without the packages of the extra `store`.
+
+    Raises:
+        NotAvailable: one is missing.
+    """
+    try:
+        import alembic
+        import sqlalchemy
+
+        _ = alembic, sqlalchemy
+    except ModuleNotFoundError as missing:
+        raise NotAvailable(
+            f"Store: expected the packages sqlalchemy and alembic, found that {missing.name} is missing; install them"
+            " with: pip install 'twinloop[store]'."
+        ) from missing
+
+
+def said(name: str, failure: Exception) -> TwinloopError:
+    """A failure of the database in a sentence.
+
+    Args:
+        name: of the store.
+        failure: as SQLAlchemy or the system has raised it.
+
+    Returns:
+        What to raise.
+    """
+    reason = str(getattr(failure, "orig", None) or failure).split("\n")[0]
+    low = reason.lower()
+    if "not a database" in low or "malformed" in low or "encrypted" in low:
+        return InvalidInput(
+            f"Store {name}: expected a database of Twinloop, found a file that is damaged or none at all ({reason});"
+            " nothing was changed in it: take another file, or a copy from before."
+        )
+    for words, what, advice in REFUSALS:
+        if words in low:
+            return StoreFailure(
+                f"Store {name}: expected {what}, found none ({reason}); nothing is lost: {advice}."
+            )
+    return StoreFailure(
+        f"Store {name}: expected an answer of the database, found: {reason}; nothing that was kept is lost: mend that,"
+        " then do the same again."
+    )
+
+
+def _check_file(path: Path, create: bool) -> None:
+    if path.is_dir():
+        raise InvalidInput(f"Store {path}: expected a file, found a folder; name a file in it.")
+    if not path.parent.is_dir():
+        raise InvalidInput(
+            f"Store {path}: expected an existing folder, found none; make {path.parent} first."
+        )
+    if not create and not path.exists():
+        raise InvalidInput(f"Store {path}: expected a store, found no such file; check its name.")
+
+
+def _connected(text: str, path: Path | None, read_only: bool, immutable: bool = False) -> Store:
+    from sqlalchemy import URL, create_engine, event, make_url
+    from sqlalchemy.exc import ArgumentError, NoSuchModuleError
+
+    if path is None:
+        try:
+            url = make_url(text)
+            engine = create_engine(url)
+        except (ArgumentError, NoSuchModuleError) as reason:
+            raise InvalidInput(
+                f"Store {text}: expected a file or an address such as postgresql+psycopg://user@host/database, found"
+                f" none: {reason}."
+            ) from reason
+        except ModuleNotFoundError as missing:
+            raise NotAvailable(
+                f"Store: expected the driver of the server, found that {missing.name} is missing; for PostgreSQL,"
+                " install it with: pip install 'twinloop[postgresql]'."
+            ) from missing
+        return Store(engine, url.render_as_string(hide_password=True), None, read_only)
+    if read_only:
+        query = {"uri": "true", "mode": "ro", **({"immutable": "1"} if immutable else {})}
+        url = URL.create("sqlite", database=path.resolve().as_uri().replace("file://", "file:"), query=query)
+    else:
+        url = URL.create("sqlite", database=str(path))
+    engine = create_engine(url)
+
+    @event.listens_for(engine, "connect")
+    def _prepare(connection: Any, _: object) -> None:
+        # Transactions are ours: the driver's own begin too late.
+        connection.isolation_level = None
+        cursor = connection.cursor()
+        cursor.execute(f"PRAGMA busy_timeout = {int(1000 * BUSY_SECONDS)}")
+        if not read_only:
+            cursor.execute("PRAGMA journal_mode = WAL")
+            cursor.execute("PRAGMA synchronous = FULL")
+            cursor.execute("PRAGMA foreign_keys = ON")
+        cursor.close()
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: Any) -> None:
+        connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
+
+    return Store(engine, str(path), path, read_only)
+
+
+def _check_whole(store: Store) -> None:
+    with store.engine.connect() as connection:
+        answer = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
+    if answer != "ok":
+        raise InvalidInput(
+            f"Store {store.name}: expected a whole database, found a damaged one ({str(answer)[:100]}); nothing was"
+            " changed in it: take a copy from before."
+        )
+
+
+def _from_still_medium(path: Path, refusal: TwinloopError) -> Store:
+    """A store where not even SQLite's own marks can be made, such as on a mounted image; else the refusal again."""
+    store = _connected(str(path), path, read_only=True, immutable=True)
+    try:
+        with store.sentences():
+            _bring_up_to_date(store, create=False)
+    except TwinloopError:
+        store.close()
+        raise refusal from None
+    return store
+
+
+def _bring_up_to_date(store: Store, create: bool) -> None:
+    from sqlalchemy import inspect, text
+
+    from twinloop.store.schema import REVISION
+
+    with store.engine.connect() as connection:
+        tables = set(inspect(connection).get_table_names())
+        ours = {"alembic_version", "campaigns", "experiments"} <= tables
+        found = connection.execute(text("select version_num from alembic_version")).scalar() if ours else None
+    if tables and not ours:
+        raise InvalidInput(
+            f"Store {store.name}: expected a database of Twinloop, found one of something else, with the tables"
+            f" {', '.join(sorted(tables)[:5])}; name another file."
+        )
+    if not tables and not (create and not store.read_only):
+        raise InvalidInput(f"Store {store.name}: expected a store, found an empty database; check its name.")
+    if found != REVISION:
+        _migrate(store, found)
+
+
+def _migrate(store: Store, found: str | None) -> None:
+    from alembic import command
+    from alembic.config import Config
+    from alembic.script import ScriptDirectory
+
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).with_name("migrations")))
+    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    if found is not None and found not in known:
+        raise InvalidInput(
+            f"Store {store.name}: expected tables of version {max(known)} at most, found {found}; a newer Twinloop"
+            " wrote it: install that."
+        )
+    if store.read_only:
+        raise InvalidInput(
+            f"Store {store.name}: expected tables of version {max(known)}, found {found}; open it once without"
+            " read_only, which brings it up to date."
+        )
+    with store.engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")

@@ -1,0 +1,295 @@
+"""One campaign in a store: found, begun, and kept row by row; what is kept is committed before `keep` returns."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from twinloop.errors import InvalidInput
+from twinloop.records import Record, from_text, to_text
+from twinloop.store.database import Store
+from twinloop.store.lock import AdvisoryLock, FileLock, Lock
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a store holds of one campaign.
+
+    Args:
+        name: of the campaign in its store.
+        setup: its record.
+        logbook: its record.
+        memory: its record; None where nothing was learnt.
+        system: record of the system that it flies, where that has one.
+        runs: how many runs the system had made at the last experiment; None where it does not count.
+        created: when, in UTC.
+        sessions: versions and processor each time it was opened to be written.
+    """
+
+    name: str
+    setup: Record
+    logbook: Record
+    memory: Record | None
+    system: Record | None
+    runs: int | None
+    created: str
+    sessions: tuple[Record, ...]
+
+
+def kept(store: Store) -> list[dict[str, Any]]:
+    """The campaigns of a store, in the order in which they were begun.
+
+    Args:
+        store: open.
+
+    Returns:
+        Name, when it was begun, and how many tests and experiments there are, of each.
+    """
+    from sqlalchemy import func, select
+
+    from twinloop.store.schema import campaigns, experiments, tests
+
+    def count(table: Any) -> Any:
+        rows = select(func.count()).select_from(table).where(table.c.campaign == campaigns.c.id)
+        return rows.scalar_subquery()
+
+    wanted = select(
+        campaigns.c.name,
+        campaigns.c.created,
+        count(tests).label("tests"),
+        count(experiments).label("experiments"),
+    )
+    with store.transaction() as connection:
+        rows = connection.execute(wanted.order_by(campaigns.c.id))
+        return [dict(row._mapping) for row in rows]
+
+
+def found(store: Store, name: str | None) -> Kept | None:
+    """A campaign of a store.
+
+    Args:
+        store: open.
+        name: of the campaign; None: the only one.
+
+    Returns:
+        What the store holds of it; None where there is none.
+
+    Raises:
+        InvalidInput: no name and several campaigns, or rows that are not what was written.
+    """
+    from sqlalchemy import select
+
+    from twinloop.store.schema import campaigns, checkpoints, sessions
+
+    with store.transaction() as connection:
+        if name is None:
+            name = _only_name(connection, store)
+        row = connection.execute(select(campaigns).where(campaigns.c.name == name)).one_or_none()
+        if row is None:
+            return None
+
+        def rows(table: Any) -> list[Any]:
+            chosen = select(table).where(table.c.campaign == row.id).order_by(table.c.number)
+            return list(connection.execute(chosen))
+
+        entries = {name: rows(table) for name, table in _entries().items()}
+        opened = rows(sessions)
+        of_this = checkpoints.c.campaign == row.id
+        memory = connection.execute(select(checkpoints.c.record).where(of_this)).scalar()
+    what = f"Store {store.name}, campaign {name}"
+    runs = entries["experiments"]
+    for i, run in enumerate(runs):
+        if _hash(run.record) != run.sha256:
+            raise InvalidInput(
+                f"{what}: expected experiment {i} as it was told, found another one; somebody has changed it: take a"
+                " copy from before."
+            )
+    logbook = {name: [from_text(entry.record, what) for entry in found] for name, found in entries.items()}
+    return Kept(
+        name=row.name,
+        setup=from_text(row.setup, what),
+        logbook={"kind": "logbook", "version": 1, "identity": row.identity, **logbook},
+        memory=None if memory is None else from_text(memory, what),
+        system=None if row.system is None else from_text(row.system, what),
+        runs=runs[-1].runs if runs else None,
+        created=row.created,
+        sessions=tuple({"started": s.started, **from_text(s.provenance, what)} for s in opened),
+    )
+
+
+def _only_name(connection: Connection, store: Store) -> str:
+    from sqlalchemy import select
+
+    from twinloop.store.schema import campaigns
+
+    names = list(connection.execute(select(campaigns.c.name).order_by(campaigns.c.id)).scalars())
+    if len(names) > 1:
+        raise InvalidInput(
+            f"Store {store.name}: expected the name of one of its campaigns, found none; it holds {', '.join(names)}."
+        )
+    return str(names[0]) if names else ""
+
+
+class Keeper:
+    """The only writer of a campaign.
+
+    Args:
+        store: open, to be written; it is closed with the keeper.
+        name: of the campaign; it is begun where there is none of that name.
+        setup: its record.
+        identity: its own.
+
+    Raises:
+        StoreFailure: somebody else writes it, or the database refuses.
+    """
+
+    def __init__(self, store: Store, name: str, setup: Record, identity: str) -> None:
+        self.store = store
+        self.name = name
+        self._lock: Lock | None = None
+        with store.transaction() as connection:
+            self._id = _entered(connection, name, setup, identity)
+        self._lock = self._locked()
+        with store.transaction() as connection:
+            self.rows = {name: _count(connection, table, self._id) for name, table in _entries().items()}
+
+    def open_session(self, provenance: Record) -> None:
+        """Enters that the campaign is written from now on, and by what.
+
+        Args:
+            provenance: versions, processor and so on.
+
+        Raises:
+            StoreFailure: the database refuses.
+        """
+        from twinloop.store.schema import sessions
+
+        with self.store.transaction() as connection:
+            number = _count(connection, sessions, self._id)
+            row = {
+                "campaign": self._id,
+                "number": number,
+                "started": _now(),
+                "provenance": to_text(provenance),
+            }
+            connection.execute(sessions.insert(), row)
+
+    def keep(
+        self, entries: Mapping[str, Sequence[Any]], memory: Record | None = None, runs: int | None = None
+    ) -> None:
+        """Commits what is new; either all of it is kept when this returns, or nothing.
+
+        Args:
+            entries: records that the lists of the logbook have in addition to `rows`.
+            memory: what was learnt; None: as it was.
+            runs: how many runs the system has made; None where it does not count.
+
+        Raises:
+            StoreFailure: the database refuses.
+        """
+        from sqlalchemy import delete
+
+        from twinloop.store.schema import checkpoints
+
+        if memory is None and not any(entries.values()):
+            return
+        now, grown = _now(), dict(self.rows)
+        with self.store.transaction() as connection:
+            for name, records in entries.items():
+                for record in records:
+                    row = {"campaign": self._id, "number": grown[name], "record": to_text(record)}
+                    if name == "experiments":
+                        row |= {"told": now, "sha256": _hash(str(row["record"])), "runs": runs}
+                    connection.execute(_entries()[name].insert(), row)
+                    grown[name] += 1
+            if memory is not None:
+                connection.execute(delete(checkpoints).where(checkpoints.c.campaign == self._id))
+                row = {"campaign": self._id, "saved": now, "record": to_text(memory)}
+                connection.execute(checkpoints.insert(), row)
+        self.rows = grown
+
+    def fly(self, system: Record) -> Record:
+        """The system that the campaign flies: the one that was kept, or this one from now on.
+
+        Args:
+            system: its record.
+
+        Returns:
+            What is kept.
+
+        Raises:
+            StoreFailure: the database refuses.
+        """
+        from sqlalchemy import select, update
+
+        from twinloop.store.schema import campaigns
+
+        of_this = campaigns.c.id == self._id
+        with self.store.transaction() as connection:
+            known = connection.execute(select(campaigns.c.system).where(of_this)).scalar()
+            if known is None:
+                connection.execute(update(campaigns).where(of_this).values(system=to_text(system)))
+                return system
+        answer: Record = from_text(known, f"Store {self.store.name}")
+        return answer
+
+    def close(self) -> None:
+        """Lets others write."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+        self.store.close()
+
+    def _locked(self) -> Lock:
+        what = f"the campaign {self.name!r} of {self.store.name}"
+        path = self.store.path
+        if path is None:
+            with self.store.sentences():
+                return AdvisoryLock(self.store.engine.connect(), self._id, what)
+        with self.store.sentences():
+            return FileLock(Path(f"{path}-{self._id}.lock"), what)
+
+
+def _entered(connection: Connection, name: str, setup: Record, identity: str) -> int:
+    """The number of a campaign, which is begun where there is none of the name."""
+    from sqlalchemy import select
+
+    from twinloop.store.schema import campaigns
+
+    known = connection.execute(select(campaigns.c.id).where(campaigns.c.name == name)).scalar()
+    if known is not None:
+        return int(known)
+    row = {"name": name, "identity": identity, "created": _now(), "setup": to_text(setup)}
+    answer = connection.execute(campaigns.insert(), row)
+    assert answer.inserted_primary_key is not None
+    return int(answer.inserted_primary_key[0])
+
+
+def _entries() -> dict[str, Any]:
+    """Tables of the lists of a logbook, by name."""
+    from twinloop.store.schema import ENTRIES
+
+    return dict(ENTRIES)
+
+
+def _count(connection: Connection, table: Any, campaign: int) -> int:
+    from sqlalchemy import func, select
+
+    rows = select(func.count()).select_from(table).where(table.c.campaign == campaign)
+    return int(connection.execute(rows).scalar_one())
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _now() -> str:
+    """When, for a person; nothing depends on the clock."""
+    return datetime.now(timezone.utc).isoformat(timespec="seconds")

@@ -1,0 +1,146 @@
+"""Kills a campaign at random moments, resumes it, and compares bits with one that was never killed.
+
+    python tests/faults.py [--kills 100] [--preset paper|default] [--seed 0]
+
+Half of the kills come after a random time, half at a random statement of SQL, often in the middle of a `tell`.
+"""
+
+import argparse
+import hashlib
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import twinloop as tl
+from twinloop.records import to_text
+
+EXPERIMENTS = 3
+OPTIONS = {
+    "paper": {
+        "model_population": 30, "model_generations": 60, "test_population": 12, "test_generations": 8,
+        "committee_size": 6, "mutants": 3,
+    },
+    "default": {
+        "moves": 400, "starts": 1, "generations": 0, "lags": False, "hidden": False, "evaluations": 128,
+        "candidates": 24, "committee_size": 3, "tuning_steps": 2, "draws": 2, "tuning_starts": 1, "parts": False,
+        "libraries": ("linear",),
+    },
+}  # fmt: skip
+
+
+def fly(store, preset):
+    """The whole campaign on a noisy quadrotor, from wherever its store has it."""
+    system = tl.systems.Quadrotor(noise=1e-3, seed=7)
+    campaign = tl.Campaign(
+        system.signals,
+        controller=system.controller,
+        initial_state=system.initial_state,
+        target_state=system.target_state,
+        duration=1.0,
+        preset=preset,
+        seed=3,
+        options=OPTIONS[preset],
+        threads=1,
+        store=store,
+    )
+    campaign.run(system, EXPERIMENTS)
+    return digest(campaign)
+
+
+def digest(campaign):
+    """A hash of all that was flown, learnt and found, without what tells campaigns apart."""
+    record = campaign.to_record()
+    best = to_text(campaign.best_test.to_record())
+    text = to_text(record) + best + campaign.twin.equations(17)
+    return hashlib.sha256(text.replace(record["logbook"]["identity"], "").encode()).hexdigest()
+
+
+def die_at_statement(number):
+    """Ends this process, without any chance to tidy up, before its n-th statement of SQL."""
+    from sqlalchemy import Engine, event
+
+    left = [number]
+
+    @event.listens_for(Engine, "before_cursor_execute")
+    def count(*_):
+        left[0] -= 1
+        if left[0] == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def started(store, preset, statement=0):
+    """The campaign in a process of its own."""
+    command = [
+        sys.executable,
+        __file__,
+        "--fly",
+        str(store),
+        "--preset",
+        preset,
+        "--statement",
+        str(statement),
+    ]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+
+def killed_and_resumed(preset, kills, seed, say=lambda line: None):
+    """Campaigns that are killed now and then; all must end as the one that was not.
+
+    Returns:
+        How many kills struck a running campaign, and how many campaigns came to their end.
+    """
+    draw = random.Random(seed)
+    with tempfile.TemporaryDirectory() as folder:
+        begun = time.monotonic()
+        whole = started(Path(folder) / "whole.db", preset)
+        expected, seconds = whole.communicate()[0].strip(), time.monotonic() - begun
+        assert whole.returncode == 0 and expected, "the campaign without a kill failed"
+        struck = ended = 0
+        while struck < kills:
+            store = Path(folder) / f"{ended}.db"
+            while True:
+                by_statement = struck < kills and draw.random() < 0.5
+                child = started(store, preset, draw.randint(1, 60) if by_statement else 0)
+                if struck < kills and not by_statement:
+                    try:
+                        child.wait(draw.uniform(0.2, 1.0) * seconds)
+                    except subprocess.TimeoutExpired:
+                        child.kill()
+                answer = child.communicate()[0].strip()
+                if child.returncode == 0:
+                    break
+                assert child.returncode == -signal.SIGKILL, f"ended by itself with {child.returncode}"
+                struck += 1
+            ended += 1
+            say(f"{preset}: {struck} kills, {ended} campaigns")
+            assert answer == expected, (
+                f"campaign {ended} of {preset}, seed {seed}: other bits after {struck} kills"
+            )
+    return struck, ended
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--preset", choices=list(OPTIONS))
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--fly")
+    parser.add_argument("--statement", type=int, default=0)
+    given = parser.parse_args()
+    if given.fly:
+        if given.statement:
+            die_at_statement(given.statement)
+        print(fly(given.fly, given.preset))
+        return
+    for preset in [given.preset] if given.preset else list(OPTIONS):
+        struck, ended = killed_and_resumed(preset, given.kills, given.seed, print)
+        print(f"{preset}: {struck} kills in {ended} campaigns, every one with the bits of the one without")
+
+
+if __name__ == "__main__":
+    main()
