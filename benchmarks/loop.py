@@ -33,12 +33,8 @@ SIGNALS = _core.Signals(
 FAMILY = _core.Family.pid(
     SIGNALS,
     [(0, 3), (1, 4), (2, 5)],
-    [0.0] * 9,
-    [0.3, 0.1, 0.1] * 3,
-    [False] * 9,
-    MATRIX,
-    OFFSET,
-    0.5,
+    [(0.0, high, False) for high in [0.3, 0.1, 0.1] * 3],
+    (MATRIX, OFFSET, 0.5),
 )
 
 

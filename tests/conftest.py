@@ -121,4 +121,4 @@ def rig():
 def rig_family(rig):
     """A PID on the first state that moves both commands, one that differences the second state."""
     matrix, offset = [[1.0, 0.25], [0.5, -2.0]], [0.1, -0.2]
-    return _core.Family.pid(rig, [(0, 1), (1, None)], [0.0] * 6, [2.0] * 6, [False] * 6, matrix, offset, 1.0)
+    return _core.Family.pid(rig, [(0, 1), (1, None)], [(0.0, 2.0, False)] * 6, (matrix, offset, 1.0))

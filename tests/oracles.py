@@ -113,33 +113,66 @@ def model_step(program, form, state, command, scales, derivative_of, dt):
 
 
 class Pid:
-    """A PID an axis: integral updated before it is used, derivative on the measurement, then the map."""
+    """A PID an axis: integral updated before it is used, derivative on the measurement, then the map.
 
-    def __init__(self, axes, genes, dt, matrix, offset, power, bounds):
+    An axis is (state, rate or None), or (rate, None, angle, limit) inside a loop that asks it for a rate.
+    """
+
+    def __init__(
+        self, axes, gains, dt, matrix, offset, power, bounds, derivative_filter=0.0, anti_windup=False
+    ):
         self.axes, self.dt, self.power = axes, dt, power
-        self.gains = np.reshape(genes, (-1, 3))
+        gains = iter(gains)
+        self.gains = [[next(gains) for _ in range(3 if len(axis) == 2 else 4)] for axis in axes]
         self.matrix, self.offset, self.bounds = np.asarray(matrix), np.asarray(offset), np.asarray(bounds)
+        self.filter, self.anti_windup = derivative_filter, anti_windup
         self.integral = np.zeros(len(axes))
         self.last = [None] * len(axes)
+        self.filtered = [None] * len(axes)
+
+    def rate(self, i, state):
+        """The rate of an axis: measured or differenced, then filtered from the first one on."""
+        place, measured, *_ = self.axes[i]
+        if measured is not None:
+            rate = state[measured]
+        else:
+            rate = 0.0 if self.last[i] is None else (state[place] - self.last[i]) / self.dt
+            self.last[i] = state[place]
+        if self.filter > 0.0:
+            before = rate if self.filtered[i] is None else self.filtered[i]
+            rate = before + self.dt / (self.dt + self.filter) * (rate - before)
+            self.filtered[i] = rate
+        return rate
 
     def command(self, state, target):
-        u = np.empty(len(self.axes))
-        for i, ((angle, rate), (kp, ki, kd)) in enumerate(zip(self.axes, self.gains, strict=True)):
-            error = target[angle] - state[angle]
-            if rate is not None:
-                measured_rate = state[rate]
-            else:
-                before = self.last[i]
-                measured_rate = 0.0 if before is None else (state[angle] - before) / self.dt
-                self.last[i] = state[angle]
+        u, before = np.empty(len(self.axes)), self.integral.copy()
+        for i, (axis, gains) in enumerate(zip(self.axes, self.gains, strict=True)):
+            kp, ki, kd = gains[-3:]
+            set_point = target[axis[0]]
+            if len(axis) == 4:
+                angle, limit = axis[2:]
+                set_point = np.clip(gains[0] * (target[angle] - state[angle]) + set_point, -limit, limit)
+            error = set_point - state[axis[0]]
             self.integral[i] += error * self.dt
-            u[i] = kp * error + ki * self.integral[i] - kd * measured_rate
+            u[i] = kp * error + ki * self.integral[i] - kd * self.rate(i, state)
         v = self.offset.copy()
         for i in range(len(u)):
             v = v + self.matrix[:, i] * u[i]
         with np.errstate(all="ignore"):
             raised = v if self.power == 1.0 else np.sign(v) * np.abs(v) ** self.power
+        if self.anti_windup:
+            self.unwind(before, raised)
         return np.clip(raised, self.bounds[:, 0], self.bounds[:, 1])
+
+    def unwind(self, before, raised):
+        """Takes back the step of an integral that pushed a command out of its bounds, or further out."""
+        for i, gains in enumerate(self.gains):
+            push = self.matrix[:, i] * gains[-2] * (self.integral[i] - before[i])
+            beyond = ((raised >= self.bounds[:, 1]) & (push > 0)) | (
+                (raised <= self.bounds[:, 0]) & (push < 0)
+            )
+            if beyond.any():
+                self.integral[i] = before[i]
 
 
 def close_loop(

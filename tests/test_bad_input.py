@@ -107,7 +107,7 @@ PIDS = {
     "another scale": lambda: tl.controllers.PID(
         axes=[("x", None)], gains={**GAINS, "x.kp": (0.1, 1.0, "lin")}
     ),
-    "a bound alone": lambda: tl.controllers.PID(axes=[("x", None)], gains={**GAINS, "x.kp": 1.0}),
+    "a bound alone": lambda: tl.controllers.PID(axes=[("x", None)], gains={**GAINS, "x.kp": (1.0,)}),
     "gains in a list": lambda: tl.controllers.PID(axes=[("x", None)], gains=[1.0, 2.0, 3.0]),
     "no axis": lambda: tl.controllers.PID(axes=[], gains={}),
     "an axis twice": lambda: tl.controllers.PID(axes=[("x", None)] * 2, gains=GAINS),

@@ -305,9 +305,8 @@ def test_a_best_model_that_ignores_the_commands_is_called_flat(rig, rig_family):
 
 def test_genes_stay_in_their_box(rig):
     low, high = np.array([0.1, 0.0, 1e-3, -1.0, 0.0, 1.0]), np.array([0.2, 1.0, 1e3, 1.0, 5.0, 2.0])
-    family = _core.Family.pid(
-        rig, [(0, 1), (1, None)], low, high, [False, False, True, False, False, True], None, None, 1.0
-    )
+    logarithmic = [False, False, True, False, False, True]
+    family = _core.Family.pid(rig, [(0, 1), (1, None)], list(zip(low, high, logarithmic, strict=True)))
     committee = [linear(rig, 0.1), linear(rig, 0.3)]
     genes = (
         search_of(committee, rig, family, population=60, mutation_step=1.0).advance(5, WORKERS).archive_genes

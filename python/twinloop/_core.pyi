@@ -20,6 +20,10 @@ _Motion = tuple[float, float, float]
 """Variance of a white disturbance, variance of a lasting one, time after which that is forgotten to 1/e (s)."""
 _Chain = tuple[Sequence[int], Sequence[float], _Motion, bool]
 """States, the driven one first; variance of each sensor; disturbances; whether features are derivatives."""
+_Gains = Sequence[float | tuple[float, float, bool]]
+"""Of a law in its order: a number that fixes a gain, or low, high and whether the scale is logarithmic."""
+_Output = tuple[ArrayLike, ArrayLike, float]
+"""Matrix (n_u, outputs), offset (n_u,) and power; without one output i of a law is command i."""
 _Record = tuple[ArrayLike, ArrayLike, ArrayLike]
 """Readings (n + 1, n_x), weights (n + 1, n_x) and commands (n, n_u) of a run."""
 
@@ -214,28 +218,34 @@ class Family:
     def pid(
         signals: Signals,
         axes: Sequence[tuple[int, int | None]],
-        low: ArrayLike,
-        high: ArrayLike,
-        logarithmic: Sequence[bool],
-        matrix: ArrayLike | None,
-        offset: ArrayLike | None,
-        power: float,
+        gains: _Gains,
+        output: _Output | None = None,
+        *,
+        derivative_filter: float = 0.0,
+        anti_windup: bool = False,
     ) -> Family:
-        """One PID an axis (angle, rate or None); genes (K_P, K_I, K_D) per axis; matrix (n_u, axes)."""
+        """One PID an axis (angle, rate or None); gains (K_P, K_I, K_D) per axis; the filter's time in s."""
+    @staticmethod
+    def cascade(
+        signals: Signals,
+        axes: Sequence[tuple[int, int, float]],
+        gains: _Gains,
+        output: _Output | None = None,
+        *,
+        derivative_filter: float = 0.0,
+        anti_windup: bool = False,
+    ) -> Family:
+        """A loop on an angle around a PID on its rate: (angle, rate, limit); gains (K, K_P, K_I, K_D) per axis."""
     @staticmethod
     def state_feedback(
         signals: Signals,
         states: Sequence[int],
         integrals: Sequence[int],
         outputs: int,
-        low: ArrayLike,
-        high: ArrayLike,
-        logarithmic: Sequence[bool],
-        matrix: ArrayLike | None,
-        offset: ArrayLike | None,
-        power: float,
+        gains: _Gains,
+        output: _Output | None = None,
     ) -> Family:
-        """Feedback of errors and integrals; genes (states, integrals) per output; matrix (n_u, outputs)."""
+        """Feedback of errors and integrals; gains (states, integrals) per output."""
     @property
     def size(self) -> int: ...
     def controller(self, parameters: ArrayLike, excitation: ArrayLike | None = None) -> Controller:

@@ -93,8 +93,8 @@ def check_controller(family: UnboundFamily, signals: Signals, seed: int = 0) -> 
     for _ in range(20):
         controller = bound.controller(low + (high - low) * stream.random(bound.size))
         _promise(
-            len(controller.parameters) == bound.size,
-            f"{bound.size} named gains, found {controller.parameters}",
+            len(controller.parameters) == len(bound.law_gains),
+            f"{len(bound.law_gains)} named gains, found {controller.parameters}",
         )
         states = scales * stream.uniform(-1.0, 1.0, (10, signals.n_x))
         target = scales * stream.uniform(-1.0, 1.0, signals.n_x)

@@ -12,6 +12,7 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign import Campaign
+from twinloop.controllers import Gain
 from twinloop.flight import fly
 from twinloop.history import Experiment, Lesson
 from twinloop.identification.noise import exact
@@ -80,8 +81,14 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         "controller": {
             "test": best.number,
             "gains": [
-                {"name": gain.name, "value": value, "unit": gain.unit, "low": gain.low, "high": gain.high}
-                for gain, value in zip(campaign.family.gains, best.genes.tolist(), strict=True)
+                {
+                    "name": gain.name,
+                    "value": best.parameters[gain.name],
+                    "unit": gain.unit,
+                    "low": gain.low if isinstance(gain, Gain) else None,
+                    "high": gain.high if isinstance(gain, Gain) else None,
+                }
+                for gain in campaign.family.law_gains
             ],
             "predicted": best.predicted,
             "measured": best.measured,

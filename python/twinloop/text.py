@@ -107,7 +107,7 @@ def _gains(best: Mapping[str, Any], first: Mapping[str, Any]) -> list[list[objec
             gain["value"],
             first["gains"][gain["name"]],
             gain["unit"],
-            f"{gain['low']:g} to {gain['high']:g}",
+            "fixed" if gain["low"] is None else f"{gain['low']:g} to {gain['high']:g}",
         ]
         for gain in best["gains"]
     ]

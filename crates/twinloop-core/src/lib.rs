@@ -31,7 +31,7 @@ mod workers;
 
 pub use actuators::{Actuation, Actuator, effects};
 pub use any_dynamics::{AnyDynamics, AnyWorkspace};
-pub use controller::{Axis, Controller, Family, Law, Mixer, Parameters, Pid, StateFeedback};
+pub use controller::*;
 pub use dynamics::Dynamics;
 pub use error::{Error, Result};
 pub use evolution::{Problem, Search, Snapshot, Variation};

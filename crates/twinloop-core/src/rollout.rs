@@ -1,6 +1,6 @@
 //! The roll-out: closes the loop of a controller around dynamics. There is no second one.
 
-use crate::controller::{Family, Law};
+use crate::controller::{Controllers, Family};
 use crate::dynamics::{Dynamics, step_apart};
 use crate::lanes::{Apart, Vector};
 
@@ -55,7 +55,7 @@ pub fn rollout<D: Dynamics, V: Vector>(
     let Start { family, parameters, initial, target, steps, limits, noise, excitation, disturbance } = *start;
     let (states, commands) = (initial.len(), family.commands());
     let mut workspace = dynamics.workspace::<V>();
-    let mut memory = vec![V::splat(0.0); family.memory()];
+    let mut controllers = family.start(parameters);
     let mut state = initial.to_vec();
     let mut reading = initial.to_vec();
     let mut command = vec![V::splat(0.0); commands];
@@ -69,8 +69,7 @@ pub fn rollout<D: Dynamics, V: Vector>(
         let excitation = excitation.get(step * commands..).unwrap_or_default();
         V::apart(Send {
             family,
-            parameters,
-            memory: &mut memory,
+            controllers: &mut controllers,
             reading: &reading,
             target,
             excitation,
@@ -103,8 +102,7 @@ pub fn rollout<D: Dynamics, V: Vector>(
 /// What is sent in a period, as a function of its own: it is compiled once for each vector, not in every loop.
 struct Send<'a, V> {
     family: &'a Family,
-    parameters: &'a [V],
-    memory: &'a mut [V],
+    controllers: &'a mut Controllers<V>,
     reading: &'a [V],
     target: &'a [V],
     /// Of this step and those after it; empty for nothing.
@@ -115,7 +113,7 @@ struct Send<'a, V> {
 impl<V: Vector> Apart for Send<'_, V> {
     #[inline(always)]
     fn run(self) {
-        self.family.command(self.parameters, self.memory, self.reading, self.target, self.command);
+        self.family.command(self.controllers, self.reading, self.target, self.command);
         if !self.excitation.is_empty() {
             self.family.excite(self.command, self.excitation);
         }

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use twinloop_core::{Axis, Controller, Family, Mixer, Parameters, Pid, Signals, StateFeedback};
+use twinloop_core::{AnyLaw, Axis, Controller, Family, Gain, Mixer, Outer, Pid, Signals, StateFeedback};
 
 use crate::arrays::{Matrix, Vector, optional_rows, rows, to_vector, vector};
 use crate::error::{Result, misuse};
@@ -14,47 +14,70 @@ use crate::model::PySignals;
 #[pyclass(frozen, name = "Family", module = "twinloop._core")]
 pub struct PyFamily(pub Arc<Family>);
 
+/// A number that fixes a gain, or (low, high, logarithmic).
+#[derive(FromPyObject)]
+pub enum GainBounds {
+    Fixed(f64),
+    Free(f64, f64, bool),
+}
+
+impl From<GainBounds> for Gain {
+    fn from(bounds: GainBounds) -> Self {
+        match bounds {
+            GainBounds::Fixed(value) => Self::Fixed(value),
+            GainBounds::Free(low, high, logarithmic) => Self::Free { low, high, logarithmic },
+        }
+    }
+}
+
+/// Matrix (n_u, outputs), offset (n_u,) and power of the map from a law's outputs to the commands.
+type OutputMap<'py> = (Matrix<'py>, Vector<'py>, f64);
+
 #[pymethods]
 impl PyFamily {
     #[staticmethod]
-    #[expect(clippy::too_many_arguments, reason = "a PID, its box and its output map, as numbers")]
+    #[pyo3(signature = (signals, axes, gains, output = None, *, derivative_filter = 0.0, anti_windup = false))]
     fn pid(
         signals: &PySignals,
         axes: Vec<(usize, Option<usize>)>,
-        low: Vector<'_>,
-        high: Vector<'_>,
-        logarithmic: Vec<bool>,
-        matrix: Option<Matrix<'_>>,
-        offset: Option<Vector<'_>>,
-        power: f64,
+        gains: Vec<GainBounds>,
+        output: Option<OutputMap<'_>>,
+        derivative_filter: f64,
+        anti_windup: bool,
     ) -> Result<Self> {
-        let signals = &signals.0;
-        let output = output_map(signals, axes.len(), matrix, offset, power)?;
-        let axes = axes.into_iter().map(|(angle, rate)| Axis { angle, rate }).collect();
-        let parameters = Parameters::new(&vector(&low), &vector(&high), &logarithmic)?;
-        let pid = Pid { axes, output, dt: signals.dt };
-        Ok(Self(Arc::new(Family::pid(pid, parameters, signals.states())?)))
+        let axes = axes.into_iter().map(|(state, rate)| Axis { state, rate, outer: None }).collect();
+        Self::of_axes(&signals.0, axes, gains, output, derivative_filter, anti_windup)
     }
 
     #[staticmethod]
-    #[expect(clippy::too_many_arguments, reason = "a law, its box and its output map, as numbers")]
+    #[pyo3(signature = (signals, axes, gains, output = None, *, derivative_filter = 0.0, anti_windup = false))]
+    fn cascade(
+        signals: &PySignals,
+        axes: Vec<(usize, usize, f64)>,
+        gains: Vec<GainBounds>,
+        output: Option<OutputMap<'_>>,
+        derivative_filter: f64,
+        anti_windup: bool,
+    ) -> Result<Self> {
+        let axis = |(angle, state, limit)| Axis { state, rate: None, outer: Some(Outer { angle, limit }) };
+        let axes = axes.into_iter().map(axis).collect();
+        Self::of_axes(&signals.0, axes, gains, output, derivative_filter, anti_windup)
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (signals, states, integrals, outputs, gains, output = None))]
     fn state_feedback(
         signals: &PySignals,
         states: Vec<usize>,
         integrals: Vec<usize>,
         outputs: usize,
-        low: Vector<'_>,
-        high: Vector<'_>,
-        logarithmic: Vec<bool>,
-        matrix: Option<Matrix<'_>>,
-        offset: Option<Vector<'_>>,
-        power: f64,
+        gains: Vec<GainBounds>,
+        output: Option<OutputMap<'_>>,
     ) -> Result<Self> {
         let signals = &signals.0;
-        let output = output_map(signals, outputs, matrix, offset, power)?;
-        let parameters = Parameters::new(&vector(&low), &vector(&high), &logarithmic)?;
+        let output = output_map(signals, outputs, output)?;
         let feedback = StateFeedback { states, integrals, outputs, output, dt: signals.dt };
-        Ok(Self(Arc::new(Family::state_feedback(feedback, parameters, signals.states())?)))
+        Self::of_law(feedback, gains, signals)
     }
 
     #[getter]
@@ -70,19 +93,32 @@ impl PyFamily {
     }
 }
 
-/// The map from a law's outputs to the commands; without a matrix output i is command i.
-fn output_map(
-    signals: &Signals,
-    outputs: usize,
-    matrix: Option<Matrix<'_>>,
-    offset: Option<Vector<'_>>,
-    power: f64,
-) -> Result<Mixer> {
+impl PyFamily {
+    fn of_law(law: impl Into<AnyLaw>, gains: Vec<GainBounds>, signals: &Signals) -> Result<Self> {
+        let gains = gains.into_iter().map(Gain::from).collect();
+        Ok(Self(Arc::new(Family::new(law, gains, signals.states())?)))
+    }
+
+    fn of_axes(
+        signals: &Signals,
+        axes: Vec<Axis>,
+        gains: Vec<GainBounds>,
+        output: Option<OutputMap<'_>>,
+        derivative_filter: f64,
+        anti_windup: bool,
+    ) -> Result<Self> {
+        let output = output_map(signals, axes.len(), output)?;
+        let pid = Pid::new(axes, output, signals.dt).filtered(derivative_filter)?;
+        Self::of_law(if anti_windup { pid.with_anti_windup() } else { pid }, gains, signals)
+    }
+}
+
+/// The map from a law's outputs to the commands; without one output i is command i.
+fn output_map(signals: &Signals, outputs: usize, map: Option<OutputMap<'_>>) -> Result<Mixer> {
     let bounds = signals.command_bounds.clone();
-    let Some(matrix) = matrix else { return Ok(Mixer::direct(bounds, outputs)?) };
+    let Some((matrix, offset, power)) = map else { return Ok(Mixer::direct(bounds, outputs)?) };
     let matrix = rows("mixer matrix", &matrix, outputs)?;
-    let offset = offset.map_or_else(|| vec![0.0; bounds.len()], |offset| vector(&offset));
-    Ok(Mixer::new(matrix, offset, power, bounds, outputs)?)
+    Ok(Mixer::new(matrix, vector(&offset), power, bounds, outputs)?)
 }
 
 /// One controller of a family, with its memory.

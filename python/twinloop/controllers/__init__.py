@@ -1,9 +1,22 @@
 """Families of controllers: bounded gains and a law, one implementation for search and real run."""
 
-from twinloop.controllers.family import Controller, Family, Gain, UnboundFamily
+from twinloop.controllers.cascade import Cascade
+from twinloop.controllers.family import Controller, Family, UnboundFamily
+from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.controllers.lqr import lqr_gains
 from twinloop.controllers.mixer import Mixer
 from twinloop.controllers.pid import PID
 from twinloop.controllers.state_feedback import StateFeedback
 
-__all__ = ["PID", "Controller", "Family", "Gain", "Mixer", "StateFeedback", "UnboundFamily", "lqr_gains"]
+__all__ = [
+    "PID",
+    "Cascade",
+    "Controller",
+    "Family",
+    "FixedGain",
+    "Gain",
+    "Mixer",
+    "StateFeedback",
+    "UnboundFamily",
+    "lqr_gains",
+]

@@ -12,27 +12,9 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop.arrays import Floats, floats, number
+from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.signals import Signals
-
-
-@dataclass(frozen=True)
-class Gain:
-    """One parameter of a family.
-
-    Args:
-        name: such as "roll.kp".
-        unit: such as "N m/rad".
-        low: smallest value, in its unit.
-        high: largest value, in its unit.
-        logarithmic: whether decades matter more than differences.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    logarithmic: bool = False
 
 
 @runtime_checkable
@@ -50,51 +32,64 @@ class Family:
 
     Args:
         signals: what they read and command.
-        gains: the parameters, in the order of the genes.
+        law_gains: all gains of the law, in its order: those with bounds, and those that are fixed.
         engine: the same family in the native engine.
 
     Raises:
-        InvalidInput: the engine counts other gains than are named.
+        InvalidInput: the engine counts other gains than are named, or none has bounds.
     """
 
     signals: Signals
-    gains: Sequence[Gain]
+    law_gains: Sequence[Gain | FixedGain]
     engine: _core.Family
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gains", tuple(self.gains))
+        object.__setattr__(self, "law_gains", tuple(self.law_gains))
         if self.engine.size != len(self.gains):
             raise InvalidInput(
                 f"Family: expected {self.engine.size} named gains, found {len(self.gains)}; name every gain"
                 " once."
             )
 
+    @cached_property
+    def gains(self) -> tuple[Gain, ...]:
+        """The parameters: gains with bounds, in the order of the genes."""
+        return tuple(gain for gain in self.law_gains if isinstance(gain, Gain))
+
+    @cached_property
+    def fixed(self) -> dict[str, float]:
+        """Gains that all controllers share, by name, in their units."""
+        return {gain.name: gain.value for gain in self.law_gains if isinstance(gain, FixedGain)}
+
     @property
     def size(self) -> int:
-        """Number of gains."""
+        """Number of parameters."""
         return len(self.gains)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the gains, in the order of the genes."""
+        """Names of the parameters, in the order of the genes."""
         return tuple(gain.name for gain in self.gains)
 
     def genes(self, parameters: Mapping[str, float] | ArrayLike) -> Floats:
         """Gains as a vector.
 
         Args:
-            parameters: all gains by name, or (size,) in order; each in its unit and bounds.
+            parameters: gains by name, or (size,) in order; each in its unit and bounds. Names of fixed gains may be
+                left out.
 
         Returns:
             Genes (size,), in the units of the gains.
 
         Raises:
-            InvalidInput: a gain that is unknown, missing, not finite or out of bounds.
+            InvalidInput: a gain that is unknown, missing, not finite or out of bounds, or fixed at another number.
         """
         if isinstance(parameters, Mapping):
-            for name in parameters:
-                if name not in self.names:
-                    raise unknown("gain", name, self.names)
+            for name, value in parameters.items():
+                if name in self.fixed:
+                    self._check_fixed(name, value)
+                elif name not in self.names:
+                    raise unknown("gain", name, (*self.names, *self.fixed))
             missing = [name for name in self.names if name not in parameters]
             if missing:
                 raise InvalidInput(
@@ -119,12 +114,20 @@ class Family:
             genes: (size,), in the units of the gains.
 
         Returns:
-            A value for each name, in the order of the genes.
+            A value for each gain of the law, in its order, the fixed ones too.
 
         Raises:
             InvalidInput: another number of genes, or one that is not finite.
         """
-        return dict(zip(self.names, floats("Genes", genes, (self.size,)).tolist(), strict=True))
+        free = dict(zip(self.names, floats("Genes", genes, (self.size,)).tolist(), strict=True))
+        return {gain.name: {**free, **self.fixed}[gain.name] for gain in self.law_gains}
+
+    def _check_fixed(self, name: str, value: object) -> None:
+        if number(f"Gain {name!r}", value) != self.fixed[name]:
+            raise InvalidInput(
+                f"Gain {name!r}: expected {self.fixed[name]:g}, which it is fixed at, found {value:g}; leave it out, or"
+                " give it bounds in the family."
+            )
 
     def controller(self, genes: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
         """One controller of the family, reset.

@@ -51,7 +51,7 @@ def lqr_gains(
         command_weights: cost of a command's squared departure from its rest, by name; by default 1 / scale².
 
     Returns:
-        All gains of the family by name, clipped to their bounds.
+        All gains of the family by name, clipped to their bounds; a fixed one as it is.
 
     Raises:
         InvalidInput: no family of state feedbacks, unknown names, or weights that are not above 0 (commands)
@@ -93,9 +93,8 @@ def lqr_gains(
             " that no feedback stabilises there; learn from more tests, feed back other states, or give every"
             " state that drifts a weight."
         )
-    low = np.array([gain.low for gain in family.gains])
-    high = np.array([gain.high for gain in family.gains])
-    return family.parameters(np.clip(gains.ravel(), low, high))
+    best = {gain.name: value for gain, value in zip(family.law_gains, gains.ravel().tolist(), strict=True)}
+    return family.parameters([np.clip(best[gain.name], gain.low, gain.high) for gain in family.gains])
 
 
 def _costs(kind: str, weights: Mapping[str, float] | None, scales: Mapping[str, float]) -> list[float]:

@@ -36,6 +36,12 @@ class Mixer(Recorded, kind="mixer"):
         object.__setattr__(self, "offset", floats("Mixer, offset (one entry a command)", offset, (rows,)))
         object.__setattr__(self, "power", number("Mixer, power", self.power, above=0.0))
 
+    @property
+    def engine(self) -> tuple[Floats, Floats, float]:
+        """The same as numbers, for the native engine."""
+        assert self.offset is not None  # __post_init__ has set it
+        return self.matrix, self.offset, self.power
+
     def check(self, commands: int, axes: int) -> None:
         """Refuses to map other numbers of axes and commands than its matrix has.
 

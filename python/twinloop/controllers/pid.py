@@ -2,55 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from twinloop import _core
-from twinloop.controllers.bounds import GainBounds, bounds_by_name, gain_units
-from twinloop.controllers.family import Family, Gain
+from twinloop.controllers.axes import (
+    TERMS,
+    Axis,
+    asked_units,
+    check_anti_windup,
+    checked_axes,
+    filter_time,
+    place,
+)
+from twinloop.controllers.family import Family
+from twinloop.controllers.gains import GainBounds, bounds_by_name, gain_of, gain_units
 from twinloop.controllers.mixer import Mixer, check_output
-from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.errors import engine_input
 from twinloop.records import Recorded
 from twinloop.signals import Signals
-
-TERMS = ("kp", "ki", "kd")
-Axis = tuple[str, "str | None"]
 
 
 @dataclass(frozen=True, eq=False)
 class PID(Recorded, kind="pid"):
     """u = K_P e + K_I ∫e − K_D rate on every axis, where e = target − angle.
 
-    The integral is updated before it is used. There is no anti-windup.
+    The integral is updated before it is used. A gain fixed at 0 leaves its term out: a PD is a PID.
 
     Args:
         axes: (angle, rate) per axis, by the names of the states; a rate of None is the difference of the
             measured angle over one period.
         gains: bounds (low, high) of "<angle>.kp", "<angle>.ki" and "<angle>.kd" for every axis; a third item
-            "log" where decades matter.
+            "log" where decades matter; a number instead of bounds fixes a gain.
         output: from the axes to the commands; None: axis i is command i.
+        anti_windup: "clamping": an integral does not take a step that would push a command further beyond the bound
+            that it is at. None: integrals always go on.
+        derivative_filter: time constant of a first-order low-pass filter on the rates, s; 0: none.
 
     Raises:
-        InvalidInput: gains that do not fit the axes, or bounds the wrong way round.
+        InvalidInput: gains that do not fit the axes, bounds the wrong way round, or options that there are not.
     """
 
     axes: Sequence[Axis]
     gains: Mapping[str, GainBounds]
     output: Mixer | None = None
+    anti_windup: str | None = None
+    derivative_filter: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axes", tuple(_axis(axis) for axis in self.axes))
-        angles = [angle for angle, _ in self.axes]
-        if not angles or len(set(angles)) != len(angles):
-            raise InvalidInput(
-                f"PID, axes: expected at least one axis and each angle once, found {angles}; mend them."
-            )
-        names = [f"{angle}.{term}" for angle in angles for term in TERMS]
+        axes = checked_axes("PID", self.axes, "rate or None")
+        object.__setattr__(self, "axes", axes)
+        names = [f"{angle}.{term}" for angle, _ in axes for term in TERMS]
         object.__setattr__(self, "gains", bounds_by_name("PID", self.gains, names))
+        object.__setattr__(self, "derivative_filter", filter_time("PID", self.derivative_filter))
         check_output("PID", self.output)
+        check_anti_windup("PID", self.anti_windup)
 
     def bind(self, signals: Signals) -> Family:
-        """The family over these signals; genes in the order (K_P, K_I, K_D) per axis.
+        """The family over these signals; gains in the order (K_P, K_I, K_D) per axis.
 
         Args:
             signals: where the axes are found.
@@ -59,50 +68,26 @@ class PID(Recorded, kind="pid"):
             The family, its gains with units.
 
         Raises:
-            InvalidInput: an axis that is no state, or another number of outputs than of commands.
+            InvalidInput: an axis that is no state, another number of outputs than of commands, or no gain with bounds.
         """
-        index = {name: i for i, name in enumerate(signals.state_names)}
-        for name in (name for axis in self.axes for name in axis if name is not None):
-            if name not in index:
-                raise unknown("state in the axes of a PID", name, index)
-        if self.output is None and len(self.axes) != signals.n_u:
-            raise InvalidInput(
-                f"PID: expected one axis for each of the {signals.n_u} commands, found {len(self.axes)}; "
-                "add axes, or an output=Mixer(...)."
-            )
-        if self.output is not None:
-            self.output.check(signals.n_u, len(self.axes))
-        gains = self._gains(signals)
+        axes = [
+            (place("PID", angle, signals), None if rate is None else place("PID", rate, signals))
+            for angle, rate in self.axes
+        ]
+        units = {state.name: state.unit for state in signals.states}
+        asked = asked_units("PID", self.output, len(axes), signals)
+        gains = [
+            gain_of(f"{angle}.{term}", unit, self.gains[f"{angle}.{term}"])
+            for (angle, _), of_output in zip(self.axes, asked, strict=True)
+            for term, unit in zip(TERMS, gain_units(of_output, units[angle]), strict=True)
+        ]
         with engine_input():
             engine = _core.Family.pid(
                 signals.engine,
-                [(index[angle], None if rate is None else index[rate]) for angle, rate in self.axes],
-                [gain.low for gain in gains],
-                [gain.high for gain in gains],
-                [gain.logarithmic for gain in gains],
-                None if self.output is None else self.output.matrix,
-                None if self.output is None else self.output.offset,
-                1.0 if self.output is None else self.output.power,
+                axes,
+                [gain.engine for gain in gains],
+                None if self.output is None else self.output.engine,
+                derivative_filter=self.derivative_filter,
+                anti_windup=self.anti_windup is not None,
             )
         return Family(signals, gains, engine)
-
-    def _gains(self, signals: Signals) -> list[Gain]:
-        units = {state.name: state.unit for state in signals.states}
-        gains = []
-        for i, (angle, _) in enumerate(self.axes):
-            asked = signals.commands[i].unit if self.output is None else self.output.unit
-            for term, unit in zip(TERMS, gain_units(asked, units[angle]), strict=True):
-                name = f"{angle}.{term}"
-                low, high, *scale = self.gains[name]
-                gains.append(Gain(name, unit, float(low), float(high), scale == ["log"]))
-        return gains
-
-
-def _axis(axis: object) -> Axis:
-    if isinstance(axis, Iterable) and not isinstance(axis, str):
-        pair = tuple(axis)
-        if len(pair) == 2 and isinstance(pair[0], str) and (pair[1] is None or isinstance(pair[1], str)):
-            return pair
-    raise InvalidInput(
-        f"PID, axes: expected pairs (angle, rate or None) of names, found {axis!r}; write both."
-    )

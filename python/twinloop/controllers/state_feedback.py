@@ -6,8 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from twinloop import _core
-from twinloop.controllers.bounds import GainBounds, bounds_by_name, gain_bounds, gain_units
-from twinloop.controllers.family import Family, Gain
+from twinloop.controllers.family import Family
+from twinloop.controllers.gains import (
+    FixedGain,
+    Gain,
+    GainBounds,
+    bounds_by_name,
+    gain_bounds,
+    gain_of,
+    gain_units,
+)
 from twinloop.controllers.mixer import Mixer, check_output
 from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.records import Recorded
@@ -25,7 +33,7 @@ class StateFeedback(Recorded, kind="state_feedback"):
     Args:
         states: names of the states that are fed back; None: all.
         gains: bounds of every gain: one (low, high) for all, or by name, where "roll" stands for the gains of
-            roll on all outputs; a third item "log" where decades matter.
+            roll on all outputs; a third item "log" where decades matter. A number instead fixes the gain.
         output: from the outputs u1, u2, … to the commands, which may hold an offset such as the thrust of
             hovering; None: output i is command i.
         integral: names of the states whose error is integrated and fed back too.
@@ -53,7 +61,7 @@ class StateFeedback(Recorded, kind="state_feedback"):
             object.__setattr__(self, "gains", gain_bounds("StateFeedback, gains", self.gains))
 
     def bind(self, signals: Signals) -> FeedbackFamily:
-        """The family over these signals; genes in rows of (states, integrals), one row an output.
+        """The family over these signals; gains in rows of (states, integrals), one row an output.
 
         Args:
             signals: where the states are found.
@@ -82,17 +90,15 @@ class StateFeedback(Recorded, kind="state_feedback"):
                 [index[name] for name in states],
                 [index[name] for name in self.integral],
                 len(outputs),
-                [gain.low for gain in gains],
-                [gain.high for gain in gains],
-                [gain.logarithmic for gain in gains],
-                None if self.output is None else self.output.matrix,
-                None if self.output is None else self.output.offset,
-                1.0 if self.output is None else self.output.power,
+                [gain.engine for gain in gains],
+                None if self.output is None else self.output.engine,
             )
         return FeedbackFamily(signals, gains, engine, states, tuple(self.integral), self.output)
 
-    def _gains(self, signals: Signals, states: Sequence[str], outputs: Mapping[str, str]) -> list[Gain]:
-        """Name, unit and bounds of every gain, in the order of the genes."""
+    def _gains(
+        self, signals: Signals, states: Sequence[str], outputs: Mapping[str, str]
+    ) -> list[Gain | FixedGain]:
+        """Name, unit and bounds of every gain, in the order of the law."""
         unit_of = {state.name: state.unit for state in signals.states}
         # What each gain multiplies: its name, the state behind it, and which of the three units it has.
         sources = [(name, name, 0) for name in states]
@@ -103,9 +109,7 @@ class StateFeedback(Recorded, kind="state_feedback"):
         for output, asked in outputs.items():
             for source, state, kind in sources:
                 name = f"{source}->{output}"
-                low, high, *scale = bounds[name]
-                unit = gain_units(asked, unit_of[state])[kind]
-                gains.append(Gain(name, unit, float(low), float(high), scale == ["log"]))
+                gains.append(gain_of(name, gain_units(asked, unit_of[state])[kind], bounds[name]))
         return gains
 
     def _spread(self, names: Mapping[str, str]) -> Mapping[str, GainBounds]:
@@ -124,7 +128,7 @@ class FeedbackFamily(Family):
 
     Args:
         signals: what they read and command.
-        gains: the parameters, in the order of the genes.
+        law_gains: all gains of the law, in its order.
         engine: the same family in the native engine.
         states: names of the states that are fed back.
         integral: names of the states whose error is integrated.

@@ -60,6 +60,11 @@ impl Mixer {
         &self.bounds
     }
 
+    /// How much an axis moves each command (n_u), before the power.
+    pub(super) fn column(&self, axis: usize) -> impl Iterator<Item = f64> {
+        self.matrix.iter().map(move |row| row[axis])
+    }
+
     /// Writes the commands of the axes' outputs, which stand `stride` apart.
     #[inline(always)]
     pub fn apply<V: Vector>(&self, outputs: &[V], stride: usize, command: &mut [V]) {

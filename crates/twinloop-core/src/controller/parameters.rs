@@ -3,6 +3,22 @@
 use crate::error::{Result, invalid};
 use crate::rng::Stream;
 
+/// One gain of a law, as a family has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gain {
+    /// The same in all controllers of the family: no parameter.
+    Fixed(f64),
+    /// A parameter.
+    Free {
+        /// Smallest value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+        /// Whether decades matter more than differences.
+        logarithmic: bool,
+    },
+}
+
 /// Bounds of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Interval {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Family, Law};
+use super::{Controllers, Family};
 use crate::error::{Result, invalid};
 use crate::lanes::{Scalar, Vector};
 
@@ -10,7 +10,7 @@ use crate::lanes::{Scalar, Vector};
 pub struct Controller {
     family: Arc<Family>,
     parameters: Vec<Scalar>,
-    memory: Vec<Scalar>,
+    running: Controllers<Scalar>,
     /// What is added to the commands, n × n_u; nothing after the last row.
     excitation: Vec<Scalar>,
     /// Commands given since the start of the run.
@@ -26,8 +26,8 @@ impl Controller {
                 "controller: expected {expected} finite parameters, found {parameters:?}"
             ));
         }
-        let memory = vec![Scalar::splat(0.0); family.memory()];
-        Ok(Self { parameters: lanes(&parameters), memory, excitation: vec![], period: 0, family })
+        let parameters = lanes(&parameters);
+        Ok(Self { running: family.start(&parameters), parameters, excitation: vec![], period: 0, family })
     }
 
     /// The same with an excitation (n × n_u): a row is added to the command of each period, then the bounds clip it.
@@ -50,7 +50,7 @@ impl Controller {
 
     /// Back to the start of a run.
     pub fn reset(&mut self) {
-        self.memory.fill(Scalar::splat(0.0));
+        self.running = self.family.start(&self.parameters);
         self.period = 0;
     }
 
@@ -69,7 +69,7 @@ impl Controller {
             );
         }
         let mut command = vec![Scalar::splat(0.0); self.family.commands()];
-        self.family.command(&self.parameters, &mut self.memory, &lanes(state), &lanes(target), &mut command);
+        self.family.command(&mut self.running, &lanes(state), &lanes(target), &mut command);
         if let Some(row) = self.excitation.chunks_exact(command.len()).nth(self.period) {
             self.family.excite(&mut command, row);
         }

@@ -5,7 +5,7 @@ use super::mixer::Mixer;
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
 
-/// u = K (target − x) + K_I ∫(target − x) and an output map; parameters: a row of (K, K_I) for the first output, then
+/// u = K (target − x) + K_I ∫(target − x) and an output map; gains: a row of (K, K_I) for the first output, then
 /// the second, … The integrals count before they are used, as a PID's do; there is no anti-windup.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateFeedback {
@@ -26,14 +26,22 @@ impl StateFeedback {
     fn row(&self) -> usize {
         self.states.len() + self.integrals.len()
     }
+}
 
-    /// Gains of all outputs.
-    pub(super) fn gains(&self) -> usize {
+impl Law for StateFeedback {
+    fn gains(&self) -> usize {
         self.outputs * self.row()
     }
 
-    /// Refuses states that are not there, and a law that feeds nothing back.
-    pub(super) fn check(&self, states: usize) -> Result<()> {
+    fn memory(&self) -> usize {
+        self.integrals.len() + self.outputs
+    }
+
+    fn output(&self) -> &Mixer {
+        &self.output
+    }
+
+    fn check(&self, states: usize) -> Result<()> {
         let missing = self.states.iter().chain(&self.integrals).find(|&&state| state >= states);
         if let Some(state) = missing {
             return invalid(format!("controller: expected states 0 to {}, found {state}", states - 1));
@@ -45,17 +53,11 @@ impl StateFeedback {
         }
         Ok(())
     }
-}
-
-impl Law for StateFeedback {
-    fn memory(&self) -> usize {
-        self.integrals.len() + self.outputs
-    }
 
     #[inline(always)]
     fn command<V: Vector>(
         &self,
-        parameters: &[V],
+        gains: &[V],
         memory: &mut [V],
         state: &[V],
         target: &[V],
@@ -65,7 +67,7 @@ impl Law for StateFeedback {
         for (integral, &i) in integrals.iter_mut().zip(&self.integrals) {
             *integral = *integral + (target[i] - state[i]) * self.dt;
         }
-        for (output, gains) in outputs.iter_mut().zip(parameters.chunks_exact(self.row())) {
+        for (output, gains) in outputs.iter_mut().zip(gains.chunks_exact(self.row())) {
             let (of_states, of_integrals) = gains.split_at(self.states.len());
             let mut u = V::splat(0.0);
             for (&gain, &i) in of_states.iter().zip(&self.states) {

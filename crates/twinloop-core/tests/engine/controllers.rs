@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Axis, Controller, Family, Mixer, Parameters, Pid, Purpose, Scalar, StateFeedback, Stream, Vector,
+    Axis, Controller, Family, Gain, Mixer, Outer, Parameters, Pid, Purpose, Scalar, StateFeedback, Stream,
+    Vector,
 };
 
 use crate::oracle::Pids;
-use crate::worlds::{GAINS, World, gains, state};
+use crate::worlds::{GAINS, World, axis, free, gains, state};
 
 fn stream(seed: u64) -> Stream {
     Stream::new(seed, Purpose::Single, 0, 0, 0)
@@ -48,8 +49,7 @@ proptest! {
         target in state(),
         states in prop::collection::vec(state(), 1..20),
     ) {
-        let parameters = Parameters::new(&[-3.0; 6], &[3.0; 6], &[false; 6]).unwrap();
-        let family = Family::state_feedback(feedback(vec![2, 0], vec![1], 2), parameters, 3).unwrap();
+        let family = Family::new(feedback(vec![2, 0], vec![1], 2), vec![free(-3.0, 3.0); 6], 3).unwrap();
         let mut controller = Controller::new(Arc::new(family), gains.to_vec()).unwrap();
         let mut integral = 0.0;
         for state in &states {
@@ -125,8 +125,8 @@ fn the_integral_counts_before_it_is_used_and_the_derivative_is_of_the_measuremen
     // One axis without mixing: K_P = 2, K_I = 3, K_D = 5, a period of 0.1 s.
     let family = |rate| {
         let output = Mixer::direct(vec![(-1e6, 1e6)], 1).unwrap();
-        let pid = Pid { axes: vec![Axis { angle: 0, rate }], output, dt: 0.1 };
-        Arc::new(Family::pid(pid, Parameters::new(&[0.0; 3], &[9.0; 3], &[false; 3]).unwrap(), 2).unwrap())
+        let pid = Pid::new(vec![axis(0, rate)], output, 0.1);
+        Arc::new(Family::new(pid, vec![free(0.0, 9.0); 3], 2).unwrap())
     };
     let commands = |rate| -> Vec<f64> {
         let mut controller = Controller::new(family(rate), vec![2.0, 3.0, 5.0]).unwrap();
@@ -183,12 +183,25 @@ fn boxes_without_room_are_refused() {
 #[test]
 fn families_whose_parts_do_not_fit_are_refused() {
     let bounds = vec![(-1.0, 1.0)];
-    let pid = |axis| Pid { axes: vec![axis], output: Mixer::direct(bounds.clone(), 1).unwrap(), dt: 0.1 };
-    let gains = |n| Parameters::new(&vec![0.0; n], &vec![1.0; n], &vec![false; n]).unwrap();
-    let refusal = |axis, n| Family::pid(pid(axis), gains(n), 2).unwrap_err().to_string();
-    assert!(refusal(Axis { angle: 0, rate: None }, 4).contains("3 gains"));
-    assert!(refusal(Axis { angle: 2, rate: None }, 3).contains("states 0 to 1"));
-    assert!(refusal(Axis { angle: 0, rate: Some(2) }, 3).contains("states 0 to 1"));
+    let pid = |axis| Pid::new(vec![axis], Mixer::direct(bounds.clone(), 1).unwrap(), 0.1);
+    let refusal = |axis, n| Family::new(pid(axis), vec![free(0.0, 1.0); n], 2).unwrap_err().to_string();
+    assert!(refusal(axis(0, None), 4).contains("3 gains"));
+    assert!(refusal(axis(2, None), 3).contains("states 0 to 1"));
+    assert!(refusal(axis(0, Some(2)), 3).contains("states 0 to 1"));
+    let outer = |angle, limit| Axis { outer: Some(Outer { angle, limit }), ..axis(1, None) };
+    assert!(refusal(outer(0, 1.0), 3).contains("4 gains"));
+    assert!(refusal(outer(2, 1.0), 4).contains("states 0 to 1"));
+    for limit in [0.0, -1.0, f64::NAN] {
+        assert!(refusal(outer(0, limit), 4).contains("limits of the rates above 0"));
+    }
+    for time in [-0.1, f64::NAN, f64::INFINITY] {
+        let refused = pid(axis(0, None)).filtered(time).unwrap_err().to_string();
+        assert!(refused.contains("at least 0 s"), "{refused}");
+    }
+    let fixed =
+        |value| Family::new(pid(axis(0, None)), vec![Gain::Fixed(value); 3], 2).unwrap_err().to_string();
+    assert!(fixed(f64::NAN).contains("finite gains"));
+    assert!(fixed(1.0).contains("at least one"));
     assert!(Mixer::direct(bounds.clone(), 2).unwrap_err().to_string().contains("2 axes and 1 commands"));
     let mixer =
         |matrix, offset, power| Mixer::new(matrix, offset, power, bounds.clone(), 1).unwrap_err().to_string();
@@ -209,8 +222,7 @@ fn families_whose_parts_do_not_fit_are_refused() {
 #[test]
 fn state_feedbacks_whose_parts_do_not_fit_are_refused() {
     let refusal = |feedback: StateFeedback, n: usize| {
-        let parameters = Parameters::new(&vec![0.0; n], &vec![1.0; n], &vec![false; n]).unwrap();
-        Family::state_feedback(feedback, parameters, 3).unwrap_err().to_string()
+        Family::new(feedback, vec![free(0.0, 1.0); n], 3).unwrap_err().to_string()
     };
     assert!(refusal(feedback(vec![0, 1], vec![2], 2), 5).contains("6 gains"));
     assert!(refusal(feedback(vec![0, 3], vec![], 2), 4).contains("states 0 to 2, found 3"));

@@ -103,8 +103,8 @@ impl<'a> Pids<'a> {
         let World { axes, signals, .. } = self.world;
         let mut efforts = Vec::new();
         for (i, axis) in axes.iter().enumerate() {
-            let angle = state[axis.angle];
-            let error = target[axis.angle] - angle;
+            let angle = state[axis.state];
+            let error = target[axis.state] - angle;
             self.integrals[i] += error * signals.dt;
             let rate = match (axis.rate, self.last_angles[i]) {
                 (Some(rate), _) => state[rate],

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Axis, Dynamics, Family, Gyroscopic, Influences, Mixer, Parameters, Pid, Quadrotor, Scalar, Task,
-    Trajectory, Vector, Width, record, step_rows,
+    Dynamics, Family, Gyroscopic, Influences, Mixer, Pid, Quadrotor, Scalar, Task, Trajectory, Vector, Width,
+    record, step_rows,
 };
 
 use crate::oracle::rk4;
+use crate::worlds::{axis, free};
 
 fn quadrotor(gyroscopic: Gyroscopic) -> Quadrotor {
     Quadrotor {
@@ -34,9 +35,9 @@ fn first_flight(gyroscopic: Gyroscopic) -> Trajectory {
     let matrix =
         vec![vec![0.0, roll, -yaw], vec![-roll, 0.0, yaw], vec![0.0, -roll, -yaw], vec![roll, 0.0, yaw]];
     let output = Mixer::new(matrix, vec![hover; 4], 0.5, vec![(0.0, 300.0); 4], 3).unwrap();
-    let axes = (0..3).map(|i| Axis { angle: i, rate: Some(i + 3) }).collect();
-    let parameters = Parameters::new(&[0.0; 9], &[0.3, 0.1, 0.1].repeat(3), &[false; 9]).unwrap();
-    let family = Family::pid(Pid { axes, output, dt: 0.02 }, parameters, 6).unwrap();
+    let axes = (0..3).map(|i| axis(i, Some(i + 3))).collect();
+    let bounds = [0.3, 0.1, 0.1].repeat(3).into_iter().map(|high| free(0.0, high)).collect();
+    let family = Family::new(Pid::new(axes, output, 0.02), bounds, 6).unwrap();
     let degrees = |x: f64| x * PI / 180.0;
     let target = vec![degrees(-30.0), degrees(30.0), degrees(-70.0), 0.0, 0.0, 0.0];
     let task = Task::new(vec![0.0; 6], target, 100).unwrap();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Axis, Experiment, Family, Form, Grammar, Instruction, Mixer, Operand, Operation, Page, Parameters, Pid,
+    Axis, Experiment, Family, Form, Gain, Grammar, Instruction, Mixer, Operand, Operation, Page, Pid,
     Program, SelectedTests, Shape, Signals, Width, Workers,
 };
 
@@ -39,14 +39,13 @@ impl World {
             kinematics: None,
         };
         let signals = Arc::new(signals.validated().unwrap());
-        let axes = vec![Axis { angle: 0, rate: Some(1) }, Axis { angle: 2, rate: None }];
+        let axes = vec![axis(0, Some(1)), axis(2, None)];
         let (matrix, offset) = (vec![vec![1.0, 0.5], vec![-0.25, 2.0]], vec![0.1, -0.2]);
         let output =
             Mixer::new(matrix.clone(), offset.clone(), power, signals.command_bounds.clone(), axes.len());
-        let parameters =
-            Parameters::new(&[0.0; GAINS], &[4.0, 2.0, 1.0, 4.0, 2.0, 1.0], &[false; GAINS]).unwrap();
-        let pid = Pid { axes: axes.clone(), output: output.unwrap(), dt: signals.dt };
-        let family = Arc::new(Family::pid(pid, parameters, STATES).unwrap());
+        let pid = Pid::new(axes.clone(), output.unwrap(), signals.dt);
+        let gains = [4.0, 2.0, 1.0, 4.0, 2.0, 1.0].map(|high| free(0.0, high)).to_vec();
+        let family = Arc::new(Family::new(pid, gains, STATES).unwrap());
         Self { signals, family, axes, matrix, offset, power }
     }
 
@@ -63,6 +62,16 @@ impl World {
     pub fn selected(&self, experiments: &[Experiment]) -> SelectedTests {
         experiments.iter().fold(self.no_tests(), |tests, one| tests.with_test(one.clone()).unwrap())
     }
+}
+
+/// An axis whose set point is the target.
+pub fn axis(state: usize, rate: Option<usize>) -> Axis {
+    Axis { state, rate, outer: None }
+}
+
+/// A gain between bounds, on a linear scale.
+pub fn free(low: f64, high: f64) -> Gain {
+    Gain::Free { low, high, logarithmic: false }
 }
 
 pub fn one_worker() -> Workers {

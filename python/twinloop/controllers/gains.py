@@ -1,14 +1,74 @@
-"""Bounds and units of gains, as every family of controllers takes and tells them."""
+"""Gains of a law: bounds or a fixed number, by name and with a unit, as every family takes and tells them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from twinloop.arrays import number
 from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import ordered
 
-GainBounds = tuple[float, float] | tuple[float, float, str]
+GainBounds = float | tuple[float, float] | tuple[float, float, str]
+"""A number that fixes a gain, (low, high), or (low, high, "log") where decades matter."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """One parameter of a family.
+
+    Args:
+        name: such as "roll.kp".
+        unit: such as "N m/rad".
+        low: smallest value, in its unit.
+        high: largest value, in its unit.
+        logarithmic: whether decades matter more than differences.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    @property
+    def engine(self) -> tuple[float, float, bool]:
+        """The same as numbers, for the native engine."""
+        return self.low, self.high, self.logarithmic
+
+
+@dataclass(frozen=True)
+class FixedGain:
+    """A gain that all controllers of a family share: no parameter, and no gene.
+
+    Args:
+        name: such as "roll.ki".
+        unit: such as "N m/(rad s)".
+        value: in its unit.
+    """
+
+    name: str
+    unit: str
+    value: float
+
+    @property
+    def engine(self) -> float:
+        """The same as a number, for the native engine."""
+        return self.value
+
+
+def gain_of(name: str, unit: str, bounds: GainBounds) -> Gain | FixedGain:
+    """A gain between checked bounds, or fixed at a number.
+
+    Args:
+        name: such as "roll.kp".
+        unit: such as "N m/rad".
+        bounds: what `gain_bounds` returned, in that unit.
+    """
+    if isinstance(bounds, tuple):
+        low, high, *scale = bounds
+        return Gain(name, unit, float(low), float(high), scale == ["log"])
+    return FixedGain(name, unit, bounds)
 
 
 def bounds_by_name(family: str, bounds: object, names: Sequence[str]) -> dict[str, GainBounds]:
@@ -16,11 +76,11 @@ def bounds_by_name(family: str, bounds: object, names: Sequence[str]) -> dict[st
 
     Args:
         family: how to call it in an error.
-        bounds: (low, high) or (low, high, "log") by name.
-        names: of the gains, in the order of the genes.
+        bounds: (low, high) or (low, high, "log") by name, or a number that fixes a gain.
+        names: of the gains, in the order of the law.
 
     Returns:
-        Checked bounds by name, in the order of the genes.
+        Checked bounds by name, in the order of the law.
 
     Raises:
         InvalidInput: no dict, an unknown or missing name, or bounds the wrong way round.
@@ -46,7 +106,7 @@ def gain_bounds(what: str, bounds: object) -> GainBounds:
 
     Args:
         what: how to call them in an error.
-        bounds: (low, high), or (low, high, "log") where decades matter.
+        bounds: (low, high), or (low, high, "log") where decades matter; or the number that it is fixed at.
 
     Returns:
         The same, as floats.
@@ -54,6 +114,8 @@ def gain_bounds(what: str, bounds: object) -> GainBounds:
     Raises:
         InvalidInput: anything else, the wrong way round, or a logarithm of what is not above 0.
     """
+    if isinstance(bounds, (int, float)):
+        return number(what, bounds)
     items = tuple(bounds) if isinstance(bounds, Iterable) and not isinstance(bounds, str) else ()
     if len(items) == 3 and items[2] != "log":
         raise InvalidInput(
@@ -61,7 +123,8 @@ def gain_bounds(what: str, bounds: object) -> GainBounds:
         )
     if len(items) not in (2, 3):
         raise InvalidInput(
-            f'{what}: expected (low, high) or (low, high, "log"), found {bounds!r}; write both numbers.'
+            f'{what}: expected (low, high), (low, high, "log") or a number that fixes it, found {bounds!r}; write'
+            " both bounds."
         )
     low, high = ordered(what, items[:2])
     if len(items) == 3 and number(what, low) <= 0.0:

@@ -1,0 +1,127 @@
+//! A family: a law, which of its gains are parameters and which are fixed numbers, and what it is for.
+
+use super::parameters::{Gain, Parameters};
+use super::{AnyLaw, Law};
+use crate::error::{Result, invalid};
+use crate::lanes::Vector;
+use crate::signals::Signals;
+
+/// A law, the box of its parameters, and the states and commands that it is for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Family {
+    law: AnyLaw,
+    gains: Vec<Gain>,
+    parameters: Parameters,
+    states: usize,
+    bounds: Vec<(f64, f64)>,
+}
+
+/// Controllers of a family with their memory, one a lane.
+pub struct Controllers<V> {
+    /// All gains of the law, the fixed ones too.
+    gains: Vec<V>,
+    memory: Vec<V>,
+}
+
+impl Family {
+    /// The controllers of a law that differ by the gains that are free.
+    pub fn new(law: impl Into<AnyLaw>, gains: Vec<Gain>, states: usize) -> Result<Self> {
+        let law = law.into();
+        law.check(states)?;
+        if gains.len() != law.gains() {
+            return invalid(format!(
+                "controller: expected bounds or numbers for {} gains, found {}",
+                law.gains(),
+                gains.len()
+            ));
+        }
+        let (mut low, mut high, mut logarithmic) = (vec![], vec![], vec![]);
+        for gain in &gains {
+            match *gain {
+                Gain::Fixed(value) if value.is_finite() => {}
+                Gain::Fixed(value) => {
+                    return invalid(format!("controller: expected finite gains, found {value}"));
+                }
+                Gain::Free { low: least, high: most, logarithmic: decades } => {
+                    low.push(least);
+                    high.push(most);
+                    logarithmic.push(decades);
+                }
+            }
+        }
+        if low.is_empty() {
+            return invalid(
+                "controller: expected at least one gain with bounds, found numbers for all of them; there would be \
+                 nothing to tune",
+            );
+        }
+        let parameters = Parameters::new(&low, &high, &logarithmic)?;
+        let bounds = law.output().bounds().to_vec();
+        Ok(Self { law, gains, parameters, states, bounds })
+    }
+
+    /// The box of the parameters: the gains that are free.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Number of states that the law reads, n_x.
+    pub fn states(&self) -> usize {
+        self.states
+    }
+
+    /// Number of commands that the law writes, n_u.
+    pub fn commands(&self) -> usize {
+        self.bounds.len()
+    }
+
+    /// Controllers of these parameters (size) at the start of a run.
+    #[inline(always)]
+    pub fn start<V: Vector>(&self, parameters: &[V]) -> Controllers<V> {
+        let mut parameters = parameters.iter();
+        let mut gains = Vec::with_capacity(self.gains.len());
+        for gain in &self.gains {
+            gains.push(match gain {
+                Gain::Fixed(value) => V::splat(*value),
+                Gain::Free { .. } => *parameters.next().expect("a number for each free gain"),
+            });
+        }
+        Controllers { gains, memory: vec![V::splat(0.0); self.law.memory()] }
+    }
+
+    /// Writes the command (n_u) for a state (n_x) and a target (n_x), and moves the controllers on by one period.
+    #[inline(always)]
+    pub fn command<V: Vector>(
+        &self,
+        controllers: &mut Controllers<V>,
+        state: &[V],
+        target: &[V],
+        command: &mut [V],
+    ) {
+        let Controllers { gains, memory } = controllers;
+        self.law.command(gains, memory, state, target, command);
+    }
+
+    /// Adds an excitation (n_u) to what the law commanded (n_u), and clips the sum to the bounds of the commands.
+    #[inline(always)]
+    pub fn excite<V: Vector>(&self, command: &mut [V], excitation: &[V]) {
+        for ((command, excitation), &(low, high)) in command.iter_mut().zip(excitation).zip(&self.bounds) {
+            *command = (*command + *excitation).clamp(low, high);
+        }
+    }
+
+    /// Refuses signals of another number of states or commands.
+    pub(crate) fn check(&self, signals: &Signals) -> Result<()> {
+        if (self.states, self.commands()) != (signals.states(), signals.commands()) {
+            return invalid(format!(
+                "controllers: expected controllers of {} states and {} commands, found {} and {}; make the family for \
+                 these signals",
+                signals.states(),
+                signals.commands(),
+                self.states,
+                self.commands()
+            ));
+        }
+        Ok(())
+    }
+}
