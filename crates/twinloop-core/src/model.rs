@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::str::FromStr;
 
 use crate::actuators::{Actuation, Line};
+use crate::difference::Periods;
 use crate::dynamics::{Dynamics, step_apart};
 use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
@@ -79,6 +80,8 @@ pub struct Frame {
     factors: Vec<f64>,
     slopes: Vec<Slope>,
     body: Option<RigidBody>,
+    /// A model sees a periodic state within half a period of 0.
+    periods: Periods,
     actuation: Actuation,
 }
 
@@ -99,7 +102,8 @@ impl Frame {
         let slopes = slopes.collect();
         let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
         let (commands, actuation) = (factors.len(), Actuation::default());
-        Self { form, dt: signals.dt, commands, factors, slopes, body: signals.kinematics, actuation }
+        let (body, periods) = (signals.kinematics, signals.periods.clone());
+        Self { form, dt: signals.dt, commands, factors, slopes, body, periods, actuation }
     }
 
     /// The same with something between commands and model, an actuator for each command.
@@ -134,6 +138,10 @@ impl Frame {
 
     pub(crate) fn commands(&self) -> usize {
         self.commands
+    }
+
+    pub(crate) fn periods(&self) -> &Periods {
+        &self.periods
     }
 }
 
@@ -172,7 +180,8 @@ impl<'a> Model<'a> {
         state: &[f64],
         command: &[f64],
     ) -> Cow<'w, [V]> {
-        if self.frame.form == Form::Absolute && self.frame.actuation.is_direct() {
+        let Frame { form, actuation, periods, .. } = self.frame;
+        if *form == Form::Absolute && actuation.is_direct() && !periods.any() {
             let inputs = Interleaved { state, command, factors: &self.frame.factors };
             return Cow::Borrowed(self.code.run(&mut workspace.bank, &inputs));
         }
@@ -184,6 +193,12 @@ impl<'a> Model<'a> {
     /// The code's outputs at a state, under a command.
     #[inline(always)]
     fn outputs<'b, V: Vector>(&self, bank: &'b mut Bank<V>, state: &[V], command: &[V]) -> &'b [V] {
+        let mut wrapped = Vec::new();
+        if self.frame.periods.any() {
+            wrapped.extend_from_slice(state);
+            self.frame.periods.wrap(&mut wrapped);
+        }
+        let state = if wrapped.is_empty() { state } else { &wrapped };
         self.code.run(bank, &StateAndCommand { state, command, factors: &self.frame.factors })
     }
 }

@@ -87,8 +87,9 @@ impl SelectedTests {
     /// These and one more.
     pub fn with_test(&self, experiment: Experiment) -> Result<Self> {
         self.check(&experiment)?;
+        let states = self.signals.periods.continued(&experiment.states, self.signals.states());
         let mut experiments = self.experiments.clone();
-        experiments.push(Arc::new(experiment));
+        experiments.push(Arc::new(Experiment { states, ..experiment }));
         let (blocks, rows) = transitions(&experiments, self.signals.states(), self.signals.commands());
         let of_group =
             |group: Range<usize>| loops(&experiments[group], self.signals.states(), self.signals.commands());

@@ -1,5 +1,6 @@
 //! What the engine knows of a system's signals: period, scales, bounds, and which state is the derivative of which.
 
+use crate::difference::Periods;
 use crate::error::{Result, invalid};
 
 /// States and commands as numbers; their names and units live in the layers above.
@@ -17,6 +18,8 @@ pub struct Signals {
     pub derivative_of: Vec<Option<usize>>,
     /// Angles and rates of a rigid body, where the states hold them.
     pub kinematics: Option<RigidBody>,
+    /// Which states are periodic.
+    pub periods: Periods,
 }
 
 /// Three angles (roll, pitch, yaw; z-y-x) and the three body rates that turn them.
@@ -61,6 +64,8 @@ impl Signals {
         }) {
             "expected six different states in the kinematics, none of the angles the integral of another"
                 .to_owned()
+        } else if !self.periods.fit(states) {
+            format!("expected a period or none for each of {states} states")
         } else {
             return Ok(self);
         };
@@ -83,8 +88,13 @@ impl Signals {
         self.command_bounds.len()
     }
 
-    /// Magnitude of each state beyond which a run counts as diverged: `factor` times its scale.
+    /// Magnitude of each state beyond which a run counts as diverged: `factor` times its scale; a periodic state may turn
+    /// as often as it likes.
     pub fn limits(&self, factor: f64) -> Vec<f64> {
-        self.state_scales.iter().map(|scale| scale * factor).collect()
+        let limit = |(state, scale): (usize, &f64)| match self.periods.of(state) {
+            None => scale * factor,
+            Some(_) => f64::INFINITY,
+        };
+        self.state_scales.iter().enumerate().map(limit).collect()
     }
 }

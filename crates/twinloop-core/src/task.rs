@@ -1,5 +1,6 @@
 //! A task: where runs start, where they should end, and how many steps they last.
 
+use crate::difference::Periods;
 use crate::error::{Result, invalid};
 
 /// What candidate tests have in common where only the controller is searched.
@@ -36,12 +37,7 @@ impl Task {
     }
 
     /// ‖η_d − η_1‖: the final distance of a system that never moves.
-    pub fn distance(&self) -> f64 {
-        distance(&self.initial, &self.target)
+    pub fn distance(&self, periods: &Periods) -> f64 {
+        periods.distance(&self.initial, &self.target)
     }
-}
-
-/// Euclidean distance of two states.
-pub fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }

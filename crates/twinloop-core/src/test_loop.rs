@@ -74,7 +74,7 @@ impl Tests {
             let (expected, found) = (family.states(), task.target.len());
             return invalid(format!("test search: expected a task of {expected} states, found {found}"));
         }
-        if task.distance() == 0.0 {
+        if task.distance(&signals.periods) == 0.0 {
             return invalid(
                 "test search: expected a target away from the initial state, found both the same",
             );
@@ -141,7 +141,7 @@ impl Problem for Tests {
             .collect();
         let mutants: Vec<&[f64]> = mutants.iter().map(|mutant| &mutant[..]).collect();
         let of_mutants = self.distances(1, &mutants, workers).concat();
-        let cap = self.settings.distance_cap * self.task.distance();
+        let cap = self.settings.distance_cap * self.task.distance(self.family.periods());
         let row = |(i, of_mutants): (usize, &[f64])| {
             let on_best = by_model[0][i];
             if on_best.is_infinite() {

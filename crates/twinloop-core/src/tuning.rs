@@ -435,7 +435,8 @@ impl Part<'_> {
                 let d = observed.states.len();
                 let (gain, root) = (whitening.gain(k), whitening.root(k));
                 for (i, &at) in observed.states.iter().enumerate() {
-                    innovation[i] = V::splat(record.states[k * n_x + at]) - state[at];
+                    let reading = V::splat(record.states[k * n_x + at]);
+                    innovation[i] = frame.periods().difference(at, reading, state[at]);
                 }
                 for (i, &at) in observed.states.iter().enumerate() {
                     let mut white = V::splat(0.0);

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::controller::Family;
 use crate::error::{Error, Result, invalid};
 use crate::lanes::Width;
 
@@ -44,5 +45,15 @@ impl Workers {
     /// The same by many threads. By a pointer: else all that shares out work is compiled again for each kind of it.
     fn shared<T: Send>(&self, count: usize, work: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
         self.pool.install(|| (0..count).into_par_iter().map(work).collect())
+    }
+
+    /// The same for work that flies controllers of a family: on this thread alone where its law is outside of the engine.
+    pub(crate) fn map_flights<T: Send>(
+        &self,
+        family: &Family,
+        count: usize,
+        work: impl Fn(usize) -> T + Sync,
+    ) -> Vec<T> {
+        if family.is_foreign() { (0..count).map(work).collect() } else { self.map(count, work) }
     }
 }

@@ -1,13 +1,15 @@
 //! Families of controllers, and one controller with its memory.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use twinloop_core::{AnyLaw, Axis, Controller, Family, Gain, Mixer, Outer, Pid, Signals, StateFeedback};
 
 use crate::arrays::{Matrix, Vector, optional_rows, rows, to_vector, vector};
 use crate::error::{Result, misuse};
+use crate::law::{PythonLaw, raised};
 use crate::model::PySignals;
 
 /// A family of controllers: a bounded parameter vector and a law, one implementation for search and real run.
@@ -80,6 +82,15 @@ impl PyFamily {
         Self::of_law(feedback, gains, signals)
     }
 
+    #[staticmethod]
+    fn python(signals: &PySignals, make: Py<PyAny>, gains: Vec<GainBounds>) -> Result<Self> {
+        let signals = &signals.0;
+        let law = Arc::new(PythonLaw { make, gains: gains.len() });
+        let gains = gains.into_iter().map(Gain::from).collect();
+        let family = Family::foreign(law, gains, signals.states(), signals.command_bounds.clone())?;
+        Ok(Self(Arc::new(family.with_periods(signals.periods.clone()))))
+    }
+
     #[getter]
     fn size(&self) -> usize {
         self.0.parameters().len()
@@ -88,6 +99,7 @@ impl PyFamily {
     #[pyo3(signature = (parameters, excitation = None))]
     fn controller(&self, parameters: Vector<'_>, excitation: Option<Matrix<'_>>) -> Result<PyController> {
         let controller = Controller::new(self.0.clone(), vector(&parameters))?;
+        raised()?;
         let excitation = optional_rows("excitation", excitation, self.0.commands())?.concat();
         Ok(PyController(Mutex::new(controller.excited(&excitation)?)))
     }
@@ -96,7 +108,8 @@ impl PyFamily {
 impl PyFamily {
     fn of_law(law: impl Into<AnyLaw>, gains: Vec<GainBounds>, signals: &Signals) -> Result<Self> {
         let gains = gains.into_iter().map(Gain::from).collect();
-        Ok(Self(Arc::new(Family::new(law, gains, signals.states())?)))
+        let family = Family::new(law, gains, signals.states())?;
+        Ok(Self(Arc::new(family.with_periods(signals.periods.clone()))))
     }
 
     fn of_axes(
@@ -129,12 +142,12 @@ pub struct PyController(Mutex<Controller>);
 impl PyController {
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(to_vector(py, self.lock()?.parameters().collect()))
+        Ok(to_vector(py, self.lock(py)?.parameters().collect()))
     }
 
-    fn reset(&self) -> Result<()> {
-        self.lock()?.reset();
-        Ok(())
+    fn reset(&self, py: Python<'_>) -> Result<()> {
+        self.lock(py)?.reset();
+        raised()
     }
 
     fn command<'py>(
@@ -143,15 +156,17 @@ impl PyController {
         state: Vector<'py>,
         target: Vector<'py>,
     ) -> Result<Bound<'py, PyArray1<f64>>> {
-        let command = self.lock()?.command(&vector(&state), &vector(&target))?;
+        let command = self.lock(py)?.command(&vector(&state), &vector(&target))?;
+        raised()?;
         Ok(to_vector(py, command))
     }
 }
 
 impl PyController {
-    fn lock(&self) -> Result<std::sync::MutexGuard<'_, Controller>> {
+    /// Another thread may wait, but not while Python does: a law in Python is called under the lock.
+    fn lock(&self, py: Python<'_>) -> Result<MutexGuard<'_, Controller>> {
         self.0
-            .lock()
+            .lock_py_attached(py)
             .map_err(|_| misuse("controller: expected one that has not panicked; make a new one".into()))
     }
 }

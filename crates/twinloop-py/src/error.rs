@@ -3,25 +3,37 @@
 use pyo3::PyErr;
 use pyo3::exceptions::PyValueError;
 
-/// An error of the engine on its way to Python.
-pub struct CoreError(twinloop_core::Error);
+/// An error on its way to Python: of the engine, or of what the engine has called there.
+pub enum CoreError {
+    Engine(twinloop_core::Error),
+    Python(PyErr),
+}
 
 impl From<twinloop_core::Error> for CoreError {
     fn from(error: twinloop_core::Error) -> Self {
-        Self(error)
+        Self::Engine(error)
+    }
+}
+
+impl From<PyErr> for CoreError {
+    fn from(error: PyErr) -> Self {
+        Self::Python(error)
     }
 }
 
 impl From<CoreError> for PyErr {
     fn from(error: CoreError) -> Self {
-        PyValueError::new_err(error.0.to_string())
+        match error {
+            CoreError::Engine(error) => PyValueError::new_err(error.to_string()),
+            CoreError::Python(error) => error,
+        }
     }
 }
 
-/// Result of a binding that can only fail in the engine.
+/// Result of a binding.
 pub type Result<T> = std::result::Result<T, CoreError>;
 
 /// A misuse that only the binding can see.
 pub fn misuse(sentence: String) -> CoreError {
-    CoreError(twinloop_core::Error::Invalid(sentence))
+    CoreError::Engine(twinloop_core::Error::Invalid(sentence))
 }

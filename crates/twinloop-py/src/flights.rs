@@ -13,6 +13,7 @@ use crate::arrays::{
 };
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
+use crate::law::flown;
 use crate::model::{PyModel, PySignals};
 use crate::plant::PyQuadrotor;
 use crate::workers::{PyWorkers, or_default};
@@ -140,12 +141,12 @@ pub fn qualities<'py>(
                 ));
             }
             let plant = [AnyDynamics::Quadrotor(&plant.0)];
-            (1, py.detach(|| core_qualities(&plant, flights, quality, &envelope, draws, &workers))?)
+            (1, flown(py, || core_qualities(&plant, flights, quality, &envelope, draws, &workers))??)
         }
         Members::Models(models) => {
             let models: Vec<_> = fitting(&models, flights)?.into_iter().map(AnyDynamics::Model).collect();
             let judged =
-                py.detach(|| core_qualities(&models, flights, quality, &envelope, draws, &workers))?;
+                flown(py, || core_qualities(&models, flights, quality, &envelope, draws, &workers))??;
             (models.len(), judged)
         }
     };
@@ -168,7 +169,7 @@ pub fn disagreements<'py>(
 ) -> Result<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<i64>>)> {
     let (workers, flights, sds) = (or_default(workers)?, &flights.0, vector(&sds));
     let models = fitting(&models, flights)?;
-    let found = py.detach(|| core_disagreements(&models, flights, &sds, cap, &workers))?;
+    let found = flown(py, || core_disagreements(&models, flights, &sds, cap, &workers))??;
     let place = |d: &Disagreement| [d.step, d.state, d.highest, d.lowest];
     let values = found.iter().map(|disagreement| disagreement.value).collect();
     Ok((to_vector(py, values), to_integer_rows(py, found.iter().map(place).collect())))

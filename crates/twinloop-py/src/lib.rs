@@ -4,6 +4,7 @@ mod arrays;
 mod controller;
 mod error;
 mod flights;
+mod law;
 mod model;
 mod objective;
 mod pareto;

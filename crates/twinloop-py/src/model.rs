@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, Form, Frame, Hidden, Learnt, Model, RigidBody, Signals, effects, step_rows,
+    Actuation, Actuator, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Signals, effects, step_rows,
 };
 
 use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector, views};
@@ -20,7 +20,7 @@ pub struct PySignals(pub Arc<Signals>);
 #[pymethods]
 impl PySignals {
     #[new]
-    #[pyo3(signature = (dt, state_scales, command_bounds, command_scales, derivative_of, kinematics = None))]
+    #[pyo3(signature = (dt, state_scales, command_bounds, command_scales, derivative_of, kinematics = None, *, periods = None))]
     fn new(
         dt: f64,
         state_scales: Vector<'_>,
@@ -28,6 +28,7 @@ impl PySignals {
         command_scales: Vector<'_>,
         derivative_of: Vec<Option<usize>>,
         kinematics: Option<([usize; 3], [usize; 3])>,
+        periods: Option<Vec<Option<f64>>>,
     ) -> Result<Self> {
         let bounds = rows("command bounds", &command_bounds, 2)?;
         let signals = Signals {
@@ -37,6 +38,7 @@ impl PySignals {
             command_scales: vector(&command_scales),
             derivative_of,
             kinematics: kinematics.map(|(angles, rates)| RigidBody { angles, rates }),
+            periods: Periods::new(periods.unwrap_or_default())?,
         };
         Ok(Self(Arc::new(signals.validated()?)))
     }

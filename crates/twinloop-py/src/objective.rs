@@ -7,6 +7,7 @@ use twinloop_core::{Model, SelectedTests, Workers};
 use crate::arrays::{Matrix, rows, to_matrix, to_vector, views};
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
+use crate::law::flown;
 use crate::model::{PyModel, PySignals};
 use crate::rollout::PyTask;
 use crate::selected::PySelectedTests;
@@ -28,7 +29,7 @@ fn errors<'py>(
     if models.iter().any(|model| !model.frame.fits(selected.signals())) {
         return Err(misuse("expected models with the states and commands of the selected tests".into()));
     }
-    let rows = py.detach(|| objective(&models, selected, &workers));
+    let rows = flown(py, || objective(&models, selected, &workers))?;
     Ok(to_matrix(py, selected.len(), rows.concat()))
 }
 
@@ -77,9 +78,9 @@ pub fn final_distances<'py>(
         return Err(misuse("expected models and a task with the states and commands of the signals".into()));
     }
     let limits = signals.0.limits(divergence_factor);
-    let distances = py.detach(|| {
+    let distances = flown(py, || {
         twinloop_core::final_distances(&models, &family.0, &views(&parameters), &task.0, &limits, &workers)
-    });
+    })?;
     Ok(to_matrix(py, parameters.len(), distances.concat()))
 }
 

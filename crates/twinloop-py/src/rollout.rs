@@ -13,6 +13,7 @@ use crate::arrays::{
 };
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
+use crate::law::{flown, raised};
 use crate::model::{PyModel, PySignals};
 use crate::plant::PyQuadrotor;
 use crate::workers::{PyWorkers, or_default};
@@ -119,13 +120,14 @@ pub fn rollout(
     let known =
         known.or_else(|_| dynamics.cast::<PyQuadrotor>().map(|plant| AnyDynamics::Quadrotor(&plant.get().0)));
     let runs = if let Ok(known) = known {
-        py.detach(|| record(&known, family, &parameters, task, &limits, influences, width))
+        flown(py, || record(&known, family, &parameters, task, &limits, influences, width))?
     } else {
         let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
         let mut runs = Vec::new();
         for (i, parameters) in parameters.iter().enumerate() {
             let influences = influences.of(&(i..i + 1));
             runs.extend(record_one(&step, family, parameters, task, &limits, influences));
+            raised()?;
             if let Some(error) = step.failure.take() {
                 return Err(error);
             }

@@ -12,6 +12,7 @@ use twinloop_core::{
 use crate::arrays::{Matrix, rows, to_matrix, to_vector};
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
+use crate::law::flown;
 use crate::model::{PyModel, PySignals};
 use crate::pareto::{distance, matrix as objectives_of};
 use crate::program::{PyGrammar, PyProgram};
@@ -129,7 +130,7 @@ impl PyModelSearch {
     ) -> Result<Self> {
         let (grammar, form, variation) = (grammar.0.clone(), form.parse()?, variation.0.clone());
         let search =
-            py.detach(|| ModelSearch::start(grammar, form, variation, seed, &selected.0, &workers.0))?;
+            flown(py, || ModelSearch::start(grammar, form, variation, seed, &selected.0, &workers.0))??;
         Ok(Self { search, signals: selected.0.signals().clone() })
     }
 
@@ -158,7 +159,7 @@ impl PyModelSearch {
     }
 
     fn learn(&self, py: Python<'_>, selected: &PySelectedTests, workers: &PyWorkers) -> Result<Self> {
-        let search = py.detach(|| self.search.clone().learn(&selected.0, &workers.0))?;
+        let search = flown(py, || self.search.clone().learn(&selected.0, &workers.0))??;
         Ok(Self { search, signals: self.signals.clone() })
     }
 
@@ -169,7 +170,7 @@ impl PyModelSearch {
         generations: u64,
         workers: &PyWorkers,
     ) -> Result<Self> {
-        let search = py.detach(|| self.search.clone().advance(&selected.0, generations, &workers.0))?;
+        let search = flown(py, || self.search.clone().advance(&selected.0, generations, &workers.0))??;
         Ok(Self { search, signals: self.signals.clone() })
     }
 
@@ -307,11 +308,11 @@ impl PyTestSearch {
         let (committee, frame) = judges(&committee, signals)?;
         let (family, task, settings, variation) =
             (family.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
-        let search = py.detach(|| {
+        let search = flown(py, || {
             TestSearch::start(
                 committee, frame, family, task, &signals.0, settings, variation, seed, iteration, &workers.0,
             )
-        })?;
+        })??;
         Ok(Self(search))
     }
 
@@ -346,8 +347,8 @@ impl PyTestSearch {
         Ok(Self(search))
     }
 
-    fn advance(&self, py: Python<'_>, generations: u64, workers: &PyWorkers) -> Self {
-        Self(py.detach(|| self.0.clone().advance(generations, &workers.0)))
+    fn advance(&self, py: Python<'_>, generations: u64, workers: &PyWorkers) -> Result<Self> {
+        Ok(Self(flown(py, || self.0.clone().advance(generations, &workers.0))?))
     }
 
     #[getter]

@@ -1,19 +1,31 @@
 //! A family: a law, which of its gains are parameters and which are fixed numbers, and what it is for.
 
+use std::sync::Arc;
+
+use super::foreign::{self, ForeignController, ForeignLaw};
 use super::parameters::{Gain, Parameters};
 use super::{AnyLaw, Law};
+use crate::difference::Periods;
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
 use crate::signals::Signals;
 
 /// A law, the box of its parameters, and the states and commands that it is for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Family {
-    law: AnyLaw,
+    law: Source,
     gains: Vec<Gain>,
     parameters: Parameters,
     states: usize,
+    periods: Periods,
     bounds: Vec<(f64, f64)>,
+}
+
+/// Where a law is written.
+#[derive(Clone, Debug)]
+enum Source {
+    Engine(AnyLaw),
+    Foreign(Arc<dyn ForeignLaw>),
 }
 
 /// Controllers of a family with their memory, one a lane.
@@ -21,6 +33,16 @@ pub struct Controllers<V> {
     /// All gains of the law, the fixed ones too.
     gains: Vec<V>,
     memory: Vec<V>,
+    /// Those of a foreign law, which have a memory of their own.
+    foreign: Vec<Box<dyn ForeignController>>,
+}
+
+impl<V: Vector> Controllers<V> {
+    /// Back to the start of a run.
+    pub fn reset(&mut self) {
+        self.memory.fill(V::splat(0.0));
+        self.foreign.iter_mut().for_each(|controller| controller.reset());
+    }
 }
 
 impl Family {
@@ -28,10 +50,31 @@ impl Family {
     pub fn new(law: impl Into<AnyLaw>, gains: Vec<Gain>, states: usize) -> Result<Self> {
         let law = law.into();
         law.check(states)?;
-        if gains.len() != law.gains() {
+        let (expected, bounds) = (law.gains(), law.output().bounds().to_vec());
+        Self::of(Source::Engine(law), expected, gains, states, bounds)
+    }
+
+    /// The controllers of a law outside of the engine, for so many states and for commands of these bounds.
+    pub fn foreign(
+        law: Arc<dyn ForeignLaw>,
+        gains: Vec<Gain>,
+        states: usize,
+        bounds: Vec<(f64, f64)>,
+    ) -> Result<Self> {
+        let expected = law.gains();
+        Self::of(Source::Foreign(law), expected, gains, states, bounds)
+    }
+
+    fn of(
+        law: Source,
+        expected: usize,
+        gains: Vec<Gain>,
+        states: usize,
+        bounds: Vec<(f64, f64)>,
+    ) -> Result<Self> {
+        if gains.len() != expected {
             return invalid(format!(
-                "controller: expected bounds or numbers for {} gains, found {}",
-                law.gains(),
+                "controller: expected bounds or numbers for {expected} gains, found {}",
                 gains.len()
             ));
         }
@@ -56,8 +99,17 @@ impl Family {
             );
         }
         let parameters = Parameters::new(&low, &high, &logarithmic)?;
-        let bounds = law.output().bounds().to_vec();
-        Ok(Self { law, gains, parameters, states, bounds })
+        Ok(Self { law, gains, parameters, states, periods: Periods::default(), bounds })
+    }
+
+    /// The same for states of which some are periodic: errors take the short way.
+    pub fn with_periods(self, periods: Periods) -> Self {
+        Self { periods, ..self }
+    }
+
+    /// Which states are periodic.
+    pub fn periods(&self) -> &Periods {
+        &self.periods
     }
 
     /// The box of the parameters: the gains that are free.
@@ -75,6 +127,11 @@ impl Family {
         self.bounds.len()
     }
 
+    /// Whether the law is outside of the engine, and so may only be called on the thread that asked for the work.
+    pub fn is_foreign(&self) -> bool {
+        matches!(self.law, Source::Foreign(_))
+    }
+
     /// Controllers of these parameters (size) at the start of a run.
     #[inline(always)]
     pub fn start<V: Vector>(&self, parameters: &[V]) -> Controllers<V> {
@@ -86,7 +143,11 @@ impl Family {
                 Gain::Free { .. } => *parameters.next().expect("a number for each free gain"),
             });
         }
-        Controllers { gains, memory: vec![V::splat(0.0); self.law.memory()] }
+        let (memory, foreign) = match &self.law {
+            Source::Engine(law) => (vec![V::splat(0.0); law.memory()], vec![]),
+            Source::Foreign(law) => (vec![], foreign::start(&**law, &gains)),
+        };
+        Controllers { gains, memory, foreign }
     }
 
     /// Writes the command (n_u) for a state (n_x) and a target (n_x), and moves the controllers on by one period.
@@ -98,8 +159,11 @@ impl Family {
         target: &[V],
         command: &mut [V],
     ) {
-        let Controllers { gains, memory } = controllers;
-        self.law.command(gains, memory, state, target, command);
+        let Controllers { gains, memory, foreign } = controllers;
+        match &self.law {
+            Source::Engine(law) => law.command(&self.periods, gains, memory, state, target, command),
+            Source::Foreign(_) => foreign::ask(foreign, &self.bounds, state, target, command),
+        }
     }
 
     /// Adds an excitation (n_u) to what the law commanded (n_u), and clips the sum to the bounds of the commands.
@@ -110,7 +174,7 @@ impl Family {
         }
     }
 
-    /// Refuses signals of another number of states or commands.
+    /// Refuses signals of another number of states or commands, or with other periods.
     pub(crate) fn check(&self, signals: &Signals) -> Result<()> {
         if (self.states, self.commands()) != (signals.states(), signals.commands()) {
             return invalid(format!(
@@ -120,6 +184,12 @@ impl Family {
                 signals.commands(),
                 self.states,
                 self.commands()
+            ));
+        }
+        if self.periods != signals.periods {
+            return invalid(format!(
+                "controllers: expected the periods {:?} of the states, found {:?}; make the family for these signals",
+                signals.periods, self.periods
             ));
         }
         Ok(())

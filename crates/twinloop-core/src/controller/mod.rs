@@ -1,6 +1,7 @@
 //! Controllers: families with a bounded parameter vector, one implementation for the search and for the real run.
 
 mod family;
+mod foreign;
 mod mixer;
 mod parameters;
 mod pid;
@@ -8,12 +9,14 @@ mod single;
 mod state_feedback;
 
 pub use family::{Controllers, Family};
+pub use foreign::{ForeignController, ForeignLaw};
 pub use mixer::Mixer;
 pub use parameters::{Gain, Parameters};
 pub use pid::{Axis, Outer, Pid};
 pub use single::Controller;
 pub use state_feedback::StateFeedback;
 
+use crate::difference::Periods;
 use crate::error::Result;
 use crate::lanes::Vector;
 
@@ -31,8 +34,17 @@ pub trait Law {
     /// Refuses a law that reads states which are not there.
     fn check(&self, states: usize) -> Result<()>;
 
-    /// Writes the command (n_u) for a state (n_x) and a target (n_x), and moves the memory on by one period.
-    fn command<V: Vector>(&self, gains: &[V], memory: &mut [V], state: &[V], target: &[V], command: &mut [V]);
+    /// Writes the command (n_u) for a state (n_x) and a target (n_x), and moves the memory on by one period. Errors are
+    /// differences as `periods` has them.
+    fn command<V: Vector>(
+        &self,
+        periods: &Periods,
+        gains: &[V],
+        memory: &mut [V],
+        state: &[V],
+        target: &[V],
+        command: &mut [V],
+    );
 }
 
 /// One type for all laws there are.
@@ -75,13 +87,16 @@ macro_rules! laws {
             #[inline(always)]
             fn command<V: Vector>(
                 &self,
+                periods: &Periods,
                 gains: &[V],
                 memory: &mut [V],
                 state: &[V],
                 target: &[V],
                 command: &mut [V],
             ) {
-                match self { $(Self::$law(law) => law.command(gains, memory, state, target, command),)+ }
+                match self {
+                    $(Self::$law(law) => law.command(periods, gains, memory, state, target, command),)+
+                }
             }
         }
     };

@@ -2,6 +2,7 @@
 
 use super::Law;
 use super::mixer::Mixer;
+use crate::difference::Periods;
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
 
@@ -75,11 +76,11 @@ impl Pid {
 
     /// The rate of an axis: measured, or the difference of its state, and filtered.
     #[inline(always)]
-    fn rate<V: Vector>(&self, axis: &Axis, memory: &mut [V], state: &[V]) -> V {
+    fn rate<V: Vector>(&self, periods: &Periods, axis: &Axis, memory: &mut [V], state: &[V]) -> V {
         let (value, started) = (state[axis.state], memory[STARTED]);
         let rate = match axis.rate {
             Some(rate) => state[rate],
-            None => (value - memory[LAST_VALUE]) / self.dt * started,
+            None => periods.difference(axis.state, value, memory[LAST_VALUE]) / self.dt * started,
         };
         memory[LAST_VALUE] = value;
         memory[STARTED] = V::splat(1.0);
@@ -146,6 +147,7 @@ impl Law for Pid {
     #[inline(always)]
     fn command<V: Vector>(
         &self,
+        periods: &Periods,
         gains: &[V],
         memory: &mut [V],
         state: &[V],
@@ -156,13 +158,13 @@ impl Law for Pid {
         for (axis, memory) in self.axes.iter().zip(memory.chunks_exact_mut(MEMORY)) {
             let mut set_point = target[axis.state];
             if let Some(Outer { angle, limit }) = axis.outer {
-                let asked = gains[first] * (target[angle] - state[angle]) + set_point;
+                let asked = gains[first] * periods.difference(angle, target[angle], state[angle]) + set_point;
                 set_point = asked.clamp(-limit, limit);
             }
             first += axis.gains();
             let gains = &gains[first - 3..first];
-            let error = set_point - state[axis.state];
-            let rate = self.rate(axis, memory, state);
+            let error = periods.difference(axis.state, set_point, state[axis.state]);
+            let rate = self.rate(periods, axis, memory, state);
             memory[INTEGRAL_BEFORE] = memory[INTEGRAL];
             memory[INTEGRAL] = memory[INTEGRAL] + error * self.dt;
             memory[OUTPUT] = gains[0] * error + gains[1] * memory[INTEGRAL] - gains[2] * rate;

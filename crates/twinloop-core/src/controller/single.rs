@@ -50,7 +50,7 @@ impl Controller {
 
     /// Back to the start of a run.
     pub fn reset(&mut self) {
-        self.running = self.family.start(&self.parameters);
+        self.running.reset();
         self.period = 0;
     }
 

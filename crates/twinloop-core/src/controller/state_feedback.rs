@@ -2,6 +2,7 @@
 
 use super::Law;
 use super::mixer::Mixer;
+use crate::difference::Periods;
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
 
@@ -57,6 +58,7 @@ impl Law for StateFeedback {
     #[inline(always)]
     fn command<V: Vector>(
         &self,
+        periods: &Periods,
         gains: &[V],
         memory: &mut [V],
         state: &[V],
@@ -65,13 +67,13 @@ impl Law for StateFeedback {
     ) {
         let (integrals, outputs) = memory.split_at_mut(self.integrals.len());
         for (integral, &i) in integrals.iter_mut().zip(&self.integrals) {
-            *integral = *integral + (target[i] - state[i]) * self.dt;
+            *integral = *integral + periods.difference(i, target[i], state[i]) * self.dt;
         }
         for (output, gains) in outputs.iter_mut().zip(gains.chunks_exact(self.row())) {
             let (of_states, of_integrals) = gains.split_at(self.states.len());
             let mut u = V::splat(0.0);
             for (&gain, &i) in of_states.iter().zip(&self.states) {
-                u = u + gain * (target[i] - state[i]);
+                u = u + gain * periods.difference(i, target[i], state[i]);
             }
             for (&gain, &integral) in of_integrals.iter().zip(integrals.iter()) {
                 u = u + gain * integral;

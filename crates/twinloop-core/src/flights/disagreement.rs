@@ -2,6 +2,7 @@
 
 use super::log_determinant::{log_determinant, place};
 use super::{Flights, Group};
+use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::error::{Result, invalid};
 use crate::lanes::{Isa, Kernel, Vector, dispatch, with_test_lanes};
@@ -51,13 +52,14 @@ pub fn disagreements<D: Dynamics + Sync>(
     }
     let mut found = Vec::with_capacity(flights.len());
     for batch in flights.groups.chunks(BATCH) {
-        let runs = workers.map(batch.len() * members.len(), |unit| {
+        let runs = workers.map_flights(&flights.family, batch.len() * members.len(), |unit| {
             let (group, member) = (&batch[unit / members.len()], &members[unit % members.len()]);
             dispatch(workers.width(), Fly { member, flights, group })
         });
         let compared = workers.map(batch.len(), |i| {
             let runs = &runs[i * members.len()..][..members.len()];
-            dispatch(workers.width(), Compare { runs, candidates: batch[i].candidates, sds, cap })
+            let periods = &flights.signals().periods;
+            dispatch(workers.width(), Compare { runs, candidates: batch[i].candidates, periods, sds, cap })
         });
         found.extend(compared.into_iter().flatten());
     }
@@ -119,6 +121,7 @@ struct Compare<'a> {
     /// What each member predicts, n × n_x × lanes.
     runs: &'a [Vec<f64>],
     candidates: usize,
+    periods: &'a Periods,
     sds: &'a [f64],
     cap: f64,
 }
@@ -143,7 +146,13 @@ impl Compare<'_> {
             let (step, state) = (entry / n_x + 1, entry % n_x);
             let mut sum = V::splat(0.0);
             for (value, run) in values.iter_mut().zip(self.runs) {
-                *value = V::load(&run[entry * V::LANES..]) / self.sds[state];
+                let mut predicted = V::load(&run[entry * V::LANES..]);
+                if self.periods.of(state).is_some() {
+                    // Whole turns between two members tell nothing.
+                    let first = V::load(&self.runs[0][entry * V::LANES..]);
+                    predicted = first + self.periods.difference(state, predicted, first);
+                }
+                *value = predicted / self.sds[state];
                 sum = sum + *value;
             }
             widest.see(step, state, &values);

@@ -1,5 +1,6 @@
 //! The envelope: what of its room each state uses up.
 
+use crate::difference::Periods;
 use crate::error::{Result, invalid};
 use crate::lanes::Vector;
 
@@ -40,8 +41,9 @@ impl Envelope {
 
     /// How far flights got that start at a state (n_x).
     #[inline(always)]
-    pub(super) fn reach<V: Vector>(&self, initial: &[V]) -> Reach<'_, V> {
-        let mut reach = Reach { bands: &self.bands, farthest: vec![V::splat(0.0); self.bands.len()] };
+    pub(super) fn reach<'a, V: Vector>(&'a self, periods: &'a Periods, initial: &[V]) -> Reach<'a, V> {
+        let mut reach =
+            Reach { periods, bands: &self.bands, farthest: vec![V::splat(0.0); self.bands.len()] };
         reach.see(initial);
         reach
     }
@@ -49,6 +51,7 @@ impl Envelope {
 
 /// How far from the middle of its envelope each state that has one ever was.
 pub(super) struct Reach<'a, V> {
+    periods: &'a Periods,
     bands: &'a [Band],
     farthest: Vec<V>,
 }
@@ -58,7 +61,8 @@ impl<V: Vector> Reach<'_, V> {
     #[inline(always)]
     pub(super) fn see(&mut self, state: &[V]) {
         for (farthest, band) in self.farthest.iter_mut().zip(self.bands) {
-            let distance = (state[band.state] - V::splat(band.middle)).abs();
+            let middle = V::splat(band.middle);
+            let distance = self.periods.difference(band.state, state[band.state], middle).abs();
             *farthest = farthest.select_less(distance, distance, *farthest);
         }
     }

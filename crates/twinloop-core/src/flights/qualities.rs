@@ -72,7 +72,7 @@ pub fn qualities<D: Dynamics + Sync>(
     }
     draws.check(flights)?;
     let (groups, count) = (flights.groups.len(), draws.count());
-    let judged = workers.map(dynamics.len() * count * groups, |unit| {
+    let judged = workers.map_flights(&flights.family, dynamics.len() * count * groups, |unit| {
         let (draw, group) = (unit / groups % count, &flights.groups[unit % groups]);
         let dynamics = &dynamics[unit / groups / count];
         let row = |rows: &[&'_ [f64]]| rows.get(draw).map_or(vec![], |row| row.to_vec());
@@ -119,7 +119,7 @@ impl<D: Dynamics> OfGroup<'_, D> {
         }
         let mut judge = Judge {
             tally: self.quality.tally(self.flights.signals(), &lanes.target),
-            reach: self.envelope.reach(&lanes.initial),
+            reach: self.envelope.reach(&self.flights.signals().periods, &lanes.initial),
             noise: if self.measured { &noise } else { &[] },
             reading: lanes.initial.clone(),
         };

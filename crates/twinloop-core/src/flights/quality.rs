@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use crate::difference::Periods;
 use crate::error::{Error, Result, invalid};
 use crate::lanes::Vector;
 use crate::signals::Signals;
@@ -72,12 +73,13 @@ impl Quality {
 
     /// Nothing flown yet.
     #[inline(always)]
-    pub(super) fn tally<'a, V: Vector>(&'a self, signals: &Signals, target: &'a [V]) -> Tally<'a, V> {
+    pub(super) fn tally<'a, V: Vector>(&'a self, signals: &'a Signals, target: &'a [V]) -> Tally<'a, V> {
         let zero = V::splat(0.0);
         let factors = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
         let last = vec![zero; signals.commands()];
         Tally {
             quality: self,
+            periods: &signals.periods,
             dt: signals.dt,
             factors,
             target,
@@ -92,6 +94,7 @@ impl Quality {
 /// The sums of a quality, as far as flights have come.
 pub(super) struct Tally<'a, V> {
     quality: &'a Quality,
+    periods: &'a Periods,
     /// Period, s.
     dt: f64,
     /// 1 / scale of each command (n_u).
@@ -110,8 +113,8 @@ impl<V: Vector> Tally<'_, V> {
     pub(super) fn add(&mut self, step: usize, command: &[V], next: &[V]) {
         let Quality { kind, weights, effort, effort_rate } = self.quality;
         let mut error = V::splat(0.0);
-        for ((state, target), &weight) in next.iter().zip(self.target).zip(weights) {
-            let difference = *state - *target;
+        for (i, ((state, target), &weight)) in next.iter().zip(self.target).zip(weights).enumerate() {
+            let difference = self.periods.difference(i, *state, *target);
             let size = if *kind == QualityKind::Iae { difference.abs() } else { difference * difference };
             error = error + size * weight;
         }

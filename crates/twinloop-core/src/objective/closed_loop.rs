@@ -1,6 +1,7 @@
 //! Closed loop: the free-run simulation error with the controller in the loop (paper, section IV.B).
 
 use super::divergence_penalty;
+use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, vectors, with_test_lanes};
 use crate::rollout::{Seen, Start, Watch, rollout};
@@ -42,7 +43,8 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
         };
         let steps = (0..V::LANES).map(|l| loops.steps.get(l).map_or(0.0, |&steps| steps as f64));
         let steps = V::load(&steps.collect::<Vec<_>>());
-        let mut error = SquaredError { recorded: &loops.recorded, steps, sum: V::splat(0.0) };
+        let periods = &self.selected.signals().periods;
+        let mut error = SquaredError { periods, recorded: &loops.recorded, steps, sum: V::splat(0.0) };
         let lasted = rollout(&self.dynamics, &start, &mut error);
         for (l, (&lasted, &steps)) in lasted.iter().zip(&loops.steps).enumerate() {
             errors.push(if lasted < steps {
@@ -56,6 +58,7 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
 
 /// Squared difference to the recorded runs, summed over steps and components.
 struct SquaredError<'a, V> {
+    periods: &'a Periods,
     recorded: &'a [f64],
     steps: V,
     sum: V,
@@ -67,8 +70,8 @@ impl<V: Vector> Watch<V> for SquaredError<'_, V> {
         let row = seen.next.len() * V::LANES;
         let recorded = &self.recorded[(seen.step + 1) * row..][..row];
         let mut sum = V::splat(0.0);
-        for (simulated, recorded) in seen.next.iter().zip(recorded.chunks_exact(V::LANES)) {
-            let error = *simulated - V::load(recorded);
+        for (i, (simulated, recorded)) in seen.next.iter().zip(recorded.chunks_exact(V::LANES)).enumerate() {
+            let error = self.periods.difference(i, *simulated, V::load(recorded));
             sum = sum + error * error;
         }
         // A lane whose recording has ended adds nothing more.

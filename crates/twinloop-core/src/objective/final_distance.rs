@@ -1,6 +1,7 @@
 //! Final distance: how far from its target a closed loop ends, δ = ‖η_n − η_d‖.
 
 use crate::controller::Family;
+use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_test_lanes};
 use crate::rollout::{Seen, Start, Watch, rollout};
@@ -17,7 +18,7 @@ pub fn final_distances<D: Dynamics + Sync>(
     workers: &Workers,
 ) -> Vec<Vec<f64>> {
     let groups = groups(parameters.len());
-    let distances = workers.map(dynamics.len() * groups.len(), |unit| {
+    let distances = workers.map_flights(family, dynamics.len() * groups.len(), |unit| {
         let (dynamics, group) = (&dynamics[unit / groups.len()], groups[unit % groups.len()].clone());
         let parameters = &parameters[group];
         dispatch(workers.width(), OfGroup { dynamics, family, parameters, task, limits })
@@ -58,7 +59,8 @@ impl<D: Dynamics> OfGroup<'_, D> {
             excitation: &[],
             disturbance: &[],
         };
-        let mut last = LastStep { steps: *steps, target: &target, squared: V::splat(0.0) };
+        let periods = self.family.periods();
+        let mut last = LastStep { periods, steps: *steps, target: &target, squared: V::splat(0.0) };
         let lasted = rollout(self.dynamics, &start, &mut last);
         let of_lane = |l: usize| {
             if lasted[l] < *steps { f64::INFINITY } else { last.squared.lane(l).sqrt() }
@@ -69,6 +71,7 @@ impl<D: Dynamics> OfGroup<'_, D> {
 
 /// Squared distance to the target after the last step.
 struct LastStep<'a, V> {
+    periods: &'a Periods,
     steps: usize,
     target: &'a [V],
     squared: V,
@@ -78,8 +81,8 @@ impl<V: Vector> Watch<V> for LastStep<'_, V> {
     #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
         if seen.step + 1 == self.steps {
-            for (state, target) in seen.next.iter().zip(self.target) {
-                let difference = *state - *target;
+            for (i, (state, target)) in seen.next.iter().zip(self.target).enumerate() {
+                let difference = self.periods.difference(i, *state, *target);
                 self.squared = self.squared + difference * difference;
             }
         }

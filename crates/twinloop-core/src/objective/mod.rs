@@ -37,5 +37,7 @@ pub fn open_loops(models: &[Model<'_>], selected: &SelectedTests, workers: &Work
 
 /// Closed loop of each model on each selected test (models × N).
 pub fn closed_loops(models: &[Model<'_>], selected: &SelectedTests, workers: &Workers) -> Vec<Vec<f64>> {
-    workers.map(models.len(), |i| dispatch(workers.width(), ClosedLoop { dynamics: models[i], selected }))
+    workers.map_flights(selected.family(), models.len(), |i| {
+        dispatch(workers.width(), ClosedLoop { dynamics: models[i], selected })
+    })
 }

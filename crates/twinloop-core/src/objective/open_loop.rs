@@ -32,11 +32,12 @@ impl OpenLoop<'_> {
     #[inline(always)]
     fn of_blocks<V: Vector>(&self, blocks: &[Block], errors: &mut Vec<f64>) {
         let mut workspace = self.model.workspace::<V>();
+        let periods = &self.selected.signals().periods;
         for block in blocks {
             let state = self.model.predict(&mut workspace, &block.state, &block.command);
             let mut sum = V::splat(0.0);
-            for (predicted, next) in state.iter().zip(block.next.chunks_exact(V::LANES)) {
-                let error = *predicted - V::load(next);
+            for (i, (predicted, next)) in state.iter().zip(block.next.chunks_exact(V::LANES)).enumerate() {
+                let error = periods.difference(i, *predicted, V::load(next));
                 sum = sum + error * error;
             }
             let end = errors.len();

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Controller, Form, Frame, Influences, Model, Program, Task, Trajectory, Width, final_distances,
-    record,
+    Code, Controller, Form, Frame, Influences, Model, Periods, Program, Task, Trajectory, Width,
+    final_distances, record,
 };
 
 use crate::oracle::{Pids, all_same, close, run, step};
@@ -236,5 +236,6 @@ fn tasks_that_no_run_can_have_are_refused() {
     assert!(refusal(vec![0.0], vec![f64::INFINITY], 1).contains("finite states"));
     assert!(refusal(vec![0.0], vec![1.0], 0).contains("found 0"));
     assert!(refusal(vec![0.0], vec![1.0], Task::MOST_STEPS + 1).contains("found 10000001"));
-    assert_eq!(Task::new(vec![1.0, 2.0], vec![4.0, -2.0], 1).unwrap().distance(), 5.0);
+    let task = Task::new(vec![1.0, 2.0], vec![4.0, -2.0], 1).unwrap();
+    assert_eq!(task.distance(&Periods::default()), 5.0);
 }

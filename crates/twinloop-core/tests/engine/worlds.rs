@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Axis, Experiment, Family, Form, Gain, Grammar, Instruction, Mixer, Operand, Operation, Page, Pid,
-    Program, SelectedTests, Shape, Signals, Width, Workers,
+    Axis, Experiment, Family, Form, Gain, Grammar, Instruction, Mixer, Operand, Operation, Page, Periods,
+    Pid, Program, SelectedTests, Shape, Signals, Width, Workers,
 };
 
 /// Three states, the second the derivative of the first; two commands; one axis with a rate and one without.
@@ -37,6 +37,7 @@ impl World {
             command_scales: vec![0.5, 2.0],
             derivative_of: vec![None, Some(0), None],
             kinematics: None,
+            periods: Periods::default(),
         };
         let signals = Arc::new(signals.validated().unwrap());
         let axes = vec![axis(0, Some(1)), axis(2, None)];
