@@ -149,6 +149,8 @@ class Signals:
         command_scales: ArrayLike,
         derivative_of: Sequence[int | None],
         kinematics: tuple[Sequence[int], Sequence[int]] | None = None,
+        *,
+        periods: Sequence[float | None] | None = None,
     ) -> Signals:
         """kinematics: the states of a rigid body's three angles (roll, pitch, yaw) and of its three rates."""
 
@@ -246,6 +248,9 @@ class Family:
         output: _Output | None = None,
     ) -> Family:
         """Feedback of errors and integrals; gains (states, integrals) per output."""
+    @staticmethod
+    def python(signals: Signals, make: Callable[[list[float]], object], gains: _Gains) -> Family:
+        """Controllers that `make` makes of a list of gains, with reset() and command(state, target)."""
     @property
     def size(self) -> int: ...
     def controller(self, parameters: ArrayLike, excitation: ArrayLike | None = None) -> Controller:

@@ -68,7 +68,8 @@ def fly(
 
 def _why_cut(last: Floats, lasted: int, signals: Signals, divergence_factor: float) -> str:
     """When a run was cut, and the state that was the furthest off a period before."""
-    worst = int(np.argmax(np.abs(last) / [state.scale for state in signals.states]))
+    scales = [np.inf if state.periodic else state.scale for state in signals.states]
+    worst = int(np.argmax(np.abs(last) / scales))
     state = signals.states[worst]
     return (
         f"a state left {divergence_factor:g} times its scale, or stopped being finite,"

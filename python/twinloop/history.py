@@ -45,11 +45,13 @@ class Experiment(Recorded, kind="experiment", given=("test",)):
 
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""
-        most = np.zeros(len(self.trajectory.states))
-        for readings, state in zip(self.trajectory.states.T, self.test.family.signals.states, strict=True):
+        most, signals = np.zeros(len(self.trajectory.states)), self.test.family.signals
+        middle = np.array([0.0 if s.envelope is None else 0.5 * sum(s.envelope) for s in signals.states])
+        off = np.abs(signals.difference(self.trajectory.states, middle))
+        for distances, state in zip(off.T, signals.states, strict=True):
             if state.envelope is not None:
                 low, high = state.envelope
-                most = np.maximum(most, np.abs(readings - 0.5 * (low + high)) / (0.5 * (high - low)))
+                most = np.maximum(most, distances / (0.5 * (high - low)))
         return most
 
 

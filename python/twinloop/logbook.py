@@ -18,7 +18,7 @@ from twinloop.objectives import frozen_error
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.setup import Setup
 from twinloop.test import Test, check_signals, final_distance
-from twinloop.trajectory import Trajectory, check_recorded
+from twinloop.trajectory import Trajectory, check_recorded, continued
 
 FAR = 5.0
 """A first reading is refused if it is this many times further off than the second, and than the next readings move."""
@@ -211,14 +211,21 @@ class Logbook(Recorded, kind="logbook"):
         """
         known = self._known(test)
         check_recorded(trajectory, self.setup.signals, known.steps, self.setup.options.divergence_factor)
+        trajectory = continued(trajectory, self.setup.signals, known.initial_state)
         _check_first_reading(trajectory, known)
         before = judge(_with_run(self.setup.none_selected(), known, trajectory))
         complete = trajectory.ended == "completed" and trajectory.steps == known.steps
-        distance = final_distance(trajectory.states[-1], known.target_state) if complete else None
+        distance = None
+        if complete:
+            distance = final_distance(trajectory.states[-1], known.target_state, self.setup.signals)
         quality = distance
         if complete and self.setup.preset != "paper":
             quality = self.setup.quality.flown(trajectory, known.target_state)
-        self._enter(Experiment(known, trajectory, before, frozen_error(trajectory), distance, quality))
+        self._enter(
+            Experiment(
+                known, trajectory, before, frozen_error(trajectory, self.setup.signals), distance, quality
+            )
+        )
 
     def measured(self, test: int) -> float | None:
         """Quality of a test on the system, mean over complete runs; None if there was none.

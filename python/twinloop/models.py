@@ -205,7 +205,7 @@ class Twin:
         """
         read = flown.states[0]
         explained = np.zeros_like(read) if self.noise is None else STARTS * self.noise.sensors
-        off = np.abs(read - test.initial_state) > explained
+        off = np.abs(self.signals.difference(read, test.initial_state)) > explained
         return dataclasses.replace(test, initial_state=np.where(off, read, test.initial_state))
 
     def spread(self, test: Test) -> tuple[Floats, Floats] | None:
@@ -242,7 +242,7 @@ class Twin:
         count = np.maximum(1, lasted.sum(axis=0))
         # From one of the runs: sums of whole states round by more than runs may differ.
         origin = np.where(lasted[0], states[0], 0.0)
-        off = np.where(lasted, states - origin, 0.0)
+        off = np.where(lasted, self.signals.difference(states, origin), 0.0)
         middle = off.sum(axis=0) / count
         variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
         return origin + middle, variance

@@ -12,6 +12,7 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, number
 from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
+from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -88,11 +89,12 @@ def closed_loop(
         return _core.closed_loop(models, selected, workers)
 
 
-def frozen_error(trajectory: Trajectory) -> float:
+def frozen_error(trajectory: Trajectory, signals: Signals | None = None) -> float:
     """Closed-loop error of the model that never moves (specification, section 3).
 
     Args:
         trajectory: a recorded run of at least one step.
+        signals: of the system; None where no state is periodic.
 
     Returns:
         Mean square of states 1 to n minus state 0, over steps and components, SI units squared.
@@ -102,7 +104,8 @@ def frozen_error(trajectory: Trajectory) -> float:
     """
     if trajectory.steps < 1:
         raise InvalidInput("Frozen error: expected at least one step, found none; record a longer run.")
-    moved = trajectory.states[1:] - trajectory.states[0]
+    states = trajectory.states
+    moved = states[1:] - states[0] if signals is None else signals.difference(states[1:], states[0])
     return float(math.fsum((moved * moved).ravel().tolist()) / moved.size)
 
 

@@ -14,6 +14,7 @@ from twinloop.campaign import Campaign
 from twinloop.errors import NotAvailable
 from twinloop.objectives import normalised_error
 from twinloop.presets import DefaultOptions
+from twinloop.signals import State
 from twinloop.trajectory import Trajectory
 
 SUFFIXES = (".svg", ".png")
@@ -203,7 +204,7 @@ def _runs(figure: Any, campaign: Campaign) -> None:
         for row, state in enumerate(states):
             axes, (factor, unit) = grid[row, column], shown_unit(state.unit)
             flown = factor * run.trajectory.states[:, row]
-            target = factor * float(run.test.target_state[row])
+            target = factor * _near(run.test.target_state[row], run.trajectory.states[-1, row], state)
             axes.axhline(target, color=TARGET, linewidth=0.8, linestyle=":", label="target")
             if predicted.band is not None:
                 low, high = factor * predicted.band[:, :, row]
@@ -245,6 +246,12 @@ def _inside_the_band(axes: Any, flown: Trajectory, predicted: Trajectory, first:
     axes.set_ylim(-3.5, 3.5)
     if first:
         axes.set_ylabel("all states,\nin the band")
+
+
+def _near(value: float, reading: float, state: State) -> float:
+    """A value, shifted by whole periods next to a reading where the state is periodic."""
+    turns = 0.0 if state.period is None else np.rint((reading - value) / state.period) * state.period
+    return float(value + turns)
 
 
 def _extent(curves: Sequence[Any]) -> tuple[float, float]:

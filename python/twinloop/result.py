@@ -60,7 +60,11 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "target_state": campaign.setup.target_state.tolist(),
             "steps": campaign.setup.steps,
             "dt": campaign.signals.dt,
-            "distance": float(np.linalg.norm(campaign.setup.target_state - campaign.setup.initial_state)),
+            "distance": float(
+                np.linalg.norm(
+                    campaign.signals.difference(campaign.setup.target_state, campaign.setup.initial_state)
+                )
+            ),
         },
         "signals": {
             "states": [dataclasses.asdict(state) for state in campaign.signals.states],

@@ -171,7 +171,7 @@ def checked(
         )
     start = floats("Campaign, initial_state", initial_state, (signals.n_x,))
     target = floats("Campaign, target_state", target_state, (signals.n_x,))
-    if (start == target).all():
+    if not signals.difference(target, start).any():
         raise InvalidInput(
             "Campaign, target_state: expected a target away from the initial state, found both the same; "
             "distances are measured in that length, so move one of them."
@@ -253,7 +253,7 @@ def _check_reachable(what: str, values: Floats, signals: Signals, divergence_fac
     """Refuses a start or target where every run would have been cut."""
     for value, state in zip(values, signals.states, strict=True):
         limit = divergence_factor * state.scale
-        if abs(value) >= limit:
+        if abs(value) >= limit and not state.periodic:
             raise InvalidInput(
                 f"{what}: expected {state.name} within {limit:g} {state.unit}, the divergence factor times its scale,"
                 f" found {value:g}; give it in the unit that is declared, or declare a larger scale."
@@ -266,6 +266,9 @@ def _check_inside(what: str, values: Floats, signals: Signals, margin: float) ->
         if state.envelope is not None:
             low, high = state.envelope
             kept = 0.5 * margin * (high - low)
+            if state.period is not None:
+                middle = 0.5 * (low + high)
+                value -= round((value - middle) / state.period) * state.period
             if not low + kept <= value <= high - kept:
                 raise InvalidInput(
                     f"{what}: expected {state.name} within {low + kept:g} to {high - kept:g} {state.unit}, its envelope"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from keyword import iskeyword
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from twinloop import _core
-from twinloop.arrays import number
+from twinloop.arrays import Floats, number
 from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.records import Recorded
 
@@ -27,9 +31,11 @@ class State(Recorded, kind="state"):
         envelope: smallest and largest value that the system may safely take, in its unit.
         noise: standard deviation of its sensor, in its unit, where that is known; the preset `default` begins its own
             estimate there and says where the two are far apart.
+        periodic: whether it is an angle that wraps: True where it is in rad, or its period in its unit, such as 360.0.
+            Errors and differences then take the short way, and a model sees it within half a period of 0.
 
     Raises:
-        InvalidInput: a name, unit, scale, envelope or noise that cannot be used.
+        InvalidInput: a name, unit, scale, envelope, noise or period that cannot be used.
     """
 
     name: str
@@ -38,6 +44,7 @@ class State(Recorded, kind="state"):
     derivative_of: str | None = None
     envelope: Bounds | None = None
     noise: float | None = None
+    periodic: bool | float = False
 
     def __post_init__(self) -> None:
         _check_words("State", self.name, self.unit)
@@ -46,6 +53,21 @@ class State(Recorded, kind="state"):
             object.__setattr__(self, "envelope", ordered(f"State {self.name!r}, envelope", self.envelope))
         if self.noise is not None:
             object.__setattr__(self, "noise", number(f"State {self.name!r}, noise", self.noise, above=0.0))
+        if self.periodic is True and self.unit != "rad":
+            raise InvalidInput(
+                f"State {self.name!r}, periodic: expected the period in {self.unit!r}, found True, which stands for"
+                " 2 pi rad; give the number, such as 360.0 for degrees."
+            )
+        if not isinstance(self.periodic, bool):
+            period = number(f"State {self.name!r}, periodic", self.periodic, above=0.0)
+            object.__setattr__(self, "periodic", period)
+
+    @property
+    def period(self) -> float | None:
+        """What can be added without changing what it stands for, in its unit; None where nothing can."""
+        return (
+            (2.0 * math.pi if self.periodic else None) if isinstance(self.periodic, bool) else self.periodic
+        )
 
 
 @dataclass(frozen=True)
@@ -198,6 +220,60 @@ class Signals(Recorded, kind="signals"):
         return tuple(i for i, name in enumerate(self.state_names) if name not in given)
 
     @cached_property
+    def _periods(self) -> list[tuple[int, float]]:
+        """Places and periods of the states that have one."""
+        return [(i, state.period) for i, state in enumerate(self.states) if state.period is not None]
+
+    def difference(self, a: ArrayLike, b: ArrayLike) -> Floats:
+        """The difference a − b, the short way where a state is periodic: at most half its period in either direction.
+
+        Args:
+            a: states (…, n_x), in their units.
+            b: the same.
+
+        Returns:
+            Differences (…, n_x), in their units.
+        """
+        difference = np.asarray(np.subtract(a, b), dtype=np.float64)
+        for i, period in self._periods:
+            difference[..., i] -= np.rint(difference[..., i] / period) * period
+        return difference
+
+    def wrapped(self, states: ArrayLike) -> Floats:
+        """States with the periodic ones within half a period of 0: what a model sees.
+
+        Args:
+            states: (…, n_x), in their units; more columns are left as they are.
+
+        Returns:
+            A copy.
+        """
+        wrapped = np.array(states, dtype=np.float64)
+        for i, period in self._periods:
+            wrapped[..., i] -= np.rint(wrapped[..., i] / period) * period
+        return wrapped
+
+    def continued(self, states: Floats, start: Floats) -> Floats:
+        """Rows of readings with the periodic states going on from row to row by the short way.
+
+        Args:
+            states: (rows, n_x), in their units.
+            start: a state (n_x,) that the first row follows.
+
+        Returns:
+            The rows, periodic states shifted by whole periods.
+        """
+        if not self._periods:
+            return states
+        continued = states.copy()
+        for i, period in self._periods:
+            last = float(start[i])
+            for k, reading in enumerate(states[:, i].tolist()):
+                last = reading - float(np.rint((reading - last) / period)) * period
+                continued[k, i] = last
+        return continued
+
+    @cached_property
     def engine(self) -> _core.Signals:
         """The same signals as numbers, for the native engine."""
         index = {name: i for i, name in enumerate(self.state_names)}
@@ -217,6 +293,7 @@ class Signals(Recorded, kind="signals"):
                     tuple(index[name] for name in self.kinematics.angles),
                     tuple(index[name] for name in self.kinematics.rates),
                 ),
+                periods=[state.period for state in self.states],
             )
 
 

@@ -125,18 +125,20 @@ class Test(Recorded, kind="test", given=("family",)):
         return f"Test({self.number}: {gains})"
 
 
-def final_distance(last_state: ArrayLike, target_state: ArrayLike) -> float:
+def final_distance(last_state: ArrayLike, target_state: ArrayLike, signals: Signals | None = None) -> float:
     """Distance of the last state to the target, δ (paper, section IV.C).
 
     Args:
         last_state: (n_x,), SI units, radians.
         target_state: (n_x,), the same units.
+        signals: of the system; None where no state is periodic.
 
     Returns:
         The Euclidean distance over all components.
     """
     target = floats("Target state", target_state, (None,))
-    gaps = floats("Last state", last_state, (len(target),)) - target
+    last = floats("Last state", last_state, (len(target),))
+    gaps = last - target if signals is None else signals.difference(last, target)
     total = 0.0
     for gap in gaps.tolist():
         total += gap * gap

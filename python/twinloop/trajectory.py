@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,7 +122,8 @@ def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_
             " loop only jitters around it, pass the even times dt * np.arange(n + 1)."
         )
     # Twice: noise may carry the last reading of a run that was stopped in time past the limit.
-    limits = 2.0 * divergence_factor * np.array([state.scale for state in signals.states])
+    scales = np.array([math.inf if state.periodic else state.scale for state in signals.states])
+    limits = 2.0 * divergence_factor * scales
     excess = np.abs(trajectory.states) / limits
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     if excess[k, i] > 1.0:
@@ -133,6 +135,21 @@ def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_
         )
     _check_commands(trajectory, signals)
     return trajectory
+
+
+def continued(trajectory: Trajectory, signals: Signals, start: Floats) -> Trajectory:
+    """The same run with periodic states that go on from row to row by the short way, however they were wrapped.
+
+    Args:
+        trajectory: as recorded.
+        signals: of the system.
+        start: the state (n_x,) that the run was to start from; the first row follows it.
+
+    Returns:
+        The run; itself where no state is periodic.
+    """
+    states = signals.continued(trajectory.states, start)
+    return trajectory if states is trajectory.states else replace(trajectory, states=states)
 
 
 def _check_commands(trajectory: Trajectory, signals: Signals) -> None:

@@ -1,6 +1,7 @@
 """Families of controllers: bounded gains and a law, one implementation for search and real run."""
 
 from twinloop.controllers.cascade import Cascade
+from twinloop.controllers.custom import Custom
 from twinloop.controllers.family import Controller, Family, UnboundFamily
 from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.controllers.lqr import lqr_gains
@@ -12,6 +13,7 @@ __all__ = [
     "PID",
     "Cascade",
     "Controller",
+    "Custom",
     "Family",
     "FixedGain",
     "Gain",

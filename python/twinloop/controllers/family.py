@@ -188,7 +188,9 @@ class Controller:
             InvalidInput: another shape, or a number that is not finite; the memory is unchanged.
         """
         n_x = self.family.signals.n_x
-        return self._law.command(floats("State", state, (n_x,)), floats("Target", target, (n_x,)))
+        reading, goal = floats("State", state, (n_x,)), floats("Target", target, (n_x,))
+        with engine_input():
+            return self._law.command(reading, goal)
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())

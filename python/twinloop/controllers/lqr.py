@@ -172,7 +172,7 @@ def _linearised(
             " once; learn from more tests, or choose another target."
         )
     half = len(sizes)
-    slopes = (following[:half] - following[half:]).T / (2.0 * NUDGE * np.array(sizes))
+    slopes = signals.difference(following[:half], following[half:]).T / (2.0 * NUDGE * np.array(sizes))
     return slopes[:, : signals.n_x], slopes[:, signals.n_x :]
 
 

@@ -46,7 +46,7 @@ def of_states(kind: str, states: Floats, test: Test) -> float:
     if len(states) < test.steps + 1:
         return CUT_FACTOR * of_nothing(kind, test)
     if kind == "final_distance":
-        return final_distance(states[-1], test.target_state)
+        return final_distance(states[-1], test.target_state, test.family.signals)
     if kind == "iae":
         signals = test.family.signals
         gaps = np.abs(states[1:] - test.target_state)[:, angles(signals)]

@@ -74,6 +74,7 @@ def identify_runs(
     Returns:
         What was learnt.
     """
+    runs = [run.continued(signals) for run in runs]
     learner = _Learner(runs, signals, options, rests, seed, iteration, known, workers, watch)
     return learner.learn()
 

@@ -16,13 +16,16 @@ CUBIC_INPUTS = 13
 
 
 def linear(pool: Pool, signals: Signals) -> Terms:
-    """1, every state, every command."""
-    return [pool.one, *range(pool.inputs)]
+    """1, every state, every command; sine and cosine of a state that is periodic."""
+    return [pool.one, *coordinates(pool, signals)]
 
 
 def quadratic(pool: Pool, signals: Signals) -> Terms:
-    """Products of two inputs."""
-    return [pool.product(*pair) for pair in combinations_with_replacement(range(pool.inputs), 2)]
+    """Products of two inputs; of a periodic state's, sine and cosine stand for it."""
+    # The square of a cosine is 1 less that of its sine.
+    cosines = {pool.wave("cos", i, signals.states[i].period) for i in periodic(signals)}
+    pairs = combinations_with_replacement(coordinates(pool, signals), 2)
+    return [pool.product(a, b) for a, b in pairs if a != b or a not in cosines]
 
 
 def damping(pool: Pool, signals: Signals) -> Terms:
@@ -74,9 +77,10 @@ def trigonometric(pool: Pool, signals: Signals) -> Terms:
     terms: Terms = []
     for i in range(signals.n_x):
         if i in angles(signals):
+            others = [j for j in range(pool.inputs) if j != i and j not in periodic(signals)]
             for function in ("sin", "cos"):
-                wave = pool.add((function, i, None))
-                terms += [wave, *(pool.product(j, wave) for j in range(pool.inputs) if j != i)]
+                wave = pool.wave(function, i, signals.states[i].period)
+                terms += [wave, *(pool.product(j, wave) for j in others)]
     return terms
 
 
@@ -92,7 +96,8 @@ def cubic(pool: Pool, signals: Signals) -> Terms:
     """Products of three inputs; none where there are so many inputs that the list alone is too long."""
     if pool.inputs > CUBIC_INPUTS:
         return []
-    return [pool.product(*triple) for triple in combinations_with_replacement(range(pool.inputs), 3)]
+    triples = combinations_with_replacement(coordinates(pool, signals), 3)
+    return [pool.product(*triple) for triple in triples]
 
 
 RUNGS: tuple[dict[str, Callable[[Pool, Signals], Terms]], ...] = (
@@ -105,9 +110,24 @@ LIBRARIES = tuple(name for rung in RUNGS for name in rung)
 """Their names."""
 
 
+def coordinates(pool: Pool, signals: Signals) -> Terms:
+    """Every input, but sine and cosine of a periodic state, which itself jumps where it wraps."""
+    terms: Terms = []
+    for i in range(pool.inputs):
+        period = signals.states[i].period if i in periodic(signals) else None
+        waves = () if period is None else ("sin", "cos")
+        terms += [pool.wave(function, i, period) for function in waves] or [i]
+    return terms
+
+
+def periodic(signals: Signals) -> set[int]:
+    """States that wrap."""
+    return {i for i, state in enumerate(signals.states) if state.period is not None}
+
+
 def angles(signals: Signals) -> set[int]:
-    """States that are measured in rad."""
-    return {i for i, state in enumerate(signals.states) if state.unit == "rad"}
+    """States that are measured in rad, or wrap."""
+    return {i for i, state in enumerate(signals.states) if state.unit == "rad"} | periodic(signals)
 
 
 def rates(signals: Signals) -> set[int]:

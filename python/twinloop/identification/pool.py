@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -156,6 +157,12 @@ class Pool(Recorded, kind="pool"):
         for factor in factors[1:]:
             result = self.add(("*", result, factor))
         return result
+
+    def wave(self, function: str, number: int, period: float | None) -> int:
+        """The node of the sine or cosine of a node, over a period of it; None: over 2π."""
+        if period is not None and period != 2.0 * math.pi:
+            number = self.add(("*", number, 2.0 * math.pi / period))
+        return self.add((function, number, None))
 
     def operands(self, number: int) -> list[int]:
         """Nodes that a node is computed from."""

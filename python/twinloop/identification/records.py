@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,12 @@ class Run:
     def of(states: Floats, commands: Floats) -> Run:
         """A run of which every reading counts."""
         return Run(states, commands, np.ones_like(states), states)
+
+    def continued(self, signals: Signals) -> Run:
+        """The run with periodic states that go on from reading to reading by the short way."""
+        states = signals.continued(self.states, self.states[0])
+        shifted = states - self.states
+        return self if states is self.states else replace(self, states=states, smooth=self.smooth + shifted)
 
     def part(self, first: int, last: int) -> Run:
         """The run from one period to another."""
@@ -75,7 +81,7 @@ def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stage
         effects = actuation.effects(signals, run.commands)
         parts.append(
             tuple(  # type: ignore[arg-type]
-                np.hstack([x, e[:, : signals.n_u] / scales, e[:, signals.n_u :]])
+                np.hstack([signals.wrapped(x), e[:, : signals.n_u] / scales, e[:, signals.n_u :]])
                 for x, e in zip((before, middle, after), effects, strict=True)
             )
         )

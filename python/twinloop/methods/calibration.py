@@ -42,7 +42,8 @@ def needed_factor(twin: Twin, test: Test, flown: Trajectory) -> float | None:
     rows = min(len(mean), len(flown.states))
     if rows < 2:
         return LARGEST
-    squares = ((flown.states[1:rows] - mean[1:rows]) / NINE_OF_TEN) ** 2 - twin.noise.sensors**2
+    errors = twin.signals.difference(flown.states[1:rows], mean[1:rows])
+    squares = (errors / NINE_OF_TEN) ** 2 - twin.noise.sensors**2
     smallest = 1e-12 * np.square([state.scale for state in twin.signals.states])
     factors = np.sqrt(np.maximum(squares, 0.0) / np.maximum(variance[1:rows], smallest))
     return float(np.clip(np.quantile(factors, 0.9), SMALLEST, LARGEST))
@@ -81,5 +82,6 @@ def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergenc
         test = dataclasses.replace(flight.test, initial_state=states[0])
         free = fly(model, test, divergence_factor=divergence_factor).states
         rows = min(len(states), len(free))
-        left.append(np.quantile(np.abs(states[:rows] - free[:rows]), 0.9, axis=0))
+        errors = test.family.signals.difference(states[:rows], free[:rows])
+        left.append(np.quantile(np.abs(errors), 0.9, axis=0))
     return np.asarray(np.median(left, axis=0) / NINE_OF_TEN, dtype=np.float64)

@@ -493,5 +493,6 @@ class IdentifyAndPlan:
 
 def _off_start(book: Logbook) -> Floats:
     """How far flights began from where they were asked to, root mean square of the first readings (n_x,)."""
-    off = [run.trajectory.states[0] - run.test.initial_state for run in book.experiments]
+    signals = book.setup.signals
+    off = [signals.difference(run.trajectory.states[0], run.test.initial_state) for run in book.experiments]
     return np.asarray(np.sqrt(np.square(off).mean(axis=0)), dtype=np.float64)

@@ -47,7 +47,7 @@ class Quality:
             target: state that it should have been led to (n_x,).
         """
         dt = self.signals.dt
-        errors = trajectory.states[1:] - target
+        errors = self.signals.difference(trajectory.states[1:], target)
         if self.kind == "final_distance":
             value = float(np.sqrt((self.weights * errors[-1] ** 2).sum()))
         else:

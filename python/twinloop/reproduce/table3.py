@@ -96,7 +96,9 @@ def _distances(
             campaign.setup.target_state,
             campaign.setup.steps,
         )
-        distances.append(final_distance(run.system.run(test).states[-1], test.target_state))
+        distances.append(
+            final_distance(run.system.run(test).states[-1], test.target_state, run.system.signals)
+        )
     return distances
 
 
@@ -108,7 +110,7 @@ def _summarised(
     scipy_stats: Any,
 ) -> Result:
     campaign = run.campaign
-    nothing = final_distance(campaign.setup.initial_state, campaign.setup.target_state)
+    nothing = final_distance(campaign.setup.initial_state, campaign.setup.target_state, campaign.signals)
     two, three = VERSIONS
     versions = {
         name: {

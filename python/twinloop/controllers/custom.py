@@ -1,0 +1,105 @@
+"""Controllers of one's own, written in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.controllers.family import Family
+from twinloop.controllers.gains import GainBounds, bounds_by_name, gain_of
+from twinloop.errors import InvalidInput, engine_input
+from twinloop.signals import Signals
+
+
+class Law(Protocol):
+    """What a class of controllers must have."""
+
+    def reset(self) -> None:
+        """Forgets the run so far; called at the start of every run."""
+        ...
+
+    def command(self, state: Floats, target: Floats) -> ArrayLike:
+        """What to send for the coming period (n_u,), for a measured state and a target (n_x,), in their units."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Custom:
+    """Controllers of a class in Python; for laws that no family here has.
+
+    An object of the class is one controller. The search makes one for each flight that it simulates, and asks it for
+    every command, one at a time and on the thread that asked, however many threads a campaign may use. That is slow: a
+    flight of 100 periods takes about 0.7 ms, some thirty times that of a law of the engine, and a campaign with its
+    default options simulates about a million flights for each test that it asks for; choose fewer `evaluations`,
+    `draws` and `candidates`. Commands are clipped to their bounds. A campaign with such controllers has no record.
+
+    Args:
+        law: makes a controller of its gains, called with all of them by name: a class with `reset()` and
+            `command(state, target)`. What it does must follow from its gains and what it was asked since `reset()`.
+        gains: bounds (low, high) by name; a third item "log" where decades matter; a number instead of bounds fixes a
+            gain.
+        units: of the gains, by name; without one "".
+
+    Raises:
+        InvalidInput: a law that cannot be called, no gains, or bounds the wrong way round.
+    """
+
+    law: Callable[..., Law]
+    gains: Mapping[str, GainBounds]
+    units: Mapping[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.law):
+            raise InvalidInput(
+                f"Custom, law: expected a class of controllers, found {self.law!r}; pass the class, not one of its"
+                " objects."
+            )
+        names = list(self.gains) if isinstance(self.gains, Mapping) else []
+        for name in names:
+            if not isinstance(name, str) or not name.isidentifier():
+                raise InvalidInput(
+                    f"Custom, gains: expected names that can be arguments, found {name!r}; rename it."
+                )
+        object.__setattr__(self, "gains", bounds_by_name("Custom", self.gains, names))
+        units = {} if self.units is None else self.units
+        if not isinstance(units, Mapping) or not all(name in names for name in units):
+            raise InvalidInput(
+                f"Custom, units: expected a dict of units by the names of gains, found {units!r}; mend it."
+            )
+        object.__setattr__(self, "units", dict(units))
+
+    def bind(self, signals: Signals) -> Family:
+        """The family over these signals; gains in the order of their names.
+
+        Args:
+            signals: that the controllers read and command.
+
+        Returns:
+            The family.
+
+        Raises:
+            InvalidInput: no gain with bounds, or a law that makes something without `reset` or `command`.
+        """
+        assert self.units is not None  # __post_init__ has set it
+        names, law = list(self.gains), self.law
+        gains = [gain_of(name, self.units.get(name, ""), self.gains[name]) for name in names]
+
+        def made(values: list[float]) -> Law:
+            controller = law(**dict(zip(names, values, strict=True)))
+            for method in ("reset", "command"):
+                if not callable(getattr(controller, method, None)):
+                    raise InvalidInput(
+                        f"Custom, law: expected controllers with reset() and command(state, target), found"
+                        f" {type(controller).__name__} without {method}; add it."
+                    )
+            return controller
+
+        made([bounds[0] if isinstance(bounds, tuple) else bounds for bounds in self.gains.values()])
+        with engine_input():
+            engine = _core.Family.python(signals.engine, made, [gain.engine for gain in gains])
+        return Family(signals, gains, engine)
