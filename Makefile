@@ -23,13 +23,13 @@ MATURIN_DEVELOP := $(BIN)/maturin develop --release
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # stages share one environment; cargo uses every core by itself
-.PHONY: help demo test check bench docs build format clean
+.PHONY: help demo test check bench docs build wheel format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{ printf "%-12s  %s\n", $$1, $$2 }'
 
-demo: $(VENV)/.installed-plot $(NATIVE) ## identify the built-in quadrotor from four flights; writes demo.svg
-	$(BIN)/twinloop run quadrotor --experiments 4 --noise 0.001 --seed 0 --plot demo.svg
+demo: $(NATIVE) ## identify the built-in quadrotor from four flights
+	$(BIN)/twinloop run quadrotor --experiments 4 --noise 0.001 --seed 0
 
 test: $(VENV)/.installed-test $(VENV)/.installed-others $(NATIVE) ## all tests, and the benchmarks in smoke mode
 	cargo test --package twinloop-core
@@ -54,13 +54,20 @@ docs: $(VENV)/.installed-docs ## the documentation, into site/
 
 build: $(NATIVE) ## the environment and the native module
 
+# A linker from a package, so that the wheel runs on Linux systems older than the one that builds it.
+wheel: $(VENV)/.created ## a wheel that needs no Rust, into dist/, tried in an environment of its own
+	$(BIN)/python -m pip install 'ziglang>=0.13'
+	rm -rf dist
+	PATH="$(CURDIR)/$(BIN):$$PATH" maturin build --release --zig --compatibility manylinux_2_17 --out dist
+	sh scripts/try_wheel.sh $(PYTHON) dist/*.whl
+
 format: $(VENV)/.installed-check ## rewrite the code in the house format
 	cargo fmt --all
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
 clean: ## remove the environment and all that was built
-	rm -rf $(VENV) target site python/twinloop/_core*.so .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) target site dist python/twinloop/_core*.so .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find python tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 
 $(VENV)/.created: | scripts/preflight.sh
