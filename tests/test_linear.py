@@ -247,3 +247,25 @@ def test_at_its_delay_margin_too():
     below, above = math.floor(periods), math.ceil(periods)
     for steps, stable in ((below, True), (above, False)):
         assert loops(actuators=((0.05, steps, None), (0.0, 0, None)))[0].margins(0, "angle").stable is stable
+
+
+def test_the_margins_of_a_campaign_are_those_of_its_twin_and_the_worst_of_its_committee():
+    system = tl.systems.Quadrotor(noise=1e-3)
+    campaign = tl.Campaign(
+        system.signals, controller=system.controller, initial_state=system.initial_state,
+        target_state=system.target_state, duration=system.duration,
+        options={"generations": 0, "moves": 2000, "starts": 2, "committee_size": 3},
+    )  # fmt: skip
+    campaign.run(system, experiments=1)
+    found = campaign.margins(system.default_gains)
+    assert [row.loop for row in found.nominal] == ["roll", "pitch", "yaw"] and found.broken_at == "axes"
+    assert found.members == len(campaign.twin.members)
+    for nominal, worst in zip(found.nominal, found.worst, strict=True):
+        assert nominal.stable and 1.0 < worst.gain <= nominal.gain and 0.0 < worst.phase <= nominal.phase
+        assert worst.sensitivity >= nominal.sensitivity > 1.0
+    # Axes of a vehicle at its target hardly touch each other: each loop alone has the margins of all closed.
+    text = str(found)
+    assert "roll" in text and "worst" in text
+    assert len(campaign.margins(system.default_gains, broken_at="commands").nominal) == 4
+    with pytest.raises(tl.InvalidInput, match="axes"):
+        campaign.margins(broken_at="wires")

@@ -14,9 +14,11 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop.arrays import floats, whole
 from twinloop.controllers import Controller, Family, UnboundFamily
-from twinloop.errors import InvalidInput, NotAvailable, engine_input
+from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.history import Experiment, Iteration, Lesson, Progress
 from twinloop.keeping import Keeping, look
+from twinloop.law.law import Law
+from twinloop.linear.margins import Margins, margins_of
 from twinloop.logbook import Logbook
 from twinloop.methods import Coevolution, IdentifyAndPlan, Method
 from twinloop.models import Twin
@@ -474,6 +476,39 @@ class Campaign(Recorded, kind="campaign"):
         if self._controller is None or self._controller.genes.tobytes() != best.genes.tobytes():
             self._controller = best.controller()
         return self._controller
+
+    def margins(
+        self, parameters: Mapping[str, float] | ArrayLike | None = None, broken_at: str = "axes"
+    ) -> Margins:
+        """How far the loops of a controller are from instability around the target, on the twin and on its committee.
+
+        Each loop is broken at one place while the others stay closed. All is in discrete time, with the delays and lags
+        of actuators. The twin is linearised at the target under the command that holds it, the controller where its
+        error is 0.
+
+        Args:
+            parameters: gains of the controller, by name or in order; None: those of `best_test`.
+            broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+
+        Returns:
+            Gain, phase and delay margins, crossover, Ms and Mt of each loop, nominal and the worst of the committee.
+
+        Raises:
+            InvalidInput: unknown gains, or another place to break a loop at.
+            NotAvailable: nothing was told, or the twin or the controller cannot be linearised there.
+        """
+        if broken_at not in ("axes", "commands"):
+            raise unknown("place to break a loop at", broken_at, ("axes", "commands"))
+        genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
+        twin, described = self.twin, self.setup.controller
+        mixer = getattr(described, "output", None)
+        if mixer is None or broken_at == "commands":
+            names: Sequence[str] = self.signals.command_names
+        else:
+            axes = getattr(described, "axes", None)
+            names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
+        laws = [twin.law, *(Law.of(member, self.signals) for member in twin.members)]
+        return margins_of(laws, self.family, genes, self.setup.target_state, mixer, names, broken_at)
 
     @property
     def committee(self) -> tuple[_core.Model, ...]:

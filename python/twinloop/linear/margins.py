@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.linear.controller import LinearController
-from twinloop.linear.plant import Linear
+from twinloop.controllers import Family, Mixer
+from twinloop.law.law import Law
+from twinloop.linear.controller import LinearController, linear_controller
+from twinloop.linear.plant import Linear, linearised, trimmed
 
 FREQUENCIES = 4000
 """Frequencies at which a loop is looked at, in equal ratios."""
@@ -133,6 +135,88 @@ class Loops:
                 low, high = (middle, high) if there * marks[place] > 0.0 else (low, middle)
             found.append(math.sqrt(low * high))
         return found
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins of the loops of a controller, by loop, each broken while the others stay closed; printable.
+
+    Args:
+        broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+        nominal: of the twin.
+        worst: the worst of each margin over the committee.
+        members: how many models that has.
+    """
+
+    broken_at: str
+    nominal: tuple[LoopMargins, ...]
+    worst: tuple[LoopMargins, ...]
+    members: int
+
+    def __str__(self) -> str:
+        """A table as text, the nominal margins above the worst of each loop."""
+        head = (
+            f"{'loop':>16}  {'':>7}  {'gain':>8}  {'down to':>8}  {'phase (°)':>9}  {'delay (s)':>9}  {'crossover':>9}"
+            f"  {'Ms':>6}  {'Mt':>6}"
+        )
+        lines = [f"Loops broken at the {self.broken_at}; crossover in rad/s", head]
+        for pair in zip(self.nominal, self.worst, strict=True):
+            for which, row in zip(("twin", "worst"), pair, strict=True):
+                lines.append(
+                    f"{row.loop if which == 'twin' else '':>16}  {which:>7}  {row.gain:>8.3g}  {row.gain_down:>8.3g}"
+                    f"  {math.degrees(row.phase):>9.3g}  {row.delay:>9.3g}  {row.crossover:>9.3g}"
+                    f"  {row.sensitivity:>6.3g}  {row.complementary:>6.3g}{'' if row.stable else '  unstable'}"
+                )
+        lines.append(f"worst: the worst of each over {self.members} model{'s' * (self.members != 1)}")
+        return "\n".join(lines)
+
+
+def margins_of(
+    laws: Sequence[Law],
+    family: Family,
+    genes: Floats,
+    target: Floats,
+    mixer: Mixer | None,
+    names: Sequence[str],
+    broken_at: str,
+) -> Margins:
+    """Margins of all loops, at the target and under the command that holds it.
+
+    Args:
+        laws: the twin's, then those of the committee.
+        family: of the controller.
+        genes: its gains (size,).
+        target: state that it leads to (n_x,).
+        mixer: from axes to commands; None: axis i is command i.
+        names: of the loops.
+        broken_at: "axes" or "commands".
+
+    Returns:
+        Nominal and worst margins of each loop.
+
+    Raises:
+        NotAvailable: a law or the controller has no derivatives there.
+    """
+    controller = linear_controller(family, genes, target)
+    outputs = None if mixer is None or broken_at == "commands" else _slopes(mixer, controller.rest)
+    rows = []
+    for law in laws:
+        plant = linearised(law, target, trimmed(law, target, controller.rest), discrete=True)
+        closed = Loops(plant, controller, outputs)
+        rows.append([closed.margins(loop, name) for loop, name in enumerate(names)])
+    return Margins(
+        broken_at,
+        tuple(rows[0]),
+        tuple(worst(each) for each in zip(*rows, strict=True)),
+        max(1, len(laws) - 1),
+    )
+
+
+def _slopes(mixer: Mixer, rest: Floats) -> Floats:
+    """How commands move with the outputs of the axes at rest (n_u, axes)."""
+    before = np.abs(rest) ** (1.0 / mixer.power)
+    slopes = np.ones(len(rest)) if mixer.power == 1.0 else mixer.power * before ** (mixer.power - 1.0)
+    return np.asarray(mixer.matrix * slopes[:, np.newaxis], dtype=np.float64)
 
 
 def worst(margins: Sequence[LoopMargins]) -> LoopMargins:
