@@ -4,7 +4,7 @@ from twinloop import contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
 from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, SystemFailure, TwinloopError
-from twinloop.models import Twin
+from twinloop.models import Twin, load_twin
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems import System
 from twinloop.test import Test
@@ -29,6 +29,7 @@ __all__ = [
     "contracts",
     "controllers",
     "errors",
+    "load_twin",
     "objectives",
     "pareto",
     "systems",

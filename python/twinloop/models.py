@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats
+from twinloop.arrays import Floats, floats, number
 from twinloop.controllers import PID, Mixer
-from twinloop.errors import engine_input
+from twinloop.errors import InvalidInput, NotAvailable, engine_input
+from twinloop.exports.export import Source, asked, c_name, exported
 from twinloop.flight import fly
 from twinloop.law.equations import equations
 from twinloop.law.law import Law
 from twinloop.linear.plant import Linear, linearised, resting, trimmed
+from twinloop.records import Recorded, checked_record, from_text, read, to_text
 from twinloop.signals import Signals
 from twinloop.streams import Purpose, stream
 from twinloop.test import Test, check_signals
@@ -25,7 +29,7 @@ from twinloop.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class TestErrors:
+class TestErrors(Recorded, kind="test_errors"):
     """How well a twin follows one selected test.
 
     Args:
@@ -67,7 +71,7 @@ class ErrorTable(tuple[TestErrors, ...]):
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class Noise(Recorded, kind="noise"):
     """What a twin does not predict.
 
     Args:
@@ -105,6 +109,8 @@ class Noise:
         return np.asarray(added, dtype=np.float64)
 
 
+WRONG = 0.5
+"""Share of the error of the model that never moves above which a flight is not followed."""
 DRAWS = 12
 """Runs of each member of a committee that a band is made of."""
 STARTS = 5.0
@@ -113,7 +119,7 @@ NINE_OF_TEN = 1.645
 """Standard deviations on either side of the mean between which nine of ten normal numbers lie."""
 
 
-class Twin:
+class Twin(Recorded, kind="twin"):
     """A model that stands in for the system.
 
     Args:
@@ -126,6 +132,7 @@ class Twin:
         seed: of the band's random numbers.
         inflation: factor on the spread of the members, where they were found to be too sure.
         offsets: by how much later than those of the driven states each state is read (n_x,), s; empty: none.
+        flights: that it was learnt from, on which its exports are checked.
     """
 
     def __init__(
@@ -139,7 +146,9 @@ class Twin:
         seed: int = 0,
         inflation: float = 1.0,
         offsets: Sequence[float] = (),
+        flights: Sequence[Trajectory] = (),
     ) -> None:
+        self.flights = tuple(flights)
         self.offsets = tuple(offsets)
         self.inflation = inflation
         self.members = tuple(members)
@@ -149,6 +158,115 @@ class Twin:
         self.signals = signals
         self.errors = ErrorTable(errors)
         self.divergence_factor = divergence_factor
+
+    @classmethod
+    def recorded_fields(cls) -> tuple[str, ...]:
+        """Names of the fields that a record has, in order."""
+        return (
+            *("signals", "model", "errors", "divergence_factor", "members", "noise", "seed", "inflation"),
+            *("offsets", "flights"),
+        )
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Twin:
+        found = checked_record(record, cls, cls.recorded_fields(), where)
+        signals = read(Signals, found["signals"], f"{where}.signals")
+        given = (signals, *given)
+        twin = cls(
+            read(_core.Model, found["model"], f"{where}.model", given),
+            signals,
+            read(tuple[TestErrors, ...], found["errors"], f"{where}.errors"),
+            number(f"Record {where}.divergence_factor", found["divergence_factor"], above=0.0),
+            read(tuple[_core.Model, ...], found["members"], f"{where}.members", given),
+            read(Noise | None, found["noise"], f"{where}.noise"),
+            read(int, found["seed"], f"{where}.seed"),
+            read(float, found["inflation"], f"{where}.inflation"),
+            read(tuple[float, ...], found["offsets"], f"{where}.offsets"),
+            read(tuple[Trajectory, ...], found["flights"], f"{where}.flights"),
+        )
+        widths = {(flight.states.shape[1], flight.commands.shape[1]) for flight in twin.flights}
+        noisy = twin.noise is None or len(twin.noise.sensors) == len(twin.noise.moves) == signals.n_x
+        if len(twin.offsets) not in (0, signals.n_x) or widths - {(signals.n_x, signals.n_u)} or not noisy:
+            raise InvalidInput(
+                f"Record {where}: expected offsets, noise and flights of {signals.n_x} states and {signals.n_u}"
+                " commands, found others; it is damaged."
+            )
+        return twin
+
+    @property
+    def follows(self) -> bool:
+        """Whether the twin, flown by itself, follows at least half of the flights that it was learnt from."""
+        noise = 0.0 if self.noise is None else float(np.square(self.noise.sensors).mean())
+        lost = 0
+        for row in self.errors:
+            frozen = row.closed_loop / row.normalised if row.normalised > 0.0 else math.inf
+            lost += not row.closed_loop - noise <= WRONG * max(frozen - noise, 2.0 * noise)
+        return 2 * lost <= len(self.errors)
+
+    def export(
+        self,
+        to: str | Path,
+        *,
+        kind: str | None = None,
+        precision: str = "double",
+        force: bool = False,
+    ) -> str | tuple[Path, ...]:
+        """The twin for use elsewhere, with its lags, delays, hidden states and all digits.
+
+        | kind | file | what it is |
+        |---|---|---|
+        | `python` | `.py` | `simulate(initial_state, commands)` and a class with `step`; it needs nothing but Python |
+        | `c` | `.c`, `.h` | C99 with one period a call; no allocation, nothing but <math.h> |
+        | `sympy` | `.py` | a script that makes SymPy expressions; divisions are plain ones |
+        | `latex` | `.tex` | equations for a paper, multiplied out, with six digits |
+        | `json` | `.json` | the twin itself, with its flights: `twinloop.load_twin` reads it back to the bit |
+
+        Python and C are run on the commands of the flights that the twin was learnt from and compared with the twin;
+        SymPy is evaluated at their states. Differences above 1e-9 of a state's scale are refused (1e-3 in single
+        precision).
+
+        Args:
+            to: a kind, or the path of a file with the suffix of one.
+            kind: of the file where its suffix does not say it: "sympy".
+            precision: of C, "double" or "float".
+            force: also a twin that does not follow its own flights, and without the comparison.
+
+        Returns:
+            The text where a kind was asked for (in C the header, then the source), else the paths that were written.
+
+        Raises:
+            InvalidInput: no such kind, or a path that cannot be written.
+            NotAvailable: the twin does not follow its own flights, or the export could not be checked on them.
+        """
+        chosen, path = asked(to, kind)
+        if not force and not self.follows:
+            raise NotAvailable(
+                "Export: expected a twin that follows the flights that it was learnt from, found one that does not"
+                " follow half of them; learn from more tests, or pass force=True."
+            )
+        record = to_text(self.to_record()) if chosen == "json" else ""
+        source = Source(
+            self.law,
+            lambda state, commands: self.simulate_commands(state, commands).states,
+            self.flights,
+            record,
+            not force,
+        )
+        texts = exported(source, chosen, "twin" if path is None else path.stem, precision)
+        if path is None:
+            return "\n".join(reversed(texts.values())).replace('#include "twin.h"\n', "")
+        written = []
+        for suffix, text in texts.items():
+            file = path.with_suffix(suffix)
+            named = text.replace(f'#include "{c_name(path.stem)}.h"', f'#include "{path.stem}.h"')
+            try:
+                file.write_text(named, encoding="utf-8")
+            except OSError as reason:
+                raise InvalidInput(
+                    f"Export: expected to be able to write {str(file)!r}: {reason}."
+                ) from reason
+            written.append(file)
+        return tuple(written)
 
     @cached_property
     def law(self) -> Law:
@@ -318,3 +436,24 @@ class Twin:
 
     def __repr__(self) -> str:
         return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"
+
+
+def load_twin(path: str | Path) -> Twin:
+    """A twin that was exported as JSON.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The twin, with the same numbers to the bit.
+
+    Raises:
+        InvalidInput: no such file, or one that holds no twin.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        raise InvalidInput(
+            f"Twin: expected a file that can be read, found {str(path)!r}: {reason}."
+        ) from reason
+    return Twin.from_record(from_text(text, f"Twin {str(path)!r}"))

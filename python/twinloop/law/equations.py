@@ -14,7 +14,7 @@ from twinloop.law.expansion import Expansion, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.law import Law
 from twinloop.law.spread import Spread, spreads
-from twinloop.law.writing import Term, Writer
+from twinloop.law.writing import EXACT, Term, Writer
 
 WIDTH = 100
 """Columns of a line."""
@@ -22,8 +22,6 @@ NOTE = 22
 """Columns of a note behind an equation; longer ones stand below it."""
 LONG_NAME = 32
 """Columns of a left side above which lines that go on do not begin under its equals sign."""
-EXACT = 17
-"""Digits that give every bit of a constant back."""
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
-from twinloop.law.expressions import BINARY, CONSTANT, INPUT, POWER, UPRIGHT, Expressions
+from twinloop.law.expressions import CONSTANT, INPUT, POWER, SMALLEST_DIVISOR, UPRIGHT, Expressions
 
 SUM, PRODUCT, HIGH, ATOM = 1, 2, 3, 4
 """How tightly an expression binds."""
@@ -12,11 +13,41 @@ LONGEST_PART = 60
 """Characters above which a part of an expression gets a name."""
 WORTH_A_NAME = 24
 """Characters above which a part that is written several times gets a name."""
-SPELLINGS = {"min": "Min", "max": "Max"}
-"""Functions whose name in SymPy is another than in a program."""
+EXACT = 17
+"""Digits that give every bit of a constant back."""
 
 Term = tuple[str, str]
 """Sign, "+" or "-", and what is added or subtracted."""
+
+
+def decimal(value: float, digits: int) -> str:
+    """A constant as text, with so many significant digits; 17 are exact."""
+    return repr(value) if digits == EXACT else f"{value:.{digits}g}"
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a language writes expressions.
+
+    Args:
+        functions: how an operation is written of its operands, where not as its name with brackets.
+        division: how a protected division is written of its operands; None: as a / b.
+        times: what stands between factors.
+        power: how a whole power is written of its base and exponent.
+        number: a constant with so many digits as text.
+        longest: characters above which a part of an expression gets a name.
+    """
+
+    functions: Mapping[str, str]
+    division: str | None = None
+    times: str = "*"
+    power: str = "{}**{}"
+    number: Callable[[float, int], str] = decimal
+    longest: int = LONGEST_PART
+
+
+TEXT = Dialect({"sqrt": "sqrt(abs({}))", "min": "Min({}, {})", "max": "Max({}, {})", UPRIGHT: "{}"})
+"""What people, Python and SymPy read alike."""
 
 
 class Writer:
@@ -29,6 +60,7 @@ class Writer:
         digits: significant digits of constants; 17 are exact.
         prefix: what the names of parts begin with.
         every: whether each part that is used twice gets a name, however short.
+        dialect: of the language.
     """
 
     def __init__(
@@ -39,8 +71,10 @@ class Writer:
         digits: int,
         prefix: str,
         every: bool,
+        dialect: Dialect = TEXT,
     ) -> None:
         self.expressions, self.symbols, self.digits = expressions, symbols, digits
+        self.dialect = dialect
         self._texts: dict[int, tuple[str, int]] = {}
         self.names: dict[int, str] = {}
         """Of parts, in the order in which they must be defined."""
@@ -60,7 +94,7 @@ class Writer:
 
     def number(self, value: float) -> str:
         """A constant as text."""
-        return repr(value) if self.digits == 17 else f"{value:.{self.digits}g}"
+        return self.dialect.number(value, self.digits)
 
     def text(self, number: int) -> str:
         """A node as text, by its name if it has one, without outer brackets."""
@@ -97,15 +131,15 @@ class Writer:
             if operation in ("+", "-"):
                 # Where a sum stands at the left of another one, a line may be broken between its terms.
                 parts = [self._in_order(operation, operands)[1]]
-                long = len(self.text(parts[0])) > LONGEST_PART
+                long = len(self.text(parts[0])) > self.dialect.longest
             else:
                 parts = sorted(set(operands), key=lambda operand: -len(self.text(operand)))
-                long = len(self._texts[number][0]) > LONGEST_PART
+                long = len(self._texts[number][0]) > self.dialect.longest
             for part in parts:
                 if long and self.expressions[part].operation not in (INPUT, CONSTANT):
                     self.names[part] = "t00"
                     self._texts[number] = self._composed(number)
-                    long = operation not in ("+", "-") and len(self._texts[number][0]) > LONGEST_PART
+                    long = operation not in ("+", "-") and len(self._texts[number][0]) > self.dialect.longest
             if count > 1 and (every or self._pays(number)):
                 self.names[number] = "t00"
         return set(self.names)
@@ -122,22 +156,29 @@ class Writer:
             return self.symbols[int(value)], ATOM
         if operation == CONSTANT:
             return self.number(value), ATOM
-        if operation == UPRIGHT:
-            return self.text(operands[0]), ATOM
         if operation == POWER:
-            return f"{self._bracketed(operands[0], ATOM)}**{int(value)}", HIGH
-        if operation == "sqrt":
-            return f"sqrt(abs({self.text(operands[0])}))", ATOM
-        if operation not in BINARY or operation in SPELLINGS:
-            inside = ", ".join(self.text(operand) for operand in operands)
-            return f"{SPELLINGS.get(operation, operation)}({inside})", ATOM
+            return self.dialect.power.format(self._bracketed(operands[0], ATOM), int(value)), HIGH
         if operation in ("+", "-"):
             return self._sum(operation, operands)
+        division = self.dialect.division
+        if operation == "/" and division is not None and not self._is_plain_divisor(operands[1]):
+            return division.format(*(self.text(operand) for operand in operands)), ATOM
+        if operation not in ("*", "/"):
+            inside = [self.text(operand) for operand in operands]
+            known = self.dialect.functions.get(operation)
+            return f"{operation}({', '.join(inside)})" if known is None else known.format(*inside), ATOM
         first, second = operands
         if operation == "*" and self.expressions.constant_value(second) is not None:
             first, second = second, first  # a product commutes to the bit
         # The right operand keeps its brackets even where algebra would not need them: rounding does.
-        return f"{self._factor(first, PRODUCT)}{operation}{self._bracketed(second, HIGH)}", PRODUCT
+        between = self.dialect.times if operation == "*" else operation
+        return f"{self._factor(first, PRODUCT)}{between}{self._bracketed(second, HIGH)}", PRODUCT
+
+    def _is_plain_divisor(self, number: int) -> bool:
+        """Whether a division by a node needs no protection: it is a constant that is large enough, or kept from 0."""
+        value = self.expressions.constant_value(number)
+        upright = self.expressions[number].operation == UPRIGHT
+        return upright or (value is not None and abs(value) > SMALLEST_DIVISOR)
 
     def _sum(self, operation: str, operands: tuple[int, ...]) -> tuple[str, int]:
         first, second = self._in_order(operation, operands)

@@ -131,7 +131,8 @@ class Coevolution:
         """The best trade-off."""
         model = self.models.best_model
         rows = errors(model, book, self.workers)
-        return Twin(model, self.setup.signals, rows, self.options.divergence_factor)
+        flights = [run.trajectory for run in book.experiments]
+        return Twin(model, self.setup.signals, rows, self.options.divergence_factor, flights=flights)
 
     @property
     def models(self) -> _core.ModelSearch:

@@ -317,6 +317,7 @@ class IdentifyAndPlan:
             seed=self.setup.seed,
             inflation=inflation,
             offsets=found.offsets.tolist(),
+            flights=[run.trajectory for run in book.experiments],
         )
 
     def _calibrated(self, known: Learnt, book: Logbook) -> tuple[float, ...]:

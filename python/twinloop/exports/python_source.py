@@ -1,0 +1,254 @@
+"""A law as a stand-alone Python module, which needs nothing but Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from twinloop._core import __version__
+from twinloop.law.law import Law
+from twinloop.law.writing import EXACT, Dialect, Term, Writer
+
+PYTHON = Dialect(
+    {
+        "abs": "abs({})",
+        "sqrt": "math.sqrt(abs({}))",
+        "sin": "_sin({})",
+        "cos": "_cos({})",
+        "tanh": "math.tanh({})",
+        "exp": "_exp({})",
+        "min": "_min({}, {})",
+        "max": "_max({}, {})",
+        "upright": "_upright({})",
+    },
+    division="_divided({}, {})",
+)
+
+_HELPERS = '''
+def _divided(a, b):
+    """Protected: a where b is all but 0."""
+    return a / b if abs(b) > 1e-6 else a
+
+
+def _min(a, b):
+    return a if a < b else b
+
+
+def _max(a, b):
+    return a if a > b else b
+
+
+def _sin(a):
+    return math.sin(a) if math.isfinite(a) else math.nan
+
+
+def _cos(a):
+    return math.cos(a) if math.isfinite(a) else math.nan
+
+
+def _exp(a):
+    try:
+        return math.exp(a)
+    except OverflowError:
+        return math.inf
+
+
+def _upright(a):
+    """A cosine of the pitch, kept from 0."""
+    return a if abs(a) >= 1e-3 else math.copysign(1e-3, a)
+'''
+
+_ACTUATED = '''
+class Twin:
+    """The twin from period to period; it remembers what its actuators and hidden states hold."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        """Begins a run: the next command is the first one."""
+        self._started = False
+
+    def step(self, x, u):
+        """The state a period after the state x, under the commands u."""
+        starts, middles, ends = self._effects(u)
+        return _step(x, starts, middles, ends)
+
+    def _effects(self, u):
+        """Commands in effect, in units of their scales, and hidden states: at start, middle and end of the period."""
+        if not self._started:
+            self._held = [value if rest is None else rest for value, rest in zip(u, RESTS)]
+            self._queues = [[held] * delay for held, delay in zip(self._held, DELAYS)]
+            self._hidden = [0.0] * len(HIDDEN)
+            self._levels = [None] * len(HIDDEN)
+            self._started = True
+        starts, middles, ends = [], [], []
+        for i, value in enumerate(u):
+            self._queues[i].append(value)
+            arrived = self._queues[i].pop(0)
+            half = math.exp(-0.5 * DT / LAGS[i]) if LAGS[i] > 0.0 else 0.0
+            start = self._held[i] if LAGS[i] > 0.0 else arrived
+            middle = arrived + (start - arrived) * half
+            end = arrived + (middle - arrived) * half
+            self._held[i] = end
+            for seen, effect in zip((starts, middles, ends), (start, middle, end)):
+                seen.append(effect * (1.0 / SCALES[i]))
+        for j, (commands, squared, rest, time) in enumerate(HIDDEN):
+            given = [u[i] * (1.0 / SCALES[i]) for i in commands]
+            level = sum(value * value if squared else value for value in given) * (1.0 / len(given))
+            if self._levels[j] is None:
+                self._levels[j] = level if rest is None else rest
+            kept = math.exp(-0.5 * DT / time)
+            added = (level - self._levels[j]) * (time * (1.0 - kept))
+            start = self._hidden[j]
+            middle = start * kept + added
+            self._hidden[j] = middle * kept + added
+            for seen, value in zip((starts, middles, ends), (start, middle, self._hidden[j])):
+                seen.append(value)
+        return starts, middles, ends
+'''
+
+_DIRECT = '''
+class Twin:
+    """The twin from period to period; its commands act at once, and it remembers nothing."""
+
+    def reset(self):
+        """Begins a run."""
+
+    def step(self, x, u):
+        """The state a period after the state x, under the commands u."""
+        seen = [value * (1.0 / scale) for value, scale in zip(u, SCALES)]
+        return _step(x, seen, seen, seen)
+'''
+
+_SIMULATE = '''
+def simulate(initial_state, commands):
+    """The states of a free run, the first one among them; what lies beyond a bound of a command is clipped."""
+    twin, states = Twin(), [list(initial_state)]
+    for u in commands:
+        clipped = [min(max(value, low), high) for value, (low, high) in zip(u, BOUNDS)]
+        states.append(twin.step(states[-1], clipped))
+    return states
+'''
+
+_STEPS = {
+    "absolute": '''
+def _step(x, start, middle, end):
+    """The next state."""
+    return _outputs(x, middle)
+''',
+    "increment": '''
+def _step(x, start, middle, end):
+    """The state and what is added to it."""
+    return [value + added for value, added in zip(x, _outputs(x, middle))]
+''',
+    "acceleration": '''
+def _step(x, start, middle, end):
+    """One Runge-Kutta step of order four."""
+
+    def along(slope, time):
+        return [value + time * rate for value, rate in zip(x, slope)]
+
+    first = _outputs(x, start)
+    second = _outputs(along(first, 0.5 * DT), middle)
+    third = _outputs(along(second, 0.5 * DT), middle)
+    fourth = _outputs(along(third, DT), end)
+    return [
+        value + DT / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        for value, a, b, c, d in zip(x, first, second, third, fourth)
+    ]
+''',
+}
+
+
+def python_source(law: Law) -> str:
+    """A law as Python.
+
+    Args:
+        law: of a twin.
+
+    Returns:
+        A module with `simulate(initial_state, commands)` and a class `Twin` with `reset` and `step`.
+    """
+    actuators, hidden = law.actuation.actuators, law.actuation.hidden
+    direct = not hidden and all(actuator.direct for actuator in actuators)
+    signals = law.signals
+    head = [
+        f'"""A twin of {", ".join(signals.state_names)}, learnt by Twinloop {__version__}.',
+        "",
+        "It needs nothing but Python.",
+        "",
+        "`simulate(initial_state, commands)` is a free run, `Twin().step(x, u)` one period of it.",
+        '"""',
+        "",
+        "import math",
+        "",
+        f"STATES = {tuple((state.name, state.unit) for state in signals.states)!r}  # names and units",
+        f"COMMANDS = {tuple((command.name, command.unit) for command in signals.commands)!r}",
+        f"BOUNDS = {tuple(command.bounds for command in signals.commands)!r}  # of the commands, in their units",
+        f"SCALES = {tuple(command.size for command in signals.commands)!r}  # what the equations see as 1",
+        f"DT = {signals.dt!r}  # s, a period",
+    ]
+    if not direct:
+        head += [
+            f"LAGS = {tuple(actuator.lag for actuator in actuators)!r}  # s, of each command",
+            f"DELAYS = {tuple(actuator.delay for actuator in actuators)!r}  # periods",
+            f"RESTS = {tuple(actuator.rest for actuator in actuators)!r}  # at the start; None: the first one",
+            f"HIDDEN = {tuple(tuple(each) for each in hidden)!r}"
+            "  # commands that fill it, whether squared, level at rest, time (s)",
+        ]
+    head += [
+        f"# {name} is read {offset:+.6g} s after the states that the equations drive; all are given at one time."
+        for name, offset in zip(signals.state_names, law.offsets, strict=True)
+        if offset != 0.0
+    ]
+    parts = ["\n".join(head) + "\n", _HELPERS, _outputs(law), _STEPS[law.form]]
+    return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE])
+
+
+def equation_roots(law: Law) -> tuple[int, ...]:
+    """Nodes of what the equations give: derivatives of all states, or outputs.
+
+    Args:
+        law: of a twin.
+    """
+    return law.derivatives() if law.form == "acceleration" else law.outputs
+
+
+def joined(terms: Sequence[Term], between: str) -> str:
+    """A sum, a term a line where it is long.
+
+    Args:
+        terms: of it.
+        between: what stands before each further line.
+    """
+    first, *rest = terms
+    text = ("-" if first[0] == "-" else "") + first[1]
+    size = len(text) + sum(len(term) + 3 for _, term in rest)
+    return text + "".join(f"{between if size > 80 else ' '}{sign} {term}" for sign, term in rest)
+
+
+def _outputs(law: Law) -> str:
+    roots = equation_roots(law)
+    symbols = [f"{name}_" if name == "math" or name.startswith("_") else name for name in law.symbols]
+    prefix = "t"
+    while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in symbols):
+        prefix += "_"
+    writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, PYTHON)
+    states, seen = symbols[: law.signals.n_x], symbols[law.signals.n_x :]
+    lines = [
+        "",
+        "def _outputs(x, u):",
+        '    """What the equations give at the state x; u are commands in effect, in units of their scales."""',
+        f"    {', '.join(states)}, = x",
+        f"    {', '.join(seen)}, = u",
+    ]
+    lines += [
+        f"    {name} = ({joined(writer.terms(number, define=True), chr(10) + ' ' * 8)})"
+        for number, name in writer.names.items()
+    ]
+    lines += [
+        "    return [",
+        *(f"        {joined(writer.terms(root), chr(10) + ' ' * 8)}," for root in roots),
+        "    ]",
+    ]
+    return "\n".join(lines) + "\n"

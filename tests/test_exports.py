@@ -1,0 +1,289 @@
+"""What is taken away gives the twin's numbers: run by Python, compiled by a C compiler, read by SymPy."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import assume, given, settings
+
+import twinloop as tl
+from oracles import registers_of
+from strategies import program_text, programs
+from twinloop import _core
+from twinloop.errors import NotAvailable
+from twinloop.exports.c_source import c_source
+from twinloop.exports.checks import c_simulation, python_simulation
+from twinloop.exports.python_source import python_source
+from twinloop.models import Noise, TestErrors
+
+needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+
+SIGNALS = tl.Signals(
+    states=[tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 8.0, derivative_of="angle")],
+    commands=[tl.Command("torque", "N m", (-2.0, 2.0)), tl.Command("fan", "V", (0.0, 5.0))],
+    dt=0.05,
+)
+PENDULUM = ["r4 = sin(r0)", "r4 = r4 * -9.0", "r5 = r1 * 0.4", "r4 = r4 - r5", "r5 = r2 * 11.0", "r4 = r4 + r5",
+            "r5 = r3 * r3", "r5 = r5 * r0", "r4 = r4 + r5"]  # fmt: skip
+FILLED = ["r5 = r4 * 3.0", "r6 = r2 * 11.0", "r5 = r5 + r6", "r6 = r3 * r0", "r5 = r5 - r6", "r6 = abs(r1)",
+          "r6 = sqrt(r6)", "r6 = r1 / r6", "r5 = r5 - r6", "r7 = tanh(r1)", "r7 = max(r7, r2)",
+          "r5 = r5 - r7"]  # fmt: skip
+BODY = tl.Signals(
+    states=[tl.State(name, "rad", 3.0) for name in ("roll", "pitch", "yaw")]
+    + [tl.State(name, "rad/s", 5.0) for name in ("p", "q", "int")],
+    commands=[tl.Command("double", "N m", (-2.0, 2.0))],
+    dt=0.05,
+    kinematics=tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "int")),
+)
+"""Two of its names are words of C."""
+
+
+def flown(twin, steps=60, seed=0):
+    """A flight that the twin follows, for its checks."""
+    rng = np.random.default_rng(seed)
+    low, high = np.array([command.bounds for command in twin.signals.commands]).T
+    commands = low + (high - low) * rng.random((steps, twin.signals.n_u))
+    start = 0.1 * rng.normal(size=twin.signals.n_x)
+    return twin.simulate_commands(start, commands)
+
+
+def twin_of(lines, form="acceleration", signals=SIGNALS, inputs=4, offsets=(), errors=(), **actuation):
+    outputs = len(signals.driven) if form == "acceleration" else signals.n_x
+    program = _core.Program.parse(program_text(inputs, outputs, inputs + outputs + 6, [lines]))
+    model = _core.Model(program, form, signals.engine, *actuation.values())
+    bare = tl.Twin(model, signals)
+    return tl.Twin(model, signals, errors, offsets=offsets, flights=[flown(bare, seed=i) for i in range(2)])
+
+
+TWINS = {
+    "acceleration": lambda: twin_of(PENDULUM),
+    "increment": lambda: twin_of(
+        ["r4 = r1 * 0.05", "r5 = sin(r0)", "r5 = r5 * -0.4", "r6 = r2 * 0.5", "r5 = r5 + r6"], "increment",
+    ),
+    "absolute": lambda: twin_of(
+        ["r4 = r1 * 0.05", "r4 = r4 + r0", "r5 = r1 * 0.9", "r6 = r3 * 0.01", "r5 = r5 - r6"], "absolute",
+    ),
+    "actuators and hidden states": lambda: twin_of(
+        FILLED, inputs=5, offsets=(0.003, 0.0),
+        actuators=[(0.08, 2, None), (0.0, 1, 2.0)], hidden=[((0, 1), True, None, 0.7)],
+    ),
+    "a lag at rest": lambda: twin_of(
+        FILLED, inputs=5, actuators=[(0.03, 0, 0.5), (0.2, 0, None)], hidden=[((1,), False, 0.25, 2.0)],
+    ),
+    "kinematics": lambda: twin_of(
+        ["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], signals=BODY, inputs=7,
+    ),
+}  # fmt: skip
+ALL = pytest.mark.parametrize("which", TWINS)
+
+
+@ALL
+def test_the_python_module_simulates_what_the_twin_does_in_another_process(which, tmp_path):
+    twin = TWINS[which]()
+    (path,) = twin.export(tmp_path / "taken.py")
+    flight = flown(twin, seed=7)
+    given = json.dumps([flight.states[0].tolist(), (2.0 * flight.commands).tolist()])
+    program = "import json, sys, taken; print(json.dumps(taken.simulate(*json.loads(sys.stdin.read()))))"
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, '.')\n{program}"],
+        cwd=path.parent, input=given, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).states
+    found = np.array(json.loads(done.stdout))[: len(expected)]
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@needs_cc
+@ALL
+def test_c_compiles_without_a_warning_and_gives_the_same(which, tmp_path):
+    twin = TWINS[which]()
+    files = twin.export(tmp_path / "my-rig.c")
+    assert {file.name for file in files} == {"my-rig.c", "my-rig.h"}
+    flight = flown(twin, seed=7)
+    n_x, n_u = twin.signals.n_x, twin.signals.n_u
+    (tmp_path / "main.c").write_text(
+        f"""
+#include <stdio.h>
+#include "my-rig.h"
+int main(void)
+{{
+    my_rig_memory memory;
+    double x[{n_x}], u[{n_u}];
+    my_rig_reset(&memory);
+    for (int i = 0; i < {n_x}; ++i) if (scanf("%lf", &x[i]) != 1) return 1;
+    for (;;) {{
+        for (int i = 0; i < {n_x}; ++i) printf("%.17g ", x[i]);
+        for (int i = 0; i < {n_u}; ++i) if (scanf("%lf", &u[i]) != 1) return 0;
+        my_rig_clip(u);
+        my_rig_step(&memory, x, u, x);
+    }}
+}}
+"""
+    )
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wshadow", "-O2"]
+    subprocess.run(["cc", *strict, "-o", "rig", "main.c", "my-rig.c", "-lm"], cwd=tmp_path, check=True)
+    numbers = " ".join(
+        repr(v) for v in [*flight.states[0].tolist(), *(2.0 * flight.commands).ravel().tolist()]
+    )
+    done = subprocess.run([tmp_path / "rig"], input=numbers, capture_output=True, text=True, check=True)
+    found = np.array(done.stdout.split(), dtype=float).reshape(-1, n_x)
+    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).states
+    np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9, atol=1e-9)
+    assert "malloc" not in files[0].read_text()
+
+
+@needs_cc
+def test_c_in_single_precision_is_near():
+    text = TWINS["acceleration"]().export("c", precision="float")
+    assert "double" not in text and "sinf(" in text and "typedef float twin_real;" in text
+
+
+@settings(deadline=None, max_examples=40)
+@given(programs(inputs=4, outputs=2))
+def test_any_program_is_taken_away_in_python(program):
+    inputs = np.random.default_rng(0).uniform(-2.0, 2.0, (6, 4))
+    banks = [*registers_of(program.effective(), inputs)]
+    assume(all((np.abs(bank) < 1e6).all() for bank in banks))
+    model = _core.Model(program, "absolute", SIGNALS.engine)
+    twin = tl.Twin(model, SIGNALS)
+    simulate = python_simulation(python_source(twin.law))
+    for row in inputs:
+        command = np.clip(row[2:] * [2.0, 5.0], [-2.0, 0.0], [2.0, 5.0])
+        expected = model.step(row[np.newaxis, :2], command[np.newaxis])[0]
+        np.testing.assert_allclose(simulate(row[:2], command[np.newaxis])[1], expected, rtol=1e-9, atol=1e-9)
+
+
+@needs_cc
+@settings(deadline=None, max_examples=12)
+@given(programs(inputs=4, outputs=2))
+def test_any_program_is_taken_away_in_c(program):
+    inputs = np.random.default_rng(0).uniform(-2.0, 2.0, (6, 4))
+    assume(all((np.abs(bank) < 1e6).all() for bank in registers_of(program.effective(), inputs)))
+    model = _core.Model(program, "absolute", SIGNALS.engine)
+    law = tl.Twin(model, SIGNALS).law
+    simulate = c_simulation(*c_source(law, "rig"), "rig", law, "double")
+    for row in inputs:
+        command = np.clip(row[2:] * [2.0, 5.0], [-2.0, 0.0], [2.0, 5.0])
+        expected = model.step(row[np.newaxis, :2], command[np.newaxis])[0]
+        np.testing.assert_allclose(simulate(row[:2], command[np.newaxis])[1], expected, rtol=1e-9, atol=1e-9)
+
+
+@ALL
+def test_sympy_has_the_equations_with_all_digits(which, tmp_path):
+    twin = TWINS[which]()
+    (path,) = twin.export(tmp_path / "law.py", kind="sympy")
+    names = {}
+    exec(path.read_text(), names)
+    symbols = [*names["STATES"], *names["COMMANDS"], *names.get("HIDDEN", ())]
+    compute = sympy.lambdify(symbols, names["EQUATIONS"], "numpy")
+    law = twin.law
+    rng = np.random.default_rng(3)
+    for row in rng.uniform(0.2, 1.0, (5, len(symbols))):
+        found = np.asarray(compute(*row), dtype=float).ravel()
+        n_x = twin.signals.n_x
+        scales = np.array([command.size for command in twin.signals.commands])
+        if law.actuation.hidden or (law.form == "acceleration" and law.actuation.actuators[0].delay):
+            program = law.expressions.program(law.outputs, law.inputs)
+            np.testing.assert_allclose(
+                found[list(twin.signals.driven)], program.run(row[np.newaxis])[0], rtol=1e-12
+            )
+            continue
+        state, command = row[:n_x], row[n_x:] * scales
+        if law.form == "acceleration":
+            tiny = tl.Signals(twin.signals.states, twin.signals.commands, 1e-5, twin.signals.kinematics)
+            after = _core.Model(twin.model.program, law.form, tiny.engine).step(state[None], command[None])[0]
+            np.testing.assert_allclose(found, (after - state) / 1e-5, rtol=1e-3, atol=1e-4)
+        else:
+            after = twin.predict(state, command) - (state if law.form == "increment" else 0.0)
+            np.testing.assert_allclose(found, after, rtol=1e-12)
+
+
+def test_latex_says_what_the_equations_say():
+    text = twin_of(PENDULUM).export("latex")
+    assert text.startswith("% Form 'acceleration'") and text.rstrip().endswith(r"\end{align*}")
+    assert r"\frac{\mathrm{d} \mathit{angle}}{\mathrm{d} t} &= \mathit{rate} \\" in text
+    assert r"\mathit{fan\_scaled}^{2}" in text and r"- 9 \, \sin\left(\mathit{angle}\right)" in text
+    assert text.count("{") == text.count("}")
+
+
+def test_a_twin_comes_back_in_another_process_with_the_same_numbers(tmp_path):
+    errors = [TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)]
+    lone = TWINS["actuators and hidden states"]()
+    noise = Noise(np.array([1e-3, 5e-3]), np.array([0.0, 1e-3]), (((1, 0), True, 0.1, 0.3),), 0.05)
+    twin = tl.Twin(
+        lone.model, SIGNALS, errors, members=[lone.model], noise=noise, seed=3, inflation=1.5,
+        offsets=lone.offsets, flights=lone.flights,
+    )  # fmt: skip
+    (path,) = twin.export(tmp_path / "twin.json")
+    again = tl.load_twin(path)
+    assert again.equations(17) == twin.equations(17) and again.errors == twin.errors
+    assert (again.seed, again.inflation, again.offsets) == (3, 1.5, twin.offsets)
+    assert again.export("json") == path.read_text()
+    flight = flown(twin, seed=5)
+    program = (
+        "import json, sys, twinloop as tl; x, u = json.loads(sys.stdin.read());"
+        "print(json.dumps(tl.load_twin(sys.argv[1]).simulate_commands(x, u).states.tolist()))"
+    )
+    given = json.dumps([flight.states[0].tolist(), flight.commands.tolist()])
+    done = subprocess.run(
+        [sys.executable, "-c", program, path], input=given, capture_output=True, text=True, check=True
+    )
+    assert np.array(json.loads(done.stdout)).tobytes() == flight.states.tobytes()
+
+
+# Refusals
+
+
+def test_a_twin_that_does_not_follow_its_flights_is_exported_only_by_force(tmp_path):
+    bad = [TestErrors(i, 1.0, 2.0, 0.9, None, 2.0) for i in range(2)]
+    twin = twin_of(PENDULUM, errors=bad)
+    assert not twin.follows
+    with pytest.raises(NotAvailable, match="force=True"):
+        twin.export(tmp_path / "twin.py")
+    assert not (tmp_path / "twin.py").exists()
+    assert twin.export(tmp_path / "twin.py", force=True) == (tmp_path / "twin.py",)
+    lost = [TestErrors(0, np.inf, np.inf, np.inf, None, np.inf)]
+    assert not twin_of(PENDULUM, errors=lost).follows
+    assert twin_of(PENDULUM, errors=[TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)]).follows
+
+
+def test_what_sympy_cannot_say_is_refused():
+    twin = twin_of(["r4 = r1 / r0", "r5 = r0 * 1.0"], "absolute")
+    still = tl.Trajectory(0.05 * np.arange(3), np.tile([0.0, 1.0], (3, 1)), np.zeros((2, 2)))
+    protected = tl.Twin(twin.model, SIGNALS, flights=[still])
+    with pytest.raises(NotAvailable, match="SymPy"):
+        protected.export("sympy")
+    assert "sp.Matrix" in protected.export("sympy", force=True)
+
+
+@pytest.mark.parametrize(
+    ("to", "options", "said"),
+    [
+        ("rust", {}, "kind of export"),
+        ("twin.xyz", {}, "kind of export"),
+        ("twin.py", {"kind": "c"}, "ends in .c"),
+        ("nowhere/twin.py", {}, "existing folder"),
+        ("c", {"precision": "half"}, "precision"),
+    ],
+)
+def test_what_cannot_be_made_is_refused(to, options, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(tl.InvalidInput, match=said):
+        twin_of(PENDULUM).export(to, **options)
+
+
+def test_a_file_that_holds_no_twin_is_refused(tmp_path):
+    path = tmp_path / "twin.json"
+    with pytest.raises(tl.InvalidInput, match="can be read"):
+        tl.load_twin(path)
+    path.write_text("{}")
+    with pytest.raises(tl.InvalidInput, match="kind 'twin'"):
+        tl.load_twin(path)
+    record = twin_of(PENDULUM).to_record()
+    path.write_text(json.dumps({**record, "offsets": [0.1]}))
+    with pytest.raises(tl.InvalidInput, match="damaged"):
+        tl.load_twin(path)
