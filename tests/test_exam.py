@@ -27,7 +27,6 @@ from twinloop.exam.systems import Subject, subject
 from twinloop.exam.tables import as_markdown, render, tables
 from twinloop.exam.tuning import score, tuned, variants
 from twinloop.models import Twin
-from twinloop.planning.gains import from_unit, to_unit
 from twinloop.presets import options_of
 
 PAPER = for_smoke(LEARNERS["paper"])
@@ -215,9 +214,9 @@ def test_gains_go_to_the_unit_cube_and_back():
     signals = tl.Signals([tl.State("angle", "rad", 1.0)], [tl.Command("torque", "N m", (-1.0, 1.0))], 0.1)
     box = {"angle.kp": (0.01, 100.0, "log"), "angle.ki": (-2.0, 4.0), "angle.kd": (0.0, 1.0)}
     family = tl.controllers.PID(axes=[("angle", None)], gains=box).bind(signals)
-    np.testing.assert_allclose(from_unit(family, [0.5, 0.5, 0.0]), [1.0, 1.0, 0.0])
+    np.testing.assert_allclose(family.from_unit([0.5, 0.5, 0.0]), [1.0, 1.0, 0.0])
     genes = np.array([3.0, -1.0, 0.25])
-    np.testing.assert_allclose(from_unit(family, to_unit(family, genes)), genes)
+    np.testing.assert_allclose(family.from_unit(family.to_unit(genes)), genes)
 
 
 # Fits

@@ -11,11 +11,12 @@ from strategies import program_text
 from twinloop import _core
 from twinloop.flights import candidates, qualities
 from twinloop.planning.excitation import binary, chirps
-from twinloop.planning.gains import from_unit, to_unit, tune_gains
+from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner
 from twinloop.planning.quality import KINDS, quality_of
 from twinloop.presets import options_of
+from twinloop.streams import Unit
 
 STEPS = 40
 TASK = Task(np.array([0.5, 0.0]), np.array([0.0, 0.0]), STEPS)
@@ -86,13 +87,13 @@ def test_an_excitation_keeps_its_amplitude_and_fades(steps, amplitude, fade, see
         0.02,
     )
     for make in (chirps, binary):
-        added = make(two, steps, amplitude, fade, np.random.default_rng(seed))
+        added = make(two, steps, amplitude, fade, Unit(seed, (0,)).stream("exam"))
         assert added.shape == (steps, 2) and np.isfinite(added).all()
         share = np.abs(added) / (np.array([2.0, 50.0]) * max(amplitude, 1e-300))
         assert (share <= 1.0 + 1e-12).all()
         left = (steps - np.arange(steps)) / steps / max(fade, 1.0 / steps)
         assert (share <= np.minimum(1.0, left)[:, None] + 1e-9).all()
-        assert same_bits(added, make(two, steps, amplitude, fade, np.random.default_rng(seed)))
+        assert same_bits(added, make(two, steps, amplitude, fade, Unit(seed, (0,)).stream("exam")))
 
 
 def test_the_first_excitation_is_the_tests_own_and_none_where_it_is_switched_off():
@@ -108,10 +109,10 @@ def test_the_first_excitation_is_the_tests_own_and_none_where_it_is_switched_off
 @given(st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3))
 def test_a_place_in_the_box_is_gains_within_their_bounds_and_back(places):
     family = family_of(signals())
-    genes = from_unit(family, np.array(places))
+    genes = family.from_unit(places)
     for value, gain in zip(genes, family.gains, strict=True):
         assert gain.low <= value <= gain.high
-    np.testing.assert_allclose(to_unit(family, genes), places, atol=1e-12)
+    np.testing.assert_allclose(family.to_unit(genes), places, atol=1e-12)
 
 
 def test_gains_are_tuned_to_the_bottom_of_a_bowl_and_never_worse_than_the_start():
@@ -119,13 +120,22 @@ def test_gains_are_tuned_to_the_bottom_of_a_bowl_and_never_worse_than_the_start(
     bottom = np.array([0.3, 0.7, 0.5])
 
     def bowl(genes):
-        return ((to_unit(family, genes) - bottom) ** 2).sum(axis=1)
+        return ((family.to_unit(genes) - bottom) ** 2).sum(axis=1)
 
-    start = from_unit(family, np.array([0.9, 0.1, 0.9]))
-    genes = tune_gains(family, bowl, [start], evaluations=2000, spread=0.2, seed=1)
-    np.testing.assert_allclose(to_unit(family, genes), bottom, atol=0.02)
-    genes = tune_gains(family, lambda g: np.ones(len(g)), [start], evaluations=64, spread=0.2, seed=1)
+    start = family.from_unit([0.9, 0.1, 0.9])
+    how = {"spread": 0.2, "unit": Unit(1).part(0), "purpose": "gains"}
+    genes = tune_gains(family, bowl, [start], evaluations=2000, **how)
+    np.testing.assert_allclose(family.to_unit(genes), bottom, atol=0.02)
+    genes = tune_gains(family, lambda g: np.ones(len(g)), [start], evaluations=64, **how)
     assert same_bits(genes, start)
+
+
+def test_what_lies_outside_the_box_is_dearer_the_further_out_whatever_the_scores_are():
+    places = np.array([[0.5], [1.0], [1.5], [2.0], [-1.0], [-2.0]])
+    for score in (0.0, 1e-200, 3.0, 1e200, -2.0):
+        dearer = _dearer_outside(np.full(6, score), places)
+        assert dearer[0] == dearer[1] == score < dearer[2] < dearer[3] == dearer[4] < dearer[5]
+    assert np.isposinf(_dearer_outside(np.full(6, np.inf), places)).all()
 
 
 # Quality
@@ -282,7 +292,7 @@ def test_without_excitation_a_flight_that_is_flown_again_is_varied():
     planner = planner_of(known, excitation=0.0)
     found = proposed(planner, unsure)
     assert found.excitation is None and not same_bits(found.genes, TUNED)
-    places = to_unit(planner.family, np.stack([found.genes, TUNED]))
+    places = planner.family.to_unit(np.stack([found.genes, TUNED]))
     assert np.abs(places[0] - places[1]).max() < 0.2
     assert "small variation" in found.reason
     again = proposed(planner_of(known), unsure)

@@ -278,7 +278,7 @@ def energies(gram, prices, largest):
 
 
 def searched(grams, prices, threads=1, **changes):
-    settings = {"moves": 3000, "largest": 8, "starts": 2, "seed": 1, "iteration": 0, **changes}
+    settings = {"moves": 3000, "largest": 8, "starts": 2, "unit": (1, "subsets", [0]), **changes}
     return _core.search_subsets(grams, prices, workers=_core.Workers(threads=threads), **settings)
 
 

@@ -318,6 +318,7 @@ def residuals(values, records):
     return np.concatenate(found)
 
 
+UNIT = (3, "members", [0])
 CHAIN = [([0], [SENSOR], QUIET, True)]
 
 
@@ -325,7 +326,7 @@ def test_constants_and_a_lag_are_those_that_scipy_finds():
     records = [flown(1), flown(2)]
     start = (-0.8, 1.5, 0.2)
     tuned, left, readings, covariance, members = _core.tune(
-        lagging(*start), CHAIN, records, free=[0, 1], lags=[[0]], iterations=30, draws=400, seed=3
+        lagging(*start), CHAIN, records, free=[0, 1], lags=[[0]], iterations=30, draws=400, unit=UNIT
     )
     expected = least_squares(residuals, start, args=(records,), xtol=1e-12, ftol=1e-12)
     errors = np.sqrt(np.diag(np.linalg.inv(expected.jac.T @ expected.jac)))
@@ -345,7 +346,7 @@ def test_constants_that_do_the_same_are_drawn_as_far_as_the_runs_bear_it():
     model = _core.Model(_core.Program.parse(program_text(2, 1, 4, [page])), "acceleration", signals)
     records = [flown(1, truth=(-1.3, 2.0, 1e-9)), flown(2, truth=(-1.3, 2.0, 1e-9))]
     tuned, left, _, covariance, members = _core.tune(
-        model, CHAIN, records, free=[0, 1, 2], lags=[], iterations=30, draws=200, seed=3
+        model, CHAIN, records, free=[0, 1, 2], lags=[], iterations=30, draws=200, unit=UNIT
     )
     drawn = np.array([member.constants for member in members])
     outer, damping, inner = np.array(tuned.constants), drawn[:, 1], drawn[:, 0] * drawn[:, 2]
@@ -353,7 +354,7 @@ def test_constants_that_do_the_same_are_drawn_as_far_as_the_runs_bear_it():
     assert np.std(drawn[:, 0]) > 0.02 * abs(outer[0])
     # As the runs have it where b c is one constant, within what a hundred draws can tell and halving takes away.
     _, _, _, plain, _ = _core.tune(
-        lagging(-1.0, 2.0, 0.0), CHAIN, records, free=[0, 1], lags=[], iterations=30, draws=0, seed=3
+        lagging(-1.0, 2.0, 0.0), CHAIN, records, free=[0, 1], lags=[], iterations=30, draws=0
     )
     errors = np.sqrt(np.diag(plain))
     assert 0.1 * errors[0] < np.std(damping) < 1.3 * errors[0]
@@ -389,7 +390,7 @@ def test_only_what_is_free_moves_and_the_rest_stays_to_the_bit():
 def test_a_model_that_diverges_is_told_as_such():
     wild = lagging(40.0, 2.0, 0.1)
     _, left, _, covariance, members = _core.tune(
-        wild, CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=5, draws=2
+        wild, CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=5, draws=2, unit=UNIT
     )
     assert left == np.inf and covariance.size == 0
     assert [member.constants.tolist() for member in members] == [[40.0, 2.0]] * 2
@@ -400,7 +401,7 @@ def test_tuning_gives_the_same_bits_for_any_workers():
     def bits(workers):
         model, left, _, covariance, members = _core.tune(
             lagging(-0.8, 1.5, 0.2), CHAIN, [flown(1), flown(2)], free=[0, 1], lags=[[0]], iterations=6, draws=3,
-            workers=workers,
+            unit=UNIT, workers=workers,
         )  # fmt: skip
         return [*model.constants, left, *covariance.ravel(), *(c for m in members for c in m.constants)]
 
@@ -459,7 +460,7 @@ def test_the_time_of_a_hidden_state_is_tuned_with_the_constants():
         lags=[[1]],
         iterations=30,
         draws=300,
-        seed=3,
+        unit=UNIT,
     )
     found = np.array([*tuned.constants, tuned.hidden[0][3]])
     np.testing.assert_allclose(found, truth, rtol=0.03)

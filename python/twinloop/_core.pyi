@@ -24,11 +24,14 @@ _Gains = Sequence[float | tuple[float, float, bool]]
 """Of a law in its order: a number that fixes a gain, or low, high and whether the scale is logarithmic."""
 _Output = tuple[ArrayLike, ArrayLike, float]
 """Matrix (n_u, outputs), offset (n_u,) and power; without one output i of a law is command i."""
+_Name = tuple[int, str, Sequence[int]]
+"""Seed, purpose, and the one to five numbers that lead to a unit of work, which its stream is named by."""
 _Record = tuple[ArrayLike, ArrayLike, ArrayLike]
 """Readings (n + 1, n_x), weights (n + 1, n_x) and commands (n, n_u) of a run."""
 
 __all__ = [
     "Archive",
+    "CmaEs",
     "Controller",
     "Family",
     "Flights",
@@ -43,6 +46,7 @@ __all__ = [
     "Runs",
     "SelectedTests",
     "Signals",
+    "Stream",
     "Task",
     "TestSearch",
     "TestSettings",
@@ -52,20 +56,28 @@ __all__ = [
     "best_tradeoff",
     "closed_loop",
     "command_effects",
+    "cos",
     "crowding_distances",
     "disagreements",
     "discrimination",
+    "eigen",
+    "exp",
     "final_distances",
     "ideal_point",
     "instability",
+    "log",
     "most_likely_noises",
     "open_loop",
+    "power",
     "predictions",
+    "purposes",
     "qualities",
     "ranks",
     "rollout",
     "search_subsets",
     "select",
+    "sin",
+    "tanh",
     "tune",
     "vector_widths",
 ]
@@ -84,6 +96,70 @@ class Workers:
     def threads(self) -> int: ...
     @property
     def width(self) -> str: ...
+
+@final
+class Stream:
+    """The random numbers of one unit of work, one after another."""
+
+    def __new__(cls, unit: _Name) -> Stream: ...
+    def uniform(self, low: float = 0.0, high: float = 1.0) -> float:
+        """One number between two, the first included."""
+    def below(self, n: int) -> int:
+        """One of 0, …, n − 1."""
+    def log_uniform(self, low: float, high: float) -> float:
+        """One number between two above 0, uniform in its logarithm."""
+    def uniforms(self, *shape: int) -> _Floats:
+        """An array of a shape, uniform in [0, 1)."""
+    def normals(self, *shape: int) -> _Floats:
+        """An array of a shape, standard normal."""
+
+def purposes() -> list[str]:
+    """What random numbers may be for."""
+
+def exp(x: ArrayLike) -> _Floats:
+    """e to the power of each number, in the shape of x."""
+
+def log(x: ArrayLike) -> _Floats:
+    """The natural logarithm of each number, in the shape of x."""
+
+def sin(x: ArrayLike) -> _Floats:
+    """The sine of each angle (rad), in the shape of x."""
+
+def cos(x: ArrayLike) -> _Floats:
+    """The cosine of each angle (rad), in the shape of x."""
+
+def tanh(x: ArrayLike) -> _Floats:
+    """The hyperbolic tangent of each number, in the shape of x."""
+
+def power(x: float, y: float) -> float:
+    """x to the power of y."""
+
+def eigen(matrix: ArrayLike) -> tuple[_Floats, _Floats]:
+    """Eigenvalues (n,), ascending, and eigenvectors (n, n), a row each, of a symmetric matrix (n, n)."""
+
+@final
+class CmaEs:
+    """A search by CMA-ES for the least value of a function, as a value."""
+
+    def __new__(cls, mean: ArrayLike, step: float, population: int, unit: _Name) -> CmaEs: ...
+    @property
+    def generation(self) -> int: ...
+    @property
+    def mean(self) -> _Floats:
+        """Middle of the distribution (n,)."""
+    @property
+    def step(self) -> float:
+        """Factor on the square root of the covariance."""
+    @property
+    def covariance(self) -> _Floats:
+        """Shape of the distribution (n, n)."""
+    @property
+    def stopped(self) -> bool:
+        """Whether nothing more is to be had from this search."""
+    def ask(self) -> _Floats:
+        """Points of this generation (population, n); the same ones when asked again."""
+    def tell(self, points: ArrayLike, values: ArrayLike) -> CmaEs:
+        """The search that knows the values (population,) of points (population, n)."""
 
 @final
 class Program:
@@ -253,6 +329,10 @@ class Family:
         """Controllers that `make` makes of a list of gains, with reset() and command(state, target)."""
     @property
     def size(self) -> int: ...
+    def places(self, parameters: ArrayLike) -> _Floats:
+        """Places (rows, size) of parameters (rows, size), 0 to 1 between the bounds, on each one's scale."""
+    def at(self, places: ArrayLike) -> _Floats:
+        """Parameters (rows, size) at places (rows, size), those beyond a bound at the bound."""
     def controller(self, parameters: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
         """excitation (n, n_u): a row is added to each command in turn, nothing after the last."""
 
@@ -467,8 +547,7 @@ def search_subsets(
     moves: int,
     largest: int,
     starts: int,
-    seed: int,
-    iteration: int,
+    unit: _Name,
     coldest: float = 2.0,
     workers: Workers | None = None,
 ) -> list[list[tuple[list[int], float]]]:
@@ -483,9 +562,7 @@ def tune(
     lags: Sequence[Sequence[int]],
     iterations: int,
     draws: int = 0,
-    seed: int = 0,
-    iteration: int = 0,
-    unit: int = 0,
+    unit: _Name | None = None,
     divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> tuple[Model, float, int, _Floats, list[Model]]:

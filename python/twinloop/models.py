@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop.arrays import Floats, floats, number
 from twinloop.controllers import PID, Mixer
+from twinloop.elementary import exp
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.exports.export import Source, asked, c_name, exported
 from twinloop.flight import fly
@@ -23,7 +24,7 @@ from twinloop.law.law import Law
 from twinloop.linear.plant import Linear, linearised, resting, trimmed
 from twinloop.records import Recorded, checked_record, from_text, read, to_text
 from twinloop.signals import Signals
-from twinloop.streams import Purpose, stream
+from twinloop.streams import Unit
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
 
@@ -87,17 +88,17 @@ class Noise(Recorded, kind="noise"):
     gusts: tuple[tuple[tuple[int, ...], bool, float, float], ...] = ()
     dt: float = 1.0
 
-    def drawn(self, draws: int, steps: int, stream: np.random.Generator) -> tuple[Floats, Floats]:
+    def drawn(self, draws: int, steps: int, stream: _core.Stream) -> tuple[Floats, Floats]:
         """What sensors add to readings (draws, steps + 1, n_x), and disturbances to states (draws, steps, n_x)."""
-        noise = self.sensors * stream.standard_normal((draws, steps + 1, len(self.sensors)))
-        return np.asarray(noise, dtype=np.float64), self.disturbance(draws, steps, stream)
+        noise = self.sensors * stream.normals(draws, steps + 1, len(self.sensors))
+        return noise, self.disturbance(draws, steps, stream)
 
-    def disturbance(self, draws: int, steps: int, stream: np.random.Generator) -> Floats:
+    def disturbance(self, draws: int, steps: int, stream: _core.Stream) -> Floats:
         """Draws of what disturbances add to the states (draws, steps, n_x)."""
-        added = self.moves * stream.standard_normal((draws, steps, len(self.moves)))
+        added = self.moves * stream.normals(draws, steps, len(self.moves))
         for states, integrated, size, memory in self.gusts:
-            kept = float(np.exp(-self.dt / memory))
-            fresh = stream.standard_normal((draws, steps))
+            kept = float(exp(-self.dt / memory))
+            fresh = stream.normals(draws, steps)
             gust = np.empty((draws, steps))
             gust[:, 0] = fresh[:, 0]
             for k in range(1, steps):
@@ -106,7 +107,7 @@ class Noise(Recorded, kind="noise"):
             for i, state in enumerate(states if integrated else states[:1]):
                 reach *= self.dt / (i + 1) if integrated else 1.0
                 added[:, :, state] += reach * size * gust
-        return np.asarray(added, dtype=np.float64)
+        return added
 
 
 WRONG = 0.5
@@ -307,7 +308,7 @@ class Twin(Recorded, kind="twin"):
         if spread is None or self.noise is None:
             return run
         mean, variance = (values[: len(run.states)] for values in spread)
-        half = NINE_OF_TEN * np.sqrt(self.inflation**2 * variance + self.noise.sensors**2)
+        half = NINE_OF_TEN * np.sqrt(self.inflation * self.inflation * variance + self.noise.sensors**2)
         return dataclasses.replace(run, band=np.stack([mean - half, mean + half]))
 
     def as_flown(self, test: Test, flown: Trajectory) -> Test:
@@ -338,7 +339,7 @@ class Twin(Recorded, kind="twin"):
         """
         if not self.members or self.noise is None:
             return None
-        noise, moves = self.noise.drawn(DRAWS, test.steps, stream(self.seed, Purpose.BAND))
+        noise, moves = self.noise.drawn(DRAWS, test.steps, Unit(self.seed).part(0).stream("band"))
         excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
         runs = []
         for member in self.members:

@@ -20,7 +20,7 @@ from twinloop.models import TestErrors, Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality
 from twinloop.presets import DefaultOptions
-from twinloop.streams import Purpose, stream
+from twinloop.streams import Unit
 from twinloop.test import Test
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
@@ -274,7 +274,9 @@ def _repeated(campaign: Campaign, twin: Twin, test: Test, gusts: bool) -> list[f
     """Qualities that would be measured if a flight were repeated, on the twin; NaN for one that diverges."""
     draws: list[tuple[Floats | None, Floats | None]] = [(None, None)]
     if twin.noise is not None:
-        noise, moves = twin.noise.drawn(REPEATS, test.steps, stream(campaign.setup.seed, Purpose.REPEATS))
+        noise, moves = twin.noise.drawn(
+            REPEATS, test.steps, Unit(campaign.setup.seed).part(0).stream("repeats")
+        )
         draws = [(seen, moved if gusts else None) for seen, moved in zip(noise, moves, strict=True)]
     values = []
     for seen, moved in draws:

@@ -1,31 +1,56 @@
-"""Streams of random numbers: one for each unit of work, named by what it is for; none is global."""
+"""Units of work, by whose names the engine draws random numbers: no two of them share a stream, none is global."""
 
 from __future__ import annotations
 
-from enum import IntEnum
+from dataclasses import dataclass
+from typing import Literal
 
-import numpy as np
+from twinloop import _core
+
+Purpose = Literal[
+    "subsets",
+    "members",
+    "hidden_subsets",
+    "terms",
+    "structures",
+    "gains",
+    "fine_gains",
+    "starts",
+    "sensors",
+    "off_start",
+    "candidates",
+    "ends",
+    "excitation",
+    "baseline",
+    "band",
+    "repeats",
+    "exam",
+]
+"""What random numbers of a campaign are for, in the engine's words (`rng.rs`)."""
+Name = tuple[int, Purpose, tuple[int, ...]]
+"""A stream's name, as the engine takes it."""
 
 
-class Purpose(IntEnum):
-    """What random numbers of a campaign are for, beside those that the engine draws."""
-
-    EVOLUTION = 77
-    COMMITTEE = 78
-    PLANNING = 79
-    BAND = 80
-    REPEATS = 81
-
-
-def stream(*key: int, purpose: int | None = None) -> np.random.Generator:
-    """The random numbers of one unit of work.
+@dataclass(frozen=True)
+class Unit:
+    """A unit of work, and the numbers that lead to it from a campaign's seed.
 
     Args:
-        key: a seed, and whatever numbers tell this unit from others.
-        purpose: names streams that are drawn beside that of the same key; None for that one.
-
-    Returns:
-        A counter-based generator that depends on these and on nothing else.
+        seed: of the campaign.
+        path: which iteration, which search of it, and so on; the engine takes five numbers at most.
     """
-    sequence = np.random.SeedSequence(list(key), spawn_key=() if purpose is None else (purpose,))
-    return np.random.Generator(np.random.Philox(sequence))
+
+    seed: int
+    path: tuple[int, ...] = ()
+
+    def part(self, *numbers: int) -> Unit:
+        """A unit within this one."""
+        return Unit(self.seed, (*self.path, *numbers))
+
+    def named(self, purpose: Purpose) -> Name:
+        """The name of its stream for a purpose; that of no other unit, and of no other purpose."""
+        return self.seed, purpose, self.path
+
+    def stream(self, purpose: Purpose) -> _core.Stream:
+        """Its random numbers for a purpose, from the first one on."""
+        return _core.Stream(self.named(purpose))

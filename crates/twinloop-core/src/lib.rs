@@ -3,6 +3,7 @@
 
 mod actuators;
 mod any_dynamics;
+mod cmaes;
 mod controller;
 mod difference;
 mod dynamics;
@@ -13,6 +14,7 @@ mod hidden;
 mod integrator;
 mod lanes;
 mod lgp;
+mod linear_algebra;
 mod model;
 mod model_loop;
 mod objective;
@@ -32,6 +34,7 @@ mod workers;
 
 pub use actuators::{Actuation, Actuator, effects};
 pub use any_dynamics::{AnyDynamics, AnyWorkspace};
+pub use cmaes::CmaEs;
 pub use controller::*;
 pub use difference::Periods;
 pub use dynamics::Dynamics;
@@ -44,15 +47,15 @@ pub use hidden::Hidden;
 pub use integrator::{Field, Stages, rk4};
 pub use lanes::{Apart, Isa, Kernel, Piece, Scalar, Vector, Wide, Width, dispatch};
 pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};
+pub use linear_algebra::{Cholesky, Eigen};
 pub use model::{Form, Frame, Model};
 pub use model_loop::{Learnt, ModelSearch};
 pub use objective::{closed_loops, discrimination, final_distances, instability, of_model, open_loops};
 pub use plants::{Gyroscopic, Quadrotor};
 pub use regression::{
-    Annealing, Chain, Choices, Cholesky, Found, Gram, Noise, Record, Solution, likelihood, most_likely_noise,
-    search,
+    Annealing, Chain, Choices, Found, Gram, Noise, Record, Solution, likelihood, most_likely_noise, search,
 };
-pub use rng::{Purpose, Stream};
+pub use rng::{Purpose, Stream, Unit};
 pub use rollout::{Seen, Start, Watch, rollout};
 pub use rows::{run_rows, step_rows};
 pub use selected::{Experiment, SelectedTests};

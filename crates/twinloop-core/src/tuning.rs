@@ -8,8 +8,9 @@ use crate::dynamics::step_apart;
 use crate::error::{Result, invalid};
 use crate::lanes::{Isa, Kernel, Vector, dispatch, pack, with_test_lanes};
 use crate::lgp::Code;
+use crate::linear_algebra::Cholesky;
 use crate::model::{Frame, Model};
-use crate::regression::{Chain, Cholesky, Noise, Record, Whitening};
+use crate::regression::{Chain, Noise, Record, Whitening};
 use crate::rng::Stream;
 use crate::workers::Workers;
 

@@ -2,12 +2,12 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use twinloop_core::{AnyLaw, Axis, Controller, Family, Gain, Mixer, Outer, Pid, Signals, StateFeedback};
 
-use crate::arrays::{Matrix, Vector, optional_rows, rows, to_vector, vector};
+use crate::arrays::{Matrix, Vector, optional_rows, rows, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
 use crate::law::{PythonLaw, raised};
 use crate::model::PySignals;
@@ -96,6 +96,14 @@ impl PyFamily {
         self.0.parameters().len()
     }
 
+    fn places<'py>(&self, py: Python<'py>, parameters: Matrix<'_>) -> Result<Bound<'py, PyArray2<f64>>> {
+        self.row_by_row(py, "parameters", &parameters, |row| self.0.parameters().places(row))
+    }
+
+    fn at<'py>(&self, py: Python<'py>, places: Matrix<'_>) -> Result<Bound<'py, PyArray2<f64>>> {
+        self.row_by_row(py, "places", &places, |row| self.0.parameters().at(row))
+    }
+
     #[pyo3(signature = (parameters, excitation = None))]
     fn controller(&self, parameters: Vector<'_>, excitation: Option<Matrix<'_>>) -> Result<PyController> {
         let controller = Controller::new(self.0.clone(), vector(&parameters))?;
@@ -106,6 +114,18 @@ impl PyFamily {
 }
 
 impl PyFamily {
+    fn row_by_row<'py>(
+        &self,
+        py: Python<'py>,
+        name: &str,
+        array: &Matrix<'_>,
+        mapped: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> Result<Bound<'py, PyArray2<f64>>> {
+        let size = self.0.parameters().len();
+        let found: Vec<f64> = rows(name, array, size)?.iter().flat_map(|row| mapped(row)).collect();
+        Ok(to_matrix(py, size, found))
+    }
+
     fn of_law(law: impl Into<AnyLaw>, gains: Vec<GainBounds>, signals: &Signals) -> Result<Self> {
         let gains = gains.into_iter().map(Gain::from).collect();
         let family = Family::new(law, gains, signals.states())?;

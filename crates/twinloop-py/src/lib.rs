@@ -1,7 +1,9 @@
 //! Python bindings of the engine: conversion only, one file for each concept.
 
 mod arrays;
+mod cmaes;
 mod controller;
+mod elementary;
 mod error;
 mod flights;
 mod law;
@@ -11,6 +13,7 @@ mod pareto;
 mod plant;
 mod program;
 mod regression;
+mod rng;
 mod rollout;
 mod search;
 mod selected;
@@ -26,7 +29,11 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 #[pyo3::pymodule]
 mod _core {
     #[pymodule_export]
+    use crate::cmaes::{PyCmaEs, eigen};
+    #[pymodule_export]
     use crate::controller::{PyController, PyFamily};
+    #[pymodule_export]
+    use crate::elementary::{cos, exp, log, power, sin, tanh};
     #[pymodule_export]
     use crate::flights::{PyFlights, PyQuality, disagreements, qualities};
     #[pymodule_export]
@@ -41,6 +48,8 @@ mod _core {
     use crate::program::{PyGrammar, PyProgram};
     #[pymodule_export]
     use crate::regression::{PyGram, PyRegression, most_likely_noises, search_subsets};
+    #[pymodule_export]
+    use crate::rng::{PyStream, purposes};
     #[pymodule_export]
     use crate::rollout::{PyRuns, PyTask, rollout};
     #[pymodule_export]

@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{
-    Annealing, Chain, Choices, Gram, Noise, Purpose, Record, Stream, likelihood, most_likely_noise, search,
-};
+use twinloop_core::{Annealing, Chain, Choices, Gram, Noise, Record, likelihood, most_likely_noise, search};
 
 use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
+use crate::rng::Name;
 use crate::workers::{PyWorkers, or_default};
 
 /// Process variance, gust variance, memory in s.
@@ -218,7 +217,7 @@ impl PyGram {
 
 /// For each of the problems, subsets with their energies, best first: annealed `starts` times from different streams.
 #[pyfunction]
-#[pyo3(signature = (grams, prices, *, moves, largest, starts, seed, iteration, coldest = 2.0, workers = None))]
+#[pyo3(signature = (grams, prices, *, moves, largest, starts, unit, coldest = 2.0, workers = None))]
 #[expect(clippy::too_many_arguments, reason = "the settings of a search, named by keyword in Python")]
 pub fn search_subsets(
     py: Python<'_>,
@@ -227,8 +226,7 @@ pub fn search_subsets(
     moves: usize,
     largest: usize,
     starts: usize,
-    seed: u64,
-    iteration: u64,
+    unit: Name,
     coldest: f64,
     workers: Option<&PyWorkers>,
 ) -> Result<Vec<Walked>> {
@@ -242,12 +240,12 @@ pub fn search_subsets(
         return Err(misuse("search_subsets: expected a price for each feature".into()));
     }
     let annealing = Annealing { moves, largest, coldest };
+    let unit = unit.unit()?;
     let walks = py.detach(|| {
         let choices = workers.map(grams.len(), |i| Choices::new(&grams[i], &prices[i]));
-        workers.map(grams.len() * starts, |unit| {
-            let problem = unit / starts;
-            let mut stream =
-                Stream::new(seed, Purpose::Subsets, iteration, problem as u64, (unit % starts) as u64);
+        workers.map(grams.len() * starts, |walk| {
+            let problem = walk / starts;
+            let mut stream = unit.stream(walk as u64);
             search(&choices[problem], &annealing, &mut stream, workers.width())
         })
     });

@@ -2,11 +2,12 @@
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use twinloop_core::{Chain, Learnt, Noise, Observed, Purpose, Recorded, Stream, Tuning};
+use twinloop_core::{Chain, Learnt, Noise, Observed, Recorded, Tuning};
 
 use crate::arrays::{Matrix, rows, to_matrix};
 use crate::error::{Result, misuse};
 use crate::model::PyModel;
+use crate::rng::Name;
 use crate::workers::{PyWorkers, or_default};
 
 /// States, sensor variances, (process variance, gust variance, memory) and whether features are derivatives, for each
@@ -53,8 +54,8 @@ fn recorded(records: &Records<'_>, n_x: usize, n_u: usize) -> Result<Vec<Recorde
 /// free values, and members drawn from it.
 #[pyfunction]
 #[pyo3(signature = (
-    model, chains, records, *, free, lags, iterations, draws = 0, seed = 0, iteration = 0, unit = 0,
-    divergence_factor = 10.0, workers = None,
+    model, chains, records, *, free, lags, iterations, draws = 0, unit = None, divergence_factor = 10.0,
+    workers = None,
 ))]
 #[expect(clippy::too_many_arguments, reason = "what tuning needs, named by keyword in Python")]
 #[expect(clippy::type_complexity, reason = "a model, χ², readings, covariance, and the free values")]
@@ -67,9 +68,7 @@ pub fn tune<'py>(
     lags: Vec<Vec<usize>>,
     iterations: usize,
     draws: usize,
-    seed: u64,
-    iteration: u64,
-    unit: u64,
+    unit: Option<Name>,
     divergence_factor: f64,
     workers: Option<&PyWorkers>,
 ) -> Result<(PyModel, f64, usize, Bound<'py, PyArray2<f64>>, Vec<PyModel>)> {
@@ -93,7 +92,16 @@ pub fn tune<'py>(
     let covariance = to_matrix(py, size, tuned.covariance.clone());
     let (left, readings) = (tuned.left, tuned.readings);
     let finished = model.varied(&tuned.constants, &tuned.lags)?;
-    let streams = (0..draws).map(|draw| Stream::new(seed, Purpose::Members, iteration, unit, draw as u64));
+    let streams: Vec<_> = match unit {
+        Some(name) => {
+            let unit = name.unit()?;
+            (0..draws).map(|draw| unit.stream(draw as u64)).collect()
+        }
+        None if draws == 0 => vec![],
+        None => {
+            return Err(misuse(format!("tune: expected the unit that draws {draws} members, found none")));
+        }
+    };
     let drawn = py.detach(|| tuning.drawn(&tuned, streams, &workers));
     let members: Vec<PyModel> =
         drawn.iter().map(|(constants, lags)| model.varied(constants, lags)).collect::<Result<_>>()?;

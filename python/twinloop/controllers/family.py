@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, runtime_checkable
@@ -128,6 +128,42 @@ class Family:
                 f"Gain {name!r}: expected {self.fixed[name]:g}, which it is fixed at, found {value:g}; leave it out, or"
                 " give it bounds in the family."
             )
+
+    def to_unit(self, genes: ArrayLike) -> Floats:
+        """Genes as places in the box, 0 to 1, logarithmic where decades matter.
+
+        Args:
+            genes: (…, size), in the units of the gains.
+
+        Returns:
+            Places (…, size).
+
+        Raises:
+            InvalidInput: another number of genes.
+        """
+        return self._in_the_box(self.engine.places, genes)
+
+    def from_unit(self, places: ArrayLike) -> Floats:
+        """The genes at places in the box; the inverse of `to_unit`, clipped to the bounds.
+
+        Args:
+            places: (…, size), 0 to 1.
+
+        Returns:
+            Genes (…, size), in the units of the gains.
+
+        Raises:
+            InvalidInput: another number of places.
+        """
+        return self._in_the_box(self.engine.at, places)
+
+    def _in_the_box(self, mapped: Callable[[Floats], Floats], values: ArrayLike) -> Floats:
+        values = np.asarray(values, dtype=np.float64)
+        if values.shape[-1:] != (self.size,):
+            raise InvalidInput(
+                f"Family: expected rows of {self.size} numbers, one a gain, found shape {values.shape}."
+            )
+        return mapped(values.reshape(-1, self.size)).reshape(values.shape)
 
     def controller(self, genes: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
         """One controller of the family, reset.

@@ -12,11 +12,10 @@ from twinloop.exam import quality
 from twinloop.exam.held_out import PENALTY, HeldOut
 from twinloop.exam.kinds import Campaigner
 from twinloop.exam.measures import coverage, number_of_terms, quantiles, violated
-from twinloop.exam.systems import Subject
+from twinloop.exam.systems import Draw, Subject
 from twinloop.flight import fly
 from twinloop.models import Twin
-from twinloop.planning.gains import from_unit
-from twinloop.streams import stream
+from twinloop.streams import Unit
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -87,12 +86,12 @@ def random_gains(subject: Subject, seed: int, experiments: int) -> Iterator[Meas
         What was measured of each flight.
     """
     rig = subject.rig(seed)
-    draw = stream(seed, 1)
+    draw = Unit(seed).part(Draw.RANDOM_GAINS).stream("exam")
     for k in range(experiments + 1):
         clock = time.monotonic()
         genes = subject.family.genes(rig.default_gains)
         if k:
-            genes = from_unit(subject.family, draw.random(subject.family.size))
+            genes = subject.family.from_unit(draw.uniforms(subject.family.size))
         test = subject.test(genes)
         flight = rig.run(test)
         yield k, of_flight(subject, test, flight), flight, time.monotonic() - clock

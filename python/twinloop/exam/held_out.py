@@ -12,7 +12,6 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.exam.quality import true_states
 from twinloop.exam.systems import Subject
-from twinloop.streams import stream
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -92,7 +91,7 @@ def controllers(subject: Subject) -> Floats:
     Returns:
         Genes (100, size), in their units.
     """
-    draw = stream(SEED)
+    draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([SEED])))
     low = np.array([gain.low for gain in subject.family.gains])
     high = np.array([gain.high for gain in subject.family.gains])
     return np.asarray(low + (high - low) * draw.random((COUNT, subject.family.size)))

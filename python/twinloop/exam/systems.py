@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -24,6 +25,14 @@ JUDGE_SEED = 987_654
 NOISY_RUNS = 200
 NOISE = 1e-3
 """Of the sensors, rad; five times as much in rad/s."""
+
+
+class Draw(IntEnum):
+    """What an exam draws beside the noise of its systems; the first number of its units of work."""
+
+    RANDOM_GAINS = 1
+    OPTIMUM = 2
+    GAUSSIAN_PROCESS = 3
 
 
 class Rig(Protocol):

@@ -14,9 +14,8 @@ from twinloop.arrays import Floats
 from twinloop.exam import quality
 from twinloop.exam.campaigns import Measured, of_flight
 from twinloop.exam.kinds import Optimum, Tuner
-from twinloop.exam.systems import Subject
-from twinloop.planning.gains import from_unit, to_unit
-from twinloop.streams import stream
+from twinloop.exam.systems import Draw, Subject
+from twinloop.streams import Unit
 
 Evaluate = Callable[[Floats], float]
 """Quality of gains given in the unit cube (size,), to be minimised."""
@@ -47,7 +46,7 @@ def tune(who: Tuner, subject: Subject, seed: int, flights: int) -> list[Measured
     def fly(units: Floats) -> float:
         if len(found) == flights:
             raise _OutOfFlightsError
-        genes = first if not found else from_unit(family, units)
+        genes = first if not found else family.from_unit(units)
         test = subject.test(genes)
         flight = rig.run(test)
         value = quality.of_states(subject.quality, flight.states, test)
@@ -59,7 +58,7 @@ def tune(who: Tuner, subject: Subject, seed: int, flights: int) -> list[Measured
         clock[0] = now
         return value
 
-    start = to_unit(family, first)
+    start = family.to_unit(first)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of Gaussian processes with few points, and experimental features
         with suppress(_OutOfFlightsError):
@@ -83,10 +82,10 @@ def optimum(who: Optimum, subject: Subject) -> Iterator[Measured]:
     flights = who.patient.get(subject.name, who.flights)
 
     def evaluate(units: Floats) -> float:
-        return subject.true_quality(from_unit(family, units), runs=draws, seed=1)
+        return subject.true_quality(family.from_unit(units), runs=draws, seed=1)
 
-    draw = stream(20, 26)
-    first = to_unit(family, family.genes(subject.true_rig.default_gains))
+    draw = Unit(seed=20).part(Draw.OPTIMUM).stream("exam")
+    first = family.to_unit(family.genes(subject.true_rig.default_gains))
     bests = []
     for number in range(who.starts):
         best: list[Any] = [np.inf, first]
@@ -101,13 +100,13 @@ def optimum(who: Optimum, subject: Subject) -> Iterator[Measured]:
                 best[:] = [value, np.array(units)]
             return value
 
-        start = first if number == 0 else draw.random(family.size)
+        start = first if number == 0 else draw.uniforms(family.size)
         with suppress(_OutOfFlightsError):
             cma_es(fly, start, {"step": 0.2}, number, flights)
         bests.append((best[0], best[1]))
     winner = min(bests, key=lambda pair: float(pair[0]))
     measures: dict[str, float | None] = {
-        "quality": subject.true_quality(from_unit(family, winner[1])),
+        "quality": subject.true_quality(family.from_unit(winner[1])),
         "worst_start": max(float(value) for value, _ in bests),
         "best_start": float(winner[0]),
     }
@@ -144,12 +143,12 @@ def gaussian_process(
         verbose=0,
         allow_duplicate_points=True,
     )
-    draw = stream(seed, 2)
+    draw = Unit(seed).part(Draw.GAUSSIAN_PROCESS).stream("exam")
     for number in range(flights):
         if number == 0:
             units = start
         elif number <= int(str(settings["random"])):
-            units = draw.random(len(start))
+            units = draw.uniforms(len(start))
         else:
             suggested = optimiser.suggest()
             units = np.array([float(suggested[name]) for name in names])

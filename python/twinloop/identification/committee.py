@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
+from twinloop.elementary import exp
 from twinloop.identification.bounds import bounded_solution
 from twinloop.identification.chains import Chain
 from twinloop.identification.fitting import Fitting
 from twinloop.identification.problem import Problem
 from twinloop.identification.structure import Sum
-from twinloop.streams import Purpose, stream
 
 PLAUSIBLE = 1.5
 """Multiple of the best model's χ² up to which another structure is a member."""
@@ -41,7 +41,7 @@ def committee(
         At most as many as the options ask for, the best first.
     """
     size = fitting.options.committee_size - len(others)
-    draw = stream(fitting.seed, Purpose.COMMITTEE, fitting.iteration)
+    draw = fitting.unit.stream("structures")
     members = [best]
     _, base, readings, _, draws = fitting.tune(best, sums, observer, 0, size)
     plausible = PLAUSIBLE * max(base, readings)
@@ -71,7 +71,7 @@ def committee(
                 weights = dict(zip(terms, solved[0].tolist(), strict=True))
                 varied.append(replace(found, weights=weights))
         model = fitting.model(varied, fitting.actuation(best))
-        _, left, _, _, drawn = fitting.tune(model, varied, observer, 4, 1, unit=attempt + 1)
+        _, left, _, _, drawn = fitting.tune(model, varied, observer, 4, 1, number=attempt + 1)
         if np.isfinite(left) and left <= plausible and drawn:
             members.append(drawn[0])
     while len(members) < size and draws:
@@ -80,8 +80,8 @@ def committee(
     return [best, *others, *members[1:]]
 
 
-def _other(found: Sum, draw: np.random.Generator) -> tuple[int, ...] | None:
+def _other(found: Sum, draw: _core.Stream) -> tuple[int, ...] | None:
     """A subset drawn by how likely it is; None for the best one."""
-    chances = np.exp(-0.5 * np.array([0.0, *(above for _, above in found.others)]))
-    pick = int(np.searchsorted(np.cumsum(chances) / chances.sum(), draw.random()))
+    chances = exp(-0.5 * np.array([0.0, *(above for _, above in found.others)]))
+    pick = int(np.searchsorted(np.cumsum(chances) / chances.sum(), draw.uniform()))
     return None if pick == 0 else found.others[min(pick, len(found.others)) - 1][0]

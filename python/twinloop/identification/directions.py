@@ -89,7 +89,9 @@ def _answers(problem: Problem, found: Sum, rows: Floats) -> Floats:
     """How strongly an output answers to each command, from rows a step above and a step below its middle in turn."""
     known = dict.fromkeys(problem.told.fixed.get(found.chain.states[0], ()), 1.0)
     terms = [*found.weights.items(), *known.items()]
-    values: Floats = problem.pool.values([term for term, _ in terms], rows) @ np.array([w for _, w in terms])
+    # Summed row by row: a product of matrices rounds differently from processor to processor.
+    weighted = problem.pool.values([term for term, _ in terms], rows) * np.array([w for _, w in terms])
+    values: Floats = weighted.sum(axis=1)
     with np.errstate(invalid="ignore"):  # what is not finite is no answer
         return values[::2] - values[1::2]
 

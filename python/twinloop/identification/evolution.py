@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.elementary import log
 from twinloop.identification.pool import UNARY, Pool
 from twinloop.identification.problem import Problem
 from twinloop.identification.structure import Sum, search
-from twinloop.streams import Purpose, stream
+from twinloop.streams import Unit
 
 PRODUCTS = 0.5
 """Share of new nodes that are products: most laws of machines are made of them."""
@@ -35,8 +35,7 @@ def evolve(
     longest: float,
     moves: int,
     largest: int,
-    seed: int,
-    iteration: int,
+    unit: Unit,
 ) -> list[Sum]:
     """Grows terms for a number of generations.
 
@@ -51,14 +50,13 @@ def evolve(
         longest: description length, in nats, of an expression at most.
         moves: of each search over subsets.
         largest: number of terms of a sum at most.
-        seed: of the campaign.
-        iteration: which stream of random numbers.
+        unit: of work, for its random numbers.
 
     Returns:
         The best sum of each chain, never worse than the known one.
     """
     pool = problem.pool
-    draw = stream(seed, Purpose.EVOLUTION, iteration)
+    draw = unit.stream("terms")
     best = list(known)
     survivors: dict[int, int] = dict.fromkeys(terms, 0)
     taken: set[int] = set()
@@ -81,7 +79,7 @@ def evolve(
         usable = problem.usable([*candidates, *(node for whole in wholes for node in whole)])
         best = search(
             problem, [found.chain for found in best], usable, best, scales,
-            moves=moves, starts=2, largest=largest, seed=seed, iteration=iteration * 1000 + generation,
+            moves=moves, starts=2, largest=largest, unit=unit.part(generation),
             favoured=favoured, forbidden=[set(whole) for whole in wholes],
             fixed_noise=generation % 4 != 0 and generation != generations - 1,
         )  # fmt: skip
@@ -98,23 +96,21 @@ def evolve(
     return best
 
 
-def _drawn(
-    pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: np.random.Generator
-) -> int | None:
+def _drawn(pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _core.Stream) -> int | None:
     """A new node of inputs and parents; None where it makes no sense."""
 
     def pick() -> int:
-        if draw.random() < 0.5:
-            return int(draw.integers(pool.inputs))
-        return parents[int(draw.integers(len(parents)))]
+        if draw.uniform() < 0.5:
+            return draw.below(pool.inputs)
+        return parents[draw.below(len(parents))]
 
     a, b = pick(), pick()
-    if "*" in operators and draw.random() < PRODUCTS:
+    if "*" in operators and draw.uniform() < PRODUCTS:
         return None if pool.one in (a, b) else pool.product(a, b)
-    operation = operators[int(draw.integers(len(operators)))]
-    if draw.random() < CONSTANTS:
-        size = float(np.exp(draw.uniform(np.log(0.1), np.log(10.0))))
-        a = pool.add(("+" if draw.random() < 0.5 else "*", a, size if draw.random() < 0.5 else -size))
+    operation = operators[draw.below(len(operators))]
+    if draw.uniform() < CONSTANTS:
+        size = draw.log_uniform(0.1, 10.0)
+        a = pool.add(("+" if draw.uniform() < 0.5 else "*", a, size if draw.uniform() < 0.5 else -size))
     if a == pool.one:
         return None
     if operation in UNARY:
@@ -134,4 +130,4 @@ def _whole(pool: Pool, found: Sum, taken: set[int]) -> dict[int, float]:
         node = part if node is None else pool.add(("+", node, part))
     assert node is not None
     taken.add(node)
-    return {node: float(np.log(pool.inputs + 1))}
+    return {node: float(log(pool.inputs + 1))}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,7 @@ from twinloop.identification.structure import Sum, Weights, prices, total
 from twinloop.identification.told import Told
 from twinloop.law.actuation import Actuation
 from twinloop.signals import Bounds, Signals
+from twinloop.streams import Unit
 
 PRUNINGS = 3
 """How often terms that tuning has shown to be nothing are dropped."""
@@ -54,8 +56,7 @@ class Fitting:
         pool: of all expressions.
         signals: of the system.
         options: of the identification.
-        seed: of the campaign.
-        iteration: which streams of random numbers.
+        unit: of work; what each call draws is a part of it.
         workers: how the work is carried out.
         told: what is known of the law.
     """
@@ -66,8 +67,7 @@ class Fitting:
         pool: Pool,
         signals: Signals,
         options: IdentificationOptions,
-        seed: int,
-        iteration: int,
+        unit: Unit,
         workers: _core.Workers,
         told: Told,
     ) -> None:
@@ -77,8 +77,7 @@ class Fitting:
         self.signals = signals
         self.form = options.form_for(signals)
         self.options = options
-        self.seed = seed
-        self.iteration = iteration
+        self.unit = unit
         self.workers = workers
 
     def tuned(self, sums: Sequence[Sum], given: Sequence[Chain], actuation: Actuation) -> Tuned:
@@ -215,7 +214,7 @@ class Fitting:
         observer: Sequence[Chain],
         steps: int,
         draws: int,
-        unit: int = 0,
+        number: int = 0,
     ) -> tuple[_core.Model, float, int, Floats, list[_core.Model]]:
         """Constants and lags tuned on predictions; a constant that leaves its bounds is held at the nearer one.
 
@@ -225,7 +224,7 @@ class Fitting:
             observer: all chains, with their noise.
             steps: at most.
             draws: models to be drawn from what the runs leave open.
-            unit: which stream of random numbers the draws come from.
+            number: of the call, which tells its draws from those of others.
 
         Returns:
             The tuned model, its χ², the readings that counted, the covariance of its constants and lags, the draws.
@@ -238,7 +237,7 @@ class Fitting:
         # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
         start = model.constants.tolist()
         held = {place for place, bounds in limits.items() if steps == 0 and start[place] in bounds}
-        while True:
+        for turn in itertools.count():
             with engine_input():
                 tuned, left, readings, covariance, drawn = _core.tune(
                     model,
@@ -248,9 +247,7 @@ class Fitting:
                     lags=lags if self.options.tuning else [],
                     iterations=steps,
                     draws=draws,
-                    seed=self.seed,
-                    iteration=self.iteration,
-                    unit=unit,
+                    unit=self.unit.part(number, turn).named("members") if draws else None,
                     divergence_factor=self.options.divergence_factor,
                     workers=self.workers,
                 )

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.elementary import log
 from twinloop.identification.actuation import groups
 from twinloop.identification.directions import Direction, together
 from twinloop.identification.pool import Pool
@@ -41,7 +42,7 @@ def enter_directions(pool: Pool, found: Sequence[Direction]) -> None:
     """
     for direction in found:
         term = pool.product(pool.hidden(0), together(pool, direction))
-        pool.found[term] = float(np.log(3.0 * (pool.inputs + 1)))
+        pool.found[term] = float(log(3.0 * (pool.inputs + 1)))
 
 
 def search_hidden(
@@ -88,4 +89,4 @@ def _mean(signals: Signals, group: Sequence[int], squared: bool, rest: Floats | 
     if rest is None:
         return None
     levels = np.array([rest[i] / signals.commands[i].size for i in group])
-    return float(np.mean(levels**2 if squared else levels))
+    return float(np.mean(levels * levels if squared else levels))

@@ -35,6 +35,7 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.structure import Sum, total
 from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
+from twinloop.streams import Unit
 
 LAGS_AGAIN = 4
 """Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
@@ -42,8 +43,8 @@ ROUNDING = 1e-18
 """That of rounding alone."""
 SEATS = 4
 """Of so many members one is of a part of the only run."""
-HIDDEN = 900
-"""Number of the stream of random numbers in which hidden states are searched."""
+WHOLE = 0
+"""Number of the unit of work that searches whole runs; those of parts follow."""
 
 
 def identify_runs(
@@ -66,7 +67,7 @@ def identify_runs(
         options: of the identification.
         rests: commands whose effect may be there at the start of a run (n_u,).
         seed: of the campaign.
-        iteration: which streams of random numbers.
+        iteration: of the campaign, which tells its random numbers from those of others.
         known: what was learnt from fewer runs; its terms are candidates again.
         workers: how the work is carried out.
         watch: called with the name of each step.
@@ -97,7 +98,8 @@ class _Learner:
         self.signals = signals
         self.options = options
         self.rests = list(rests)
-        self.stream = iteration * 1000
+        self.unit = Unit(seed, (iteration,))
+        self._looks = 0
         self.watch = watch
         self.known = known if known is not None and known.model.form == options.form_for(signals) else None
         if self.known is None:
@@ -106,11 +108,9 @@ class _Learner:
             # A copy: what an interrupted attempt has entered must not change the next one.
             self.pool = copy.deepcopy(self.known.pool)
         self.selection = Selection(
-            runs, signals, options, self.pool, self.known, seed, iteration, workers, watch
+            runs, signals, options, self.pool, self.known, self.unit.part(WHOLE), workers, watch
         )
-        self.fitting = Fitting(
-            runs, self.pool, signals, options, seed, iteration, workers, self.selection.told
-        )
+        self.fitting = Fitting(runs, self.pool, signals, options, self.unit, workers, self.selection.told)
 
     def learn(self) -> Identified:
         self.watch("noise")
@@ -271,19 +271,21 @@ class _Learner:
         Returns:
             The actuation, and the sums behind it.
         """
-        # Where nothing is hidden, what follows goes on as if nobody had looked: streams and nodes are taken back.
+        # Where nothing is hidden, what follows goes on as if nobody had looked: nodes are taken back.
         entered = len(self.pool)
         enter_directions(self.pool, directions(self._problem(actuation), start, self.signals))
         driven = [found.chain for found in start]
         own = [term for found in start for term in found.weights]
         few, many = ([*filled(self.pool), *terms] for terms in (own, self.selection.ladder[0]))
-        stream = self.stream + HIDDEN
+        self._looks += 1
+        unit, tried = self.unit.part(self._looks), itertools.count(1)
         moves, starts = self.options.moves, max(1, self.options.starts // 2)
 
-        def judge(tried: Actuation) -> list[Sum]:
+        def judge(behind: Actuation) -> list[Sum]:
             return self.selection.search(
-                self._problem(tried), few, start, driven, moves // 10, 1, iteration=stream
-            )
+                self._problem(behind), few, start, driven, moves // 10, 1,
+                unit=unit.part(next(tried)), purpose="hidden_subsets",
+            )  # fmt: skip
 
         before = actuation.hidden or (() if self.known is None else self.known.actuation.hidden)
         longest = self.signals.dt * max(len(run.commands) for run in self.fitting.runs)
@@ -291,8 +293,9 @@ class _Learner:
         found, sums = search_hidden(self.signals, actuation, before, rests, longest, judge)
         # Which one shows on the terms that there are; whether there is one, when all may change.
         best = self.selection.search(
-            self._problem(found), many, sums, driven, moves, starts, iteration=stream + 1
-        )
+            self._problem(found), many, sums, driven, moves, starts,
+            unit=unit.part(0), purpose="hidden_subsets",
+        )  # fmt: skip
         price = 0.0 if actuation.hidden else PRICE
         if total(best) + price >= total(plain):
             self.pool.forget(entered)
@@ -304,8 +307,8 @@ class _Learner:
         """The shortest description of the only run that itself or its parts have led to, and what parts have led to."""
         actuation = self.fitting.actuation(tuned.model)
         whole, runs, found = self._problem(actuation), self.fitting.runs, []
-        for run, begun in parts(runs[0], self.signals, actuation):
-            part = self.selection.of_part(run)
+        for number, (run, begun) in enumerate(parts(runs[0], self.signals, actuation), WHOLE + 1):
+            part = self.selection.of_part(run, self.unit.part(number))
             own = part.alone(self._problem_of([run], begun))
             driven, terms = [sum_.chain for sum_ in own], [term for sum_ in own for term in sum_.weights]
             sums = self.selection.search(whole, terms, own, driven, part.options.moves // 4, 1)

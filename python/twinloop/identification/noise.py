@@ -39,7 +39,7 @@ def declared_noise(chain: Chain, signals: Signals) -> Chain:
     for i, state in enumerate(chain.states):
         noise = signals.states[state].noise
         if noise is not None:
-            sensors[i] = np.clip(noise * noise, BEST_SENSOR**2 * chain.rough[i], chain.rough[i])
+            sensors[i] = np.clip(noise * noise, BEST_SENSOR * BEST_SENSOR * chain.rough[i], chain.rough[i])
     return chain.with_noise(sensors, chain.motion)
 
 
@@ -54,9 +54,9 @@ def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:
     Disturbances could explain every reading exactly. Sensors are therefore never taken to be much better than their
     own roughness says, which is all noise of theirs or less.
     """
-    sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR**2 * chain.rough)
+    sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR * BEST_SENSOR * chain.rough)
     period = dt if chain.integrated else 1.0
-    return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / period**2, dt)
+    return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / (period * period), dt)
 
 
 def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = True) -> Chain:
@@ -121,4 +121,4 @@ def _begun(chain: Chain, low: Floats, slow: Motion, dt: float, gust: float) -> t
     sensors = np.maximum(chain.sensors, low)
     period = dt if chain.integrated else 1.0
     first = float(sensors[0])
-    return sensors, (max(1e-3 * first / period, slow[0]), gust * first / period**2, 10.0 * dt)
+    return sensors, (max(1e-3 * first / period, slow[0]), gust * first / (period * period), 10.0 * dt)

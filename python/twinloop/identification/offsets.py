@@ -174,7 +174,7 @@ class _Group:
         for chain, regression in zip(self.chains, self._regressions(size, self.chains), strict=True):
             low, slow = floor_of(chain, self.scales, dt)
             first = float(chain.rough[0])
-            gust = 0.0 if chain.output is None else max(first / dt**2, slow[1])
+            gust = 0.0 if chain.output is None else max(first / (dt * dt), slow[1])
             start = (max(first / dt, slow[0]), gust, 10.0 * dt)
             problems.append((regression, [0.0], np.maximum(chain.rough, low), start, low, slow))
         with engine_input():

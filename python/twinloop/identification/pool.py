@@ -10,6 +10,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.elementary import log
 from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Record, Recorded, checked_record, plain, read
 
@@ -208,14 +209,14 @@ class Pool(Recorded, kind="pool"):
     def _written(self, number: int) -> float:
         n, leaves = self.inputs, self.leaves(number)
         choices = 1 + n if len(set(leaves)) < 2 else max(1 + n, n * (n - 1) / 2)
-        operation = float(np.log(self.operations))
+        operation = float(log(self.operations))
         further = max(0, len(leaves) - 2) * self.further
-        return float(np.log(3.0 * choices)) + further + self.functions(number) * operation
+        return float(log(3.0 * choices)) + further + self.functions(number) * operation
 
     @property
     def further(self) -> float:
         """What one more input or constant adds to the description length of an expression, in nats."""
-        return float(np.log(self.inputs) + np.log(self.operations))
+        return float(log(self.inputs) + log(self.operations))
 
     def functions(self, number: int) -> int:
         """How often an expression applies a function of one operand."""

@@ -105,7 +105,9 @@ def other_noise(observer: Sequence[Chain], signals: Signals) -> list[str]:
         for i, state in enumerate(signals.states[number] for number in chain.states):
             found = float(np.sqrt(chain.sensors[i]))
             # An angle of a rigid body, or a sensor that is as good as is ever believed: less cannot be told from this.
-            limit = chain.output is None or chain.sensors[i] <= 1.5 * BEST_SENSOR**2 * chain.rough[i]
+            limit = (
+                chain.output is None or chain.sensors[i] <= 1.5 * BEST_SENSOR * BEST_SENSOR * chain.rough[i]
+            )
             if state.noise is None or (state.noise < found and limit):
                 continue
             if not 0.5 <= found / state.noise <= 2.0:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
+from twinloop.elementary import log
 from twinloop.identification.chains import Chain, chains
 from twinloop.identification.directions import directions, terms_of, unequal
 from twinloop.identification.evolution import evolve
@@ -23,6 +24,7 @@ from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.identification.structure import Sum, search
 from twinloop.identification.told import told
 from twinloop.signals import Signals
+from twinloop.streams import Purpose, Unit
 
 
 class Selection:
@@ -36,8 +38,7 @@ class Selection:
         options: of the identification.
         pool: of all expressions.
         known: what was learnt from fewer runs; its terms are candidates again.
-        seed: of the campaign.
-        iteration: which streams of random numbers.
+        unit: of work; each search is a part of it.
         workers: how the work is carried out.
         watch: called with the name of each step.
     """
@@ -49,8 +50,7 @@ class Selection:
         options: IdentificationOptions,
         pool: Pool,
         known: Identified | None,
-        seed: int,
-        iteration: int,
+        unit: Unit,
         workers: _core.Workers,
         watch: Callable[[str], None] = lambda step: None,
     ) -> None:
@@ -58,8 +58,7 @@ class Selection:
         self.options = options
         self.pool = pool
         self.known = known
-        self.seed = seed
-        self.iteration = iteration
+        self.unit = unit
         self.workers = workers
         self.watch = watch
         self.scales = np.array([state.scale for state in signals.states])
@@ -71,14 +70,12 @@ class Selection:
         self._admit_bounded()
         self._searches = 0
 
-    def of_part(self, run: Run) -> Selection:
+    def of_part(self, run: Run, unit: Unit) -> Selection:
         """A brief one on part of a run, where nothing is known."""
         generations = 0 if self.options.libraries else self.options.generations
         moves = max(LEAST_MOVES, self.options.moves // 4)
         options = replace(self.options, generations=generations, moves=moves)
-        return Selection(
-            [run], self.signals, options, self.pool, None, self.seed, self.iteration, self.workers
-        )
+        return Selection([run], self.signals, options, self.pool, None, unit, self.workers)
 
     def alone(self, problem: Problem) -> list[Sum]:
         """The best sums where nothing is known."""
@@ -125,12 +122,12 @@ class Selection:
                 list(self.ladder[0]) if not options.libraries else [self.pool.one, *range(self.pool.inputs)]
             )
             seeds += [node for found in best for node in found.weights]
-            for restart in range(options.restarts):
+            for _ in range(options.restarts):
                 best = evolve(
                     problem, best, seeds, self.scales,
                     operators=options.operators, generations=options.generations,
                     population=options.population, longest=options.longest, moves=options.moves // 4,
-                    largest=options.largest, seed=self.seed, iteration=self._next() + 100_000 * restart,
+                    largest=options.largest, unit=self._next(),
                 )  # fmt: skip
         return best
 
@@ -144,13 +141,14 @@ class Selection:
         starts: int,
         *,
         fixed_noise: bool = False,
-        iteration: int | None = None,
+        unit: Unit | None = None,
+        purpose: Purpose = "subsets",
     ) -> list[Sum]:
-        """One search among some terms, as `structure.search`; without an iteration it draws from a new stream."""
+        """One search among some terms, as `structure.search`; the next one of this selection, or a unit of its own."""
         return search(
             problem, driven, terms, known, self.scales,
-            moves=moves, starts=starts, largest=self.options.largest, seed=self.seed,
-            iteration=self._next() if iteration is None else iteration, fixed_noise=fixed_noise,
+            moves=moves, starts=starts, largest=self.options.largest,
+            unit=self._next() if unit is None else unit, purpose=purpose, fixed_noise=fixed_noise,
         )  # fmt: skip
 
     def admit_hidden(self) -> None:
@@ -165,7 +163,7 @@ class Selection:
         found, admitted = directions(problem, sums, self.signals), []
         for direction in found:
             # A direction is one of those found, and a share that is not that of all others a constant.
-            choice = float(np.log(len(found) + 1)) + self.pool.further * unequal(direction)
+            choice = float(log(len(found) + 1)) + self.pool.further * unequal(direction)
             for term, plain in terms_of(self.pool, direction, self.signals).items():
                 if bounded.isdisjoint(plain):
                     self.pool.found.setdefault(term, self.pool.length(plain[0]) + choice)
@@ -178,9 +176,9 @@ class Selection:
             self.pool.rungs.setdefault(term, 0)
         self.ladder = [list(dict.fromkeys([*rung, *terms])) for rung in self.ladder]
 
-    def _next(self) -> int:
+    def _next(self) -> Unit:
         self._searches += 1
-        return self.iteration * 1000 + self._searches
+        return self.unit.part(self._searches)
 
     def _ladder(self) -> list[list[int]]:
         """Candidates, rung by rung."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.elementary import log, power
 from twinloop.errors import engine_input
 from twinloop.identification.bounds import Limits, bounded_solution, excludes_zero
 from twinloop.identification.chains import Chain
@@ -17,11 +18,14 @@ from twinloop.identification.noise import floor_of
 from twinloop.identification.pool import Pool
 from twinloop.identification.problem import Problem
 from twinloop.records import Recorded
+from twinloop.streams import Purpose, Unit
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
-Walk = Callable[[Sequence[_core.Gram], Sequence[Floats]], Sequence[Sequence[tuple[Sequence[int], float]]]]
-"""Annealed walks: from inner products and prices, a pair for each chain, to subsets with their energies, best first."""
+Walked = Sequence[Sequence[tuple[Sequence[int], float]]]
+"""Subsets with their energies, the best first, for each chain."""
+Walk = Callable[[Sequence[_core.Gram], Sequence[Floats], int], Walked]
+"""Annealed walks: from inner products and prices, a pair for each chain, and the number of the walks."""
 Judged = tuple[tuple[int, ...], float, Floats]
 """A subset of features, its energy, its coefficients."""
 NOISE_ROUNDS = 5
@@ -73,8 +77,8 @@ def prices(
         Prices (terms,).
     """
     lengths = [(favoured or {}).get(term, pool.length(term)) for term in terms]
-    costs: Floats = np.log(max(readings, 2)) + 2.0 * np.array(lengths)
-    return costs * float(max(1.0, runs / FEW_RUNS) ** RESEMBLANCE)
+    costs: Floats = log(max(readings, 2)) + 2.0 * np.array(lengths)
+    return costs * power(max(1.0, runs / FEW_RUNS), RESEMBLANCE)
 
 
 def search(
@@ -87,8 +91,8 @@ def search(
     moves: int,
     starts: int,
     largest: int,
-    seed: int,
-    iteration: int,
+    unit: Unit,
+    purpose: Purpose = "subsets",
     favoured: Sequence[Mapping[int, float]] = (),
     forbidden: Sequence[set[int]] = (),
     fixed_noise: bool = False,
@@ -104,8 +108,8 @@ def search(
         moves: of each walk.
         starts: walks for each chain.
         largest: number of terms at most.
-        seed: of the campaign.
-        iteration: which stream of random numbers.
+        unit: of work; each round of walks is a part of it.
+        purpose: of the random numbers.
         favoured: for each chain, description lengths in nats of terms that are known from elsewhere.
         forbidden: for each chain, terms that it may not use.
         fixed_noise: whether the chains' noise is to be believed.
@@ -130,12 +134,13 @@ def search(
             r.gram(c.sensors, c.motion, problem.workers) for r, c in zip(regressions, current, strict=True)
         ]
         walk = partial(
-            _core.search_subsets,
+            _walked,
             moves=moves if round_ == 0 else moves // 2,
             largest=largest,
             starts=starts if round_ == 0 else max(1, starts // 2),
-            seed=seed,
-            iteration=iteration * NOISE_ROUNDS + round_,
+            unit=unit,
+            purpose=purpose,
+            round_=round_,
             workers=problem.workers,
         )
         subsets = _chosen(problem, usable, place, chains, known, grams, costs, walk)
@@ -160,6 +165,26 @@ def search(
     return best
 
 
+def _walked(
+    grams: Sequence[_core.Gram],
+    costs: Sequence[Floats],
+    number: int,
+    *,
+    moves: int,
+    largest: int,
+    starts: int,
+    unit: Unit,
+    purpose: Purpose,
+    round_: int,
+    workers: _core.Workers,
+) -> Walked:
+    """The walks of a number in a round; those of each number and round draw from a stream of their own."""
+    name = unit.part(number * NOISE_ROUNDS + round_).named(purpose)
+    return _core.search_subsets(
+        grams, costs, moves=moves, largest=largest, starts=starts, unit=name, workers=workers
+    )
+
+
 def _chosen(
     problem: Problem,
     usable: Sequence[int],
@@ -178,17 +203,17 @@ def _chosen(
     found, walks are repeated in which J costs something, and more until they find laws without.
     """
     with engine_input():
-        walks = walk(grams, costs)
+        walks = walk(grams, costs, 0)
     posed = list(zip(chains, known, grams, walks, costs, strict=True))
     subsets = [_best_subsets(problem, usable, place, *of_chain) for of_chain in posed]
     for i, (chain, sum_, gram, _, cost) in enumerate(posed):
         if not chain.integrated or _given_back(problem, chain, usable, subsets[i][0]) <= GIVEN_BACK:
             continue
         rows = problem.feedthrough(chain, usable)
-        for price in GIVEN_BACK_PRICES:
+        for attempt, price in enumerate(GIVEN_BACK_PRICES):
             with engine_input():
                 dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
-                (walked,) = walk([dear], [cost])
+                (walked,) = walk([dear], [cost], 1 + i * len(GIVEN_BACK_PRICES) + attempt)
             # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
             found = [
                 law
@@ -266,8 +291,8 @@ def _noisy(
 def _differ(new: Chain, old: Chain, scales: Floats, dt: float) -> bool:
     """Whether a chain's noise is so much another one that its terms may be."""
     _, slow = floor_of(old, scales, dt)
-    moved = (abs(np.log((new.motion[i] + slow[i]) / (old.motion[i] + slow[i]))) > 1.0 for i in range(2))
-    return bool(np.any(np.abs(np.log(new.sensors / old.sensors)) > 0.3)) or any(moved)
+    moved = (abs(log((new.motion[i] + slow[i]) / (old.motion[i] + slow[i]))) > 1.0 for i in range(2))
+    return bool(np.any(np.abs(log(new.sensors / old.sensors)) > 0.3)) or any(moved)
 
 
 def _with_what_must_be(

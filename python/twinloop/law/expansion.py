@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from twinloop.elementary import cos, sin, tanh
 from twinloop.law.expressions import (
     CONSTANT,
     INPUT,
@@ -30,9 +31,9 @@ HIGHEST = 24
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "abs": abs,
     "sqrt": lambda value: math.sqrt(abs(value)),
-    "sin": math.sin,
-    "cos": math.cos,
-    "tanh": math.tanh,
+    "sin": lambda value: float(sin(value)),
+    "cos": lambda value: float(cos(value)),
+    "tanh": lambda value: float(tanh(value)),
 }
 
 

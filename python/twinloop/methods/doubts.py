@@ -75,10 +75,10 @@ def _against_derivatives(experiments: Sequence[Experiment], signals: Signals) ->
         size, told, both = (
             float(values.sum()) for values in (np.square(moved), np.square(said), moved * said)
         )
-        if size <= len(moved) * MOVED**2 * noise[j] or told == 0.0:
+        if size <= len(moved) * MOVED * MOVED * noise[j] or told == 0.0:
             continue
         how = ""
-        if both**2 < ALIKE**2 * size * told:
+        if both * both < ALIKE * ALIKE * size * told:
             how = "does not change as"
         elif not AS_FAST[0] * told < both < AS_FAST[1] * told:
             how = f"changes {both / told:.3g} times as fast as"

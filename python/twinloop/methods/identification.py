@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import lqr_gains
 from twinloop.controllers.state_feedback import FeedbackFamily
+from twinloop.elementary import log
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.history import Lesson, Planned, Progress
 from twinloop.identification.identified import Identified
@@ -22,7 +23,6 @@ from twinloop.methods.doubts import distinct, doubts
 from twinloop.methods.errors import errors
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import closed_loop, normalised_error
-from twinloop.planning.gains import load_ahead
 from twinloop.planning.judging import Committee, Task, expected, risk
 from twinloop.planning.planner import Flown, Planner
 from twinloop.presets import DefaultOptions
@@ -149,7 +149,6 @@ class IdentifyAndPlan:
         latest = self.memory.latest
         if latest is not None and (at_once or latest.told == len(book.experiments)):
             return
-        load_ahead()
         self._told = tuple(run.test.number for run in book.experiments)
         self.memory = Memory(asked=self.memory.asked, latest=self._learnt(book))
 
@@ -232,7 +231,7 @@ class IdentifyAndPlan:
             spread=found.spread,
             risk=found.risk,
             safe=found.safe,
-            bits=found.disagreement / float(np.log(2.0)),
+            bits=found.disagreement / float(log(2.0)),
             gain=found.gain,
             reason=found.reason,
         )
@@ -372,7 +371,7 @@ class IdentifyAndPlan:
         if first.tobytes() != starts[0].tobytes():
             starts.append(first)
         starts += self._linear_gains(committee)
-        genes = self.planner.tune(committee, starts, 2 * told) if committee.trusted else starts[0]
+        genes = self.planner.tune(committee, starts, told) if committee.trusted else starts[0]
         # What an interruption has left unlearnt must not show in what is tuned afterwards.
         if self._latest().told == told:
             self.memory = replace(self.memory, gains=(told, genes))

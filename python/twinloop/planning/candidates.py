@@ -8,7 +8,6 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.planning.excitation import chirps
-from twinloop.planning.gains import from_unit, to_unit
 from twinloop.planning.judging import Ends, Judge
 from twinloop.planning.settings import PlanningOptions
 
@@ -52,35 +51,35 @@ def candidates(
         The candidates.
     """
     family, steps = judge.family, judge.task.steps
-    stream = judge.stream(5, number)
+    stream = judge.unit.part(number).stream("candidates")
     count = max(2, options.candidates)
     again = max(1, count // 16)
-    place = to_unit(family, tuned)
-    places = place + options.nearness * stream.standard_normal((count, family.size))
+    place = family.to_unit(tuned)
+    places = place + options.nearness * stream.normals(count, family.size)
     places[: count // 4] = place
     if goal == "model":
-        places[count // 2 :] = stream.random((count - count // 2, family.size))
-    genes = from_unit(family, np.clip(places, 0.0, 1.0))
+        places[count // 2 :] = stream.uniforms(count - count // 2, family.size)
+    genes = family.from_unit(places)
     genes[0] = tuned
     genes[count - again :] = flown
     if options.excitation <= 0.0:
         # The same flight once more would tell nothing: gains close by.
-        near = to_unit(family, flown) + 0.3 * options.nearness * stream.standard_normal((again, family.size))
-        genes[count - again :] = from_unit(family, np.clip(near, 0.0, 1.0))
+        near = family.to_unit(flown) + 0.3 * options.nearness * stream.normals(again, family.size)
+        genes[count - again :] = family.from_unit(near)
     excitation = np.zeros((count, steps, judge.signals.n_u))
     most = options.excitation_most
     if most > 0.0 and options.excitation > 0.0:
         # Gains that have flown bear more of it than at first, and once more the same would tell little.
         stronger = min(2.0 * options.excitation, most)
         for i in range(1, count):
-            amplitude = stronger if i >= count - again else most * stream.random()
+            amplitude = stronger if i >= count - again else most * stream.uniform()
             excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)
     return Candidates(genes, excitation, _ends(judge, options, number, count), count - again)
 
 
 def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> Ends:
     """Start and target of each candidate (K, n_x); those of the campaign for the first one."""
-    stream = judge.stream(6, number)
+    stream = judge.unit.part(number).stream("ends")
     ends = []
     for middle, reach in (
         (judge.task.initial_state, options.initial_range),
@@ -88,6 +87,6 @@ def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> En
     ):
         states = np.tile(middle, (count, 1))
         if any(reach):
-            states[1:] += np.array(reach) * stream.uniform(-1.0, 1.0, (count - 1, len(middle)))
+            states[1:] += np.array(reach) * (2.0 * stream.uniforms(count - 1, len(middle)) - 1.0)
         ends.append(states)
     return ends[0], ends[1]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.elementary import sin
 from twinloop.signals import Signals
 
 SLOWEST, FASTEST = (0.5, 2.0), (4.0, 10.0)
@@ -13,9 +15,7 @@ SHORTEST = 8.0
 """Periods of a cycle at least: faster ones look like noise to a model in steps."""
 
 
-def chirps(
-    signals: Signals, steps: int, amplitude: float, fade: float, stream: np.random.Generator
-) -> Floats:
+def chirps(signals: Signals, steps: int, amplitude: float, fade: float, stream: _core.Stream) -> Floats:
     """A chirp for each command.
 
     Args:
@@ -37,13 +37,11 @@ def chirps(
         last = min(stream.uniform(*FASTEST) / duration, 1.0 / (SHORTEST * signals.dt))
         phase = stream.uniform(0.0, 2.0 * np.pi)
         angle = 2.0 * np.pi * (first * t + (last - first) * t * t / (2.0 * duration)) + phase
-        columns.append(amplitude * command.size * np.sin(angle) * fading)
+        columns.append(amplitude * command.size * sin(angle) * fading)
     return np.stack(columns, axis=1)
 
 
-def binary(
-    signals: Signals, steps: int, amplitude: float, fade: float, stream: np.random.Generator
-) -> Floats:
+def binary(signals: Signals, steps: int, amplitude: float, fade: float, stream: _core.Stream) -> Floats:
     """A pseudo-random binary sequence for each command, faded likewise: a baseline for tests.
 
     Args:
@@ -57,7 +55,7 @@ def binary(
         What is to be added to the commands (steps, n_u), in their units.
     """
     held = max(1, steps // 20)
-    signs = np.where(stream.random((steps // held + 1, signals.n_u)) < 0.5, -1.0, 1.0)
+    signs = np.where(stream.uniforms(steps // held + 1, signals.n_u) < 0.5, -1.0, 1.0)
     sizes = np.array([command.size for command in signals.commands])
     fading = _fading(signals, steps, fade)[:, np.newaxis]
     added: Floats = amplitude * sizes * np.repeat(signs, held, axis=0)[:steps] * fading

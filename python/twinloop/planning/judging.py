@@ -12,7 +12,7 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.flights import candidates, qualities
 from twinloop.planning.quality import Quality
-from twinloop.streams import Purpose, stream
+from twinloop.streams import Unit
 
 Ends = tuple[Floats, Floats]
 """Initial states and target states (K, n_x)."""
@@ -113,7 +113,7 @@ class Judge:
         self.task = task
         self.quality = quality
         self.divergence_factor = divergence_factor
-        self.seed = seed
+        self.unit = Unit(seed)
         self.workers = workers
 
     def judge(
@@ -133,7 +133,9 @@ class Judge:
         flight would give. Where `off` is given flights begin elsewhere, as far as it says (n_x,), drawn like noise.
         """
         noise = self.noise(sds, draws)
-        offsets = None if off is None else off * self.stream(7, 0).standard_normal((draws, len(off)))
+        offsets = (
+            None if off is None else off * self.unit.part(0).stream("off_start").normals(draws, len(off))
+        )
         values, usages = qualities(
             members, self.flights(genes, excitation, ends), self.quality.engine, self.signals,
             noise=noise, offsets=offsets, measured=measured, workers=self.workers,
@@ -158,9 +160,8 @@ class Judge:
         """The same draws of sensor noise for everybody (draws, n + 1, n_x); None for a single, quiet flight."""
         if draws < 2:
             return None
-        stream = self.stream(1, 0)
-        shape = (draws, self.task.steps + 1, self.signals.n_x)
-        return np.asarray(sds * stream.standard_normal(shape), dtype=np.float64)
+        stream = self.unit.part(0).stream("sensors")
+        return sds * stream.normals(draws, self.task.steps + 1, self.signals.n_x)
 
     def flights(self, genes: Floats, excitation: Floats | None, ends: Ends | None) -> _core.Flights:
         """Candidates laid out for the engine; those of the campaign's own task where no ends are given."""
@@ -169,7 +170,3 @@ class Judge:
             self.family, genes, initial, target, self.task.steps,
             excitation=excitation, divergence_factor=self.divergence_factor,
         )  # fmt: skip
-
-    def stream(self, purpose: int, number: int) -> np.random.Generator:
-        """Random numbers of one purpose and one test."""
-        return stream(self.seed, Purpose.PLANNING, purpose, number)

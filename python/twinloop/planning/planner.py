@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
+from twinloop.elementary import log, power
 from twinloop.flights import disagreements
 from twinloop.planning.candidates import candidates
 from twinloop.planning.excitation import binary, chirps
-from twinloop.planning.gains import from_unit, to_unit, tune_gains
+from twinloop.planning.gains import tune_gains
 from twinloop.planning.judging import DIVERGED, Committee, Judge, Judged, Task, expected, risk
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
+from twinloop.streams import Purpose
 
 Flags = NDArray[np.bool_]
 GOALS = ("both", "model", "control")
@@ -115,20 +117,20 @@ class Planner(Judge):
         Args:
             committee: that judges.
             starts: genes to start from.
-            number: of the call, for its stream.
+            number: of runs told, for its streams.
         """
         options = self.options
-        stream = self.stream(2, number)
-        places = np.clip(to_unit(self.family, np.stack(starts)), 0.0, 1.0)
+        stream = self.unit.part(number).stream("starts")
+        places = np.clip(self.family.to_unit(np.stack(starts)), 0.0, 1.0)
         all_starts = list(starts)
         while len(all_starts) < options.tuning_starts:
             # The middle between what is known and anywhere: basins that no flight has seen.
-            other = 0.5 * places[0] + 0.5 * stream.random(self.family.size)
-            all_starts.append(from_unit(self.family, other))
-        best = self._searched(committee.members[:1], committee.sds, 1, all_starts, 0.2, number)
+            other = 0.5 * places[0] + 0.5 * stream.uniforms(self.family.size)
+            all_starts.append(self.family.from_unit(other))
+        best = self._searched(committee.members[:1], committee.sds, 1, all_starts, 0.2, number, "gains")
         members = committee.members[: max(1, options.tuning_members)]
         fine = [best, starts[0]]
-        return self._searched(members, committee.sds, options.draws, fine, 0.08, number + 1)
+        return self._searched(members, committee.sds, options.draws, fine, 0.08, number, "fine_gains")
 
     def _searched(
         self,
@@ -138,6 +140,7 @@ class Planner(Judge):
         starts: Sequence[Floats],
         spread: float,
         number: int,
+        purpose: Purpose,
     ) -> Floats:
         """One of two searches, with half of the evaluations."""
         options = self.options
@@ -149,7 +152,7 @@ class Planner(Judge):
 
         return tune_gains(
             self.family, score, starts, evaluations=options.evaluations // 2, spread=spread,
-            seed=self.seed * 1009 + number, watch=lambda: self.watch("gains"),
+            unit=self.unit.part(number), purpose=purpose, watch=lambda: self.watch("gains"),
         )  # fmt: skip
 
     # Proposing
@@ -159,16 +162,16 @@ class Planner(Judge):
         options = self.options
         if options.excitation <= 0.0:
             return None
-        stream = self.stream(3, number)
+        stream = self.unit.part(number).stream("excitation")
         return chirps(self.signals, self.task.steps, options.excitation, options.fade, stream)
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""
         options = self.options
-        stream = self.stream(4, number)
+        stream = self.unit.part(number).stream("baseline")
         steps, most, fade = self.task.steps, options.excitation_most, options.fade
         if options.tests == "random":
-            genes = from_unit(self.family, stream.random(self.family.size))
+            genes = self.family.from_unit(stream.uniforms(self.family.size))
             return genes, chirps(self.signals, steps, options.excitation, fade, stream)
         make = chirps if options.tests == "chirp" else binary
         return first, make(self.signals, steps, most, fade, stream)
@@ -281,7 +284,7 @@ class Planner(Judge):
         """Predicted quality that a test may have at most."""
         if goal == "model":
             return max(first, 2.0 * tuned)
-        given = self.options.share ** max(1, told) * max(0.0, first - tuned)
+        given = power(self.options.share, max(1, told)) * max(0.0, first - tuned)
         # What is lost in the scatter of the flights costs nothing.
         given = 0.1 * given if goal == "control" else max(scatter, given)
         # Where the tuned gains promise less than the first ones gave, the committee knows too little to lead anywhere.
@@ -306,7 +309,7 @@ class Planner(Judge):
         elif value > 0.0 and high != low:
             sentences.append(
                 f"Models {high} and {low} disagree most on {self.signals.state_names[state]},"
-                f" {row * self.signals.dt:.2g} s after the start; the flight tells {value / np.log(2):.3g} bits."
+                f" {row * self.signals.dt:.2g} s after the start; the flight tells {value / float(log(2.0)):.3g} bits."
             )
         else:
             sentences.append("All models agree: the flight confirms what is known.")

@@ -89,5 +89,5 @@ def quality_of(
             units = {state.unit for state, counts in zip(signals.states, counted, strict=True) if counts}
             for i, state in enumerate(signals.states):
                 size = state.scale if len(units) > 1 else 1.0
-                chosen[i] = (size if kind == "iae" else size**2) ** -1.0 if counted[i] else 0.0
+                chosen[i] = 1.0 / (size if kind == "iae" else size * size) if counted[i] else 0.0
     return Quality(kind, chosen, effort, effort_rate, signals)

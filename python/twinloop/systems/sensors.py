@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.streams import stream
 
 RATE_NOISE = 5.0
 """Noise of a rate over that of an angle, 1/s."""
@@ -22,7 +21,8 @@ def run_stream(seed: int, run: int, purpose: int | None = None) -> np.random.Gen
     Returns:
         A generator that depends on these three and on nothing else.
     """
-    return stream(seed, run, purpose=purpose)
+    sequence = np.random.SeedSequence([seed, run], spawn_key=() if purpose is None else (purpose,))
+    return np.random.Generator(np.random.Philox(sequence))
 
 
 def attitude_noise(stream: np.random.Generator, steps: int, noise: float) -> Floats:

@@ -97,6 +97,16 @@ impl Parameters {
         values.len() == self.len() && self.0.iter().zip(values).all(within)
     }
 
+    /// The places of values, 0 to 1 between the bounds, on each parameter's scale.
+    pub fn places(&self, values: &[f64]) -> Vec<f64> {
+        self.0.iter().zip(values).map(|(interval, value)| interval.place(*value)).collect()
+    }
+
+    /// The values at places, those beyond a bound at the bound.
+    pub fn at(&self, places: &[f64]) -> Vec<f64> {
+        self.0.iter().zip(places).map(|(interval, place)| interval.at(*place)).collect()
+    }
+
     /// A vector drawn uniformly, on each parameter's scale.
     pub fn uniform(&self, stream: &mut Stream) -> Vec<f64> {
         self.0.iter().map(|interval| interval.at(stream.uniform())).collect()

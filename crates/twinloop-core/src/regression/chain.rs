@@ -109,9 +109,10 @@ impl Chain {
         let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
         for a in 0..d {
             for b in 0..d {
-                let power = (a + b + 1) as i32;
-                q[a * d + b] =
-                    process * self.dt.powi(power) / (factorial(a) * factorial(b) * f64::from(power));
+                let power = a + b + 1;
+                // Not `powi`: how that rounds is the compiler's choice.
+                let lasting: f64 = (0..power).map(|_| self.dt).product();
+                q[a * d + b] = process * lasting / (factorial(a) * factorial(b) * power as f64);
             }
         }
         q

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::chain::{Chain, LONGEST, Noise, Whitening};
-use super::cholesky::Cholesky;
+use crate::linear_algebra::Cholesky;
 use crate::workers::Workers;
 
 /// A record of one chain.

@@ -196,7 +196,7 @@ impl<V: Vector> Inverse<V> {
 mod tests {
     use super::*;
     use crate::lanes::{Scalar, Wide};
-    use crate::regression::Cholesky;
+    use crate::linear_algebra::Cholesky;
     use proptest::prelude::*;
 
     const FEATURES: usize = 9;

@@ -2,14 +2,12 @@
 
 mod blocks;
 mod chain;
-mod cholesky;
 mod gram;
 mod inverse;
 mod likelihood;
 mod subset;
 
 pub use chain::{Chain, Noise};
-pub use cholesky::Cholesky;
 pub use gram::{Gram, Record, Solution};
 pub use likelihood::{likelihood, most_likely_noise};
 pub use subset::{Annealing, Choices, Found, search};

@@ -1,0 +1,453 @@
+//! CMA-ES: searches the least value of a function, with a normal distribution that adapts to what it meets.
+//!
+//! N. Hansen, *The CMA Evolution Strategy: A Tutorial*, arXiv:1604.00772; numbers in parentheses are its equations, the
+//! defaults those of its table 1. It is our own because no library has the same bits on every processor: they take
+//! eigenvectors and sums from LAPACK and BLAS, which round differently from kernel to kernel, and one rounding sends a
+//! search elsewhere. Here they are summed in one order.
+
+use crate::error::{Result, invalid};
+use crate::linear_algebra::Eigen;
+use crate::rng::Unit;
+
+/// A range of values, beside the largest of them, below which nothing is left to be gained.
+const FLAT: f64 = 1e-9;
+/// A step, beside the first one, below which a search stands still.
+const STILL: f64 = 1e-12;
+/// A step, beside the first one, above which a search has run away.
+const FAR: f64 = 1e4;
+/// Added to a squared length, so that a point in the middle of the others has a weight.
+const MIDDLE: f64 = 1e-8;
+/// Condition of the covariance above which its axes are rounding.
+const ILL: f64 = 1e14;
+
+/// Weights and rates, by dimension and population (table 1).
+#[derive(Clone, Debug, PartialEq)]
+struct Strategy {
+    /// w, the best point first; those of the worse half are negative.
+    weights: Vec<f64>,
+    /// μ.
+    parents: usize,
+    /// μ_eff.
+    effective: f64,
+    c_sigma: f64,
+    d_sigma: f64,
+    c_c: f64,
+    c_1: f64,
+    c_mu: f64,
+    /// E‖N(0, I)‖.
+    expected: f64,
+    /// Generations over which values are compared.
+    memory: usize,
+}
+
+impl Strategy {
+    fn new(dimension: usize, population: usize) -> Self {
+        let (n, parents) = (dimension as f64, population / 2);
+        let raw: Vec<f64> = (1..=population)
+            .map(|i| libm::log(0.5 * (population + 1) as f64) - libm::log(i as f64)) // (49)
+            .collect();
+        let mass = |w: &[f64]| {
+            let (sum, squares) = (w.iter().sum::<f64>(), w.iter().map(|w| w * w).sum::<f64>());
+            sum * sum / squares
+        };
+        let (effective, effective_minus) = (mass(&raw[..parents]), mass(&raw[parents..]));
+        let c_sigma = (effective + 2.0) / (n + effective + 5.0); // (55)
+        let d_sigma = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + c_sigma; // (55)
+        let c_c = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n); // (56)
+        let c_1 = 2.0 / ((n + 1.3) * (n + 1.3) + effective); // (57)
+        let c_mu = (2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0) * (n + 2.0) + effective)) // (58)
+            .min(1.0 - c_1 - 1e-8);
+        let smallest = (1.0 + c_1 / c_mu) // (50)
+            .min(1.0 + 2.0 * effective_minus / (effective + 2.0)) // (51)
+            .min((1.0 - c_1 - c_mu) / (n * c_mu)); // (52)
+        let positive: f64 = raw.iter().filter(|w| **w > 0.0).sum();
+        let negative: f64 = raw.iter().filter(|w| **w < 0.0).map(|w| -w).sum();
+        let weights =
+            raw.iter().map(|w| w * if *w >= 0.0 { 1.0 / positive } else { smallest / negative }).collect(); // (53)
+        let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
+        let memory = 10 + (30 * dimension).div_ceil(population);
+        Self { weights, parents, effective, c_sigma, d_sigma, c_c, c_1, c_mu, expected, memory }
+    }
+}
+
+/// A search as a value: `ask` for points, judge them, and `tell` makes the search that knows them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CmaEs {
+    strategy: Strategy,
+    unit: Unit,
+    generation: u64,
+    first_step: f64,
+    /// m.
+    mean: Vec<f64>,
+    /// σ.
+    step: f64,
+    /// C, row after row.
+    covariance: Vec<f64>,
+    /// Axes of C, and their lengths squared.
+    axes: Eigen,
+    /// p_c.
+    path: Vec<f64>,
+    /// p_σ.
+    step_path: Vec<f64>,
+    /// The best and the worst value of the last generations.
+    extremes: Vec<(f64, f64)>,
+}
+
+impl CmaEs {
+    /// A search around a point with standard deviations `step`; each generation has a stream of its unit.
+    pub fn new(mean: &[f64], step: f64, population: usize, unit: Unit) -> Result<Self> {
+        if mean.is_empty() || !mean.iter().all(|x| x.is_finite()) {
+            return invalid(format!("CMA-ES, mean: expected at least one finite number, found {mean:?}"));
+        }
+        if !(step.is_finite() && step > 0.0) || population < 2 {
+            return invalid(format!(
+                "CMA-ES: expected a step above 0 and a population of at least 2, found {step} and {population}"
+            ));
+        }
+        let dimension = mean.len();
+        let mut covariance = vec![0.0; dimension * dimension];
+        (0..dimension).for_each(|i| covariance[i * dimension + i] = 1.0);
+        Ok(Self {
+            strategy: Strategy::new(dimension, population),
+            unit,
+            generation: 0,
+            first_step: step,
+            mean: mean.to_vec(),
+            step,
+            axes: Eigen::new(&covariance, dimension),
+            covariance,
+            path: vec![0.0; dimension],
+            step_path: vec![0.0; dimension],
+            extremes: vec![],
+        })
+    }
+
+    /// Number of generations told.
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    /// m, the middle of the distribution.
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// σ, the factor on the square root of the covariance.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// C, row after row.
+    pub fn covariance(&self) -> &[f64] {
+        &self.covariance
+    }
+
+    /// The points of this generation; asking again gives the same ones.
+    pub fn ask(&self) -> Vec<Vec<f64>> {
+        let mut stream = self.unit.stream(self.generation);
+        let mut drawn = || {
+            let z: Vec<f64> = self.mean.iter().map(|_| stream.gaussian()).collect(); // (38)
+            let stretched = z.iter().enumerate().map(|(i, z)| z * self.length(i)).collect::<Vec<_>>();
+            let y = self.back(&stretched); // (39)
+            self.mean.iter().zip(&y).map(|(m, y)| m + self.step * y).collect() // (40)
+        };
+        self.strategy.weights.iter().map(|_| drawn()).collect()
+    }
+
+    /// The search that knows the values of a generation's points; only their order counts.
+    pub fn tell(&self, points: &[Vec<f64>], values: &[f64]) -> Result<Self> {
+        self.check(points, values)?;
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
+        let s = &self.strategy;
+        let n = self.mean.len();
+        let steps: Vec<Vec<f64>> = order
+            .iter()
+            .map(|&i| points[i].iter().zip(&self.mean).map(|(x, m)| (x - m) / self.step).collect())
+            .collect();
+        let mut next = self.clone();
+        next.generation += 1;
+        next.extremes.push((values[order[0]], values[order[order.len() - 1]]));
+        if next.extremes.len() > s.memory {
+            next.extremes.remove(0);
+        }
+        let mut y_w = vec![0.0; n]; // (41)
+        for (y, w) in steps.iter().zip(&s.weights).take(s.parents) {
+            add(&mut y_w, *w, y);
+        }
+        add(&mut next.mean, self.step, &y_w); // (42)
+        scale_and_add(
+            &mut next.step_path,
+            1.0 - s.c_sigma,
+            (s.c_sigma * (2.0 - s.c_sigma) * s.effective).sqrt(),
+            &self.whitened(&y_w),
+        ); // (43)
+        let norm = square(&next.step_path).sqrt();
+        next.step *= libm::exp(s.c_sigma / s.d_sigma * (norm / s.expected - 1.0)); // (44)
+        let settled = 1.0 - libm::pow(1.0 - s.c_sigma, 2.0 * (next.generation + 1) as f64);
+        let h = norm / settled.sqrt() < (1.4 + 2.0 / (n as f64 + 1.0)) * s.expected;
+        let towards = if h { (s.c_c * (2.0 - s.c_c) * s.effective).sqrt() } else { 0.0 };
+        scale_and_add(&mut next.path, 1.0 - s.c_c, towards, &y_w); // (45)
+        let late = if h { 0.0 } else { s.c_c * (2.0 - s.c_c) };
+        let kept = 1.0 + s.c_1 * late - s.c_1 - s.c_mu * s.weights.iter().sum::<f64>();
+        next.covariance.iter_mut().for_each(|c| *c *= kept); // (47)
+        add_outer(&mut next.covariance, s.c_1, &next.path);
+        for (y, w) in steps.iter().zip(&s.weights) {
+            let length = if *w >= 0.0 { 1.0 } else { n as f64 / (square(&self.whitened(y)) + MIDDLE) };
+            add_outer(&mut next.covariance, s.c_mu * w * length, y); // (46), (47)
+        }
+        next.axes = Eigen::new(&next.covariance, n);
+        Ok(next)
+    }
+
+    /// Whether nothing more is to be had from this search (section B.3).
+    pub fn stopped(&self) -> bool {
+        let n = self.mean.len();
+        let deviation = |i: usize| self.step * self.covariance[i * n + i].sqrt();
+        let moves = |i: usize, by: f64| self.mean[i] + by != self.mean[i];
+        let least = STILL * self.first_step;
+        let axis = self.generation as usize % n;
+        let along = 0.1 * self.step * self.length(axis);
+        let still = (0..n).all(|i| deviation(i) < least && self.step * self.path[i].abs() < least);
+        let lost = (0..n).any(|i| !moves(i, 0.2 * deviation(i)))
+            || self.axes.vector(axis).iter().enumerate().all(|(i, v)| !moves(i, along * v));
+        let (shortest, longest) = (self.length(0), self.length(n - 1));
+        let far = !self.step.is_finite() || self.step * longest > FAR * self.first_step;
+        let ill = longest * longest > ILL * shortest * shortest;
+        self.flat() || still || lost || far || ill
+    }
+
+    /// Whether the values of many generations are all the same but for rounding.
+    fn flat(&self) -> bool {
+        let best = self.extremes.iter().map(|e| e.0).fold(f64::INFINITY, f64::min);
+        let worst = self.extremes.iter().map(|e| e.1).fold(f64::NEG_INFINITY, f64::max);
+        let many = self.extremes.len() == self.strategy.memory;
+        many && (worst == best || worst - best <= FLAT * worst.abs().max(best.abs()))
+    }
+
+    fn check(&self, points: &[Vec<f64>], values: &[f64]) -> Result<()> {
+        let (population, n) = (self.strategy.weights.len(), self.mean.len());
+        if points.len() != population || values.len() != population || points.iter().any(|x| x.len() != n) {
+            return invalid(format!(
+                "CMA-ES: expected {population} points of {n} numbers with a value each, found {} and {} values",
+                points.len(),
+                values.len()
+            ));
+        }
+        if !points.iter().flatten().all(|x| x.is_finite()) || values.iter().any(|x| x.is_nan()) {
+            return invalid(
+                "CMA-ES: expected finite points and no NaN among values; give a failure a large value",
+            );
+        }
+        Ok(())
+    }
+
+    /// Length of an axis of C, the shortest first; above 0 even where rounding left a negative square.
+    fn length(&self, i: usize) -> f64 {
+        let longest = self.axes.values[self.mean.len() - 1];
+        self.axes.values[i].max(f64::EPSILON * longest).sqrt()
+    }
+
+    /// Coordinates along the axes, from those along the parameters.
+    fn along(&self, y: &[f64]) -> Vec<f64> {
+        (0..y.len()).map(|i| self.axes.vector(i).iter().zip(y).map(|(v, y)| v * y).sum()).collect()
+    }
+
+    /// Coordinates along the parameters, from those along the axes.
+    fn back(&self, a: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; a.len()];
+        a.iter().enumerate().for_each(|(i, a)| add(&mut y, *a, self.axes.vector(i)));
+        y
+    }
+
+    /// C^(−1/2) y.
+    fn whitened(&self, y: &[f64]) -> Vec<f64> {
+        let along: Vec<f64> = self.along(y).iter().enumerate().map(|(i, a)| a / self.length(i)).collect();
+        self.back(&along)
+    }
+}
+
+/// x += factor · y.
+fn add(x: &mut [f64], factor: f64, y: &[f64]) {
+    x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
+}
+
+/// x = kept · x + factor · y.
+fn scale_and_add(x: &mut [f64], kept: f64, factor: f64, y: &[f64]) {
+    x.iter_mut().zip(y).for_each(|(x, y)| *x = kept * *x + factor * y);
+}
+
+/// A += factor · y yᵀ; symmetric to the bit.
+fn add_outer(matrix: &mut [f64], factor: f64, y: &[f64]) {
+    for (row, a) in matrix.chunks_exact_mut(y.len()).zip(y) {
+        row.iter_mut().zip(y).for_each(|(c, b)| *c += factor * (a * b));
+    }
+}
+
+fn square(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Purpose;
+    use proptest::prelude::*;
+
+    fn name(seed: u64, purpose: Purpose, path: &[u64]) -> Unit {
+        Unit::new(seed, purpose, path).expect("a unit")
+    }
+
+    fn search(mean: &[f64], step: f64, population: usize, unit: u64) -> CmaEs {
+        CmaEs::new(mean, step, population, name(7, Purpose::Gains, &[1, unit])).expect("a search")
+    }
+
+    /// The search after some generations, or as soon as it has stopped.
+    fn minimised(mut search: CmaEs, generations: usize, value: impl Fn(&[f64]) -> f64) -> CmaEs {
+        for _ in 0..generations {
+            if search.stopped() {
+                break;
+            }
+            let points = search.ask();
+            let values: Vec<f64> = points.iter().map(|x| value(x)).collect();
+            search = search.tell(&points, &values).expect("values");
+        }
+        search
+    }
+
+    fn sphere(x: &[f64]) -> f64 {
+        square(x)
+    }
+
+    fn ellipsoid(x: &[f64]) -> f64 {
+        let n = x.len() as f64;
+        x.iter().enumerate().map(|(i, x)| libm::pow(10.0, 6.0 * i as f64 / (n - 1.0)) * x * x).sum()
+    }
+
+    fn rosenbrock(x: &[f64]) -> f64 {
+        x.windows(2).map(|x| 100.0 * square(&[x[1] - x[0] * x[0]]) + square(&[1.0 - x[0]])).sum()
+    }
+
+    #[test]
+    fn it_finds_the_bottom_of_a_sphere_an_ellipsoid_and_a_bent_valley() {
+        for unit in 0..5 {
+            assert!(sphere(minimised(search(&[3.0; 9], 0.5, 10, unit), 400, sphere).mean()) < 1e-12);
+            assert!(ellipsoid(minimised(search(&[1.0; 8], 0.5, 10, unit), 1000, ellipsoid).mean()) < 1e-10);
+            let valley = minimised(search(&[-1.0, 0.5, 0.0, 0.5, 0.0], 0.3, 16, unit), 1500, rosenbrock);
+            assert!(valley.mean().iter().all(|x| (x - 1.0).abs() < 1e-6), "{:?}", valley.mean());
+        }
+    }
+
+    #[test]
+    fn the_distribution_takes_the_shape_of_the_valley() {
+        // In the limit C is the inverse of the Hessian, but for a factor (section 0.4 of the tutorial).
+        let weights = [1.0, 100.0, 10_000.0];
+        let found = minimised(search(&[1.0; 3], 0.5, 12, 0), 150, |x| {
+            x.iter().zip(&weights).map(|(x, w)| w * x * x).sum()
+        });
+        let curvature: Vec<f64> = (0..3).map(|i| found.covariance()[4 * i] * weights[i]).collect();
+        let largest = curvature.iter().fold(0.0, |a: f64, b| a.max(*b));
+        let smallest = curvature.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+        assert!(largest / smallest < 10.0, "{curvature:?}");
+    }
+
+    #[test]
+    fn points_have_the_mean_and_the_covariance_that_the_search_says() {
+        let told = minimised(search(&[1.0, -2.0], 0.5, 2000, 0), 3, ellipsoid);
+        let points = told.ask();
+        for i in 0..2 {
+            for j in 0..=i {
+                let expected = told.step() * told.step() * told.covariance()[2 * i + j];
+                let product = |x: &Vec<f64>| (x[i] - told.mean()[i]) * (x[j] - told.mean()[j]);
+                let found = points.iter().map(product).sum::<f64>() / points.len() as f64;
+                let size =
+                    told.step() * told.step() * (told.covariance()[3 * i] * told.covariance()[3 * j]).sqrt();
+                assert!((found - expected).abs() < 0.1 * size, "({i}, {j}): {found} instead of {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn searches_of_other_names_draw_other_points() {
+        let first = search(&[0.0; 3], 1.0, 8, 0).ask();
+        let points = |unit| CmaEs::new(&[0.0; 3], 1.0, 8, unit).expect("a search").ask();
+        assert_eq!(first, points(name(7, Purpose::Gains, &[1, 0])));
+        for other in [
+            name(8, Purpose::Gains, &[1, 0]),
+            name(7, Purpose::FineGains, &[1, 0]),
+            name(7, Purpose::Gains, &[2, 0]),
+            name(7, Purpose::Gains, &[1, 1]),
+        ] {
+            let others = points(other).concat();
+            assert!(first.iter().flatten().all(|x| !others.contains(x)));
+        }
+    }
+
+    #[test]
+    fn a_flat_function_and_a_minimum_at_rounding_stop_it() {
+        assert!(minimised(search(&[0.5; 4], 0.2, 16, 0), 60, |_| 1.0).stopped());
+        assert!(minimised(search(&[0.5; 4], 0.2, 16, 0), 60, |_| f64::INFINITY).stopped());
+        assert!(minimised(search(&[1.0; 4], 0.2, 16, 0), 3000, |x| sphere(x).sqrt()).stopped());
+        assert!(!minimised(search(&[1.0; 4], 0.2, 16, 0), 10, sphere).stopped());
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let name = || name(0, Purpose::Gains, &[0]);
+        assert!(CmaEs::new(&[], 1.0, 8, name()).is_err());
+        assert!(CmaEs::new(&[f64::NAN], 1.0, 8, name()).is_err());
+        assert!(CmaEs::new(&[0.0], 0.0, 8, name()).is_err());
+        assert!(CmaEs::new(&[0.0], 1.0, 1, name()).is_err());
+        let search = search(&[0.0; 2], 1.0, 4, 0);
+        let points = search.ask();
+        assert!(search.tell(&points[..3], &[0.0; 3]).is_err());
+        assert!(search.tell(&points, &[0.0; 3]).is_err());
+        assert!(search.tell(&points, &[0.0, 1.0, f64::NAN, 2.0]).is_err());
+        assert!(search.tell(&vec![vec![0.0; 3]; 4], &[0.0; 4]).is_err());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        #[test]
+        fn only_the_order_of_values_counts(unit in 0_u64..1000) {
+            let start = search(&[1.0, 2.0, -1.0], 0.5, 12, unit);
+            let plain = minimised(start.clone(), 30, rosenbrock);
+            let bent = minimised(start, 30, |x| libm::exp(libm::log1p(rosenbrock(x)) / 3.0) - 4.0);
+            prop_assert_eq!(plain.mean(), bent.mean());
+            prop_assert_eq!(plain.covariance(), bent.covariance());
+        }
+
+        #[test]
+        fn units_of_the_parameters_change_nothing(unit in 0_u64..1000, power in -30_i32..30) {
+            let factor = libm::ldexp(1.0, power);
+            let plain = minimised(search(&[1.0, 2.0, -1.0], 0.5, 12, unit), 30, rosenbrock);
+            let mean = [factor, 2.0 * factor, -factor];
+            let back = |x: &[f64]| rosenbrock(&x.iter().map(|x| x / factor).collect::<Vec<_>>());
+            let scaled = minimised(search(&mean, 0.5 * factor, 12, unit), 30, back);
+            let expected: Vec<f64> = plain.mean().iter().map(|x| factor * x).collect();
+            prop_assert_eq!(scaled.mean(), &expected[..]);
+            prop_assert_eq!(scaled.step(), factor * plain.step());
+            prop_assert_eq!(scaled.covariance(), plain.covariance());
+        }
+
+        #[test]
+        fn points_may_be_told_in_any_order(unit in 0_u64..1000, turn in 1_usize..12) {
+            let start = minimised(search(&[1.0, 2.0, -1.0], 0.5, 12, unit), 5, rosenbrock);
+            let mut points = start.ask();
+            let values = |points: &[Vec<f64>]| points.iter().map(|x| rosenbrock(x)).collect::<Vec<_>>();
+            let told = start.tell(&points, &values(&points)).expect("values");
+            points.rotate_left(turn);
+            prop_assert_eq!(told, start.tell(&points, &values(&points)).expect("values"));
+        }
+
+        #[test]
+        fn a_turned_function_is_searched_as_well(unit in 0_u64..1000, angle in 0.0..6.3_f64) {
+            let turned = |x: &[f64]| {
+                let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+                ellipsoid(&[cosine * x[0] - sine * x[1], sine * x[0] + cosine * x[1]])
+            };
+            prop_assert!(turned(minimised(search(&[1.0, 1.0], 0.5, 12, unit), 150, turned).mean()) < 1e-8);
+        }
+    }
+}
