@@ -23,7 +23,7 @@ from twinloop.identification.fitting import Fitting, Tuned, described
 from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
 from twinloop.identification.identified import Identified
 from twinloop.identification.lags import search_actuators
-from twinloop.identification.noise import exact
+from twinloop.identification.noise import exact, kinematic_noise
 from twinloop.identification.offsets import moved, search_offsets
 from twinloop.identification.parts import parts
 from twinloop.identification.pool import Pool
@@ -115,7 +115,10 @@ class _Learner:
     def learn(self) -> Identified:
         self.watch("noise")
         offsets = self._offsets()
-        tuned = self._best(moved(self.fitting.runs, self.signals, offsets))
+        runs = moved(self.fitting.runs, self.signals, offsets)
+        given = [kinematic_noise(chain, runs, self.signals) for chain in self.selection.given]
+        self.selection.given = given
+        tuned = self._best(runs)
         others: list[_core.Model] = []
         if self.options.parts and len(self.fitting.runs) == 1:
             self.watch("parts")

@@ -13,7 +13,9 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.chains import Chain, Motion
+from twinloop.identification.coasting import coasted
 from twinloop.identification.problem import Problem
+from twinloop.identification.records import Run
 from twinloop.signals import Signals
 
 GUSTS = (1e-3, 1e-1, 10.0)
@@ -24,6 +26,10 @@ BEST_SENSOR = 0.1
 """Share of its readings' roughness that a sensor's standard deviation is at least."""
 NOTHING = 0.01
 """χ² a reading below which the noise was not estimated but held at the least that is believed: readings are exact."""
+FEW_READINGS = 20
+"""Below so many, the noise of an angle that body rates turn is not estimated."""
+OUTLYING = 6.0
+"""Medians of its residuals' size beyond which one counts no more."""
 RIDGE = 1e-9
 """Added to the columns' unit lengths where all terms are fitted at once."""
 
@@ -43,9 +49,37 @@ def declared_noise(chain: Chain, signals: Signals) -> Chain:
     return chain.with_noise(sensors, chain.motion)
 
 
-def given_noise(chain: Chain, dt: float) -> Chain:
+def given_noise(chain: Chain, signals: Signals) -> Chain:
     """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
-    return chain.with_noise(chain.sensors, (1e-4 * float(chain.sensors[0]) / dt, 0.0, 1.0))
+    sensors = declared_noise(chain, signals).sensors
+    return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
+
+
+def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chain:
+    """An angle that body rates turn, with its sensor's noise as kinematics show it.
+
+    A reading's error makes one increment too large and the next one too small: the covariance of neighbouring residuals
+    is minus its variance.
+
+    Args:
+        chain: of one angle that no output drives, with a first guess of its sensor's noise.
+        runs: as they would have been read had all sensors been read at once.
+        signals: of the system, which say how rates turn the angle.
+
+    Returns:
+        The chain with that noise; as it was where readings are too few.
+    """
+    (angle,) = chain.states
+    residuals = [(run.states[1:] - coasted(run.states, signals))[:, angle] for run in runs]
+    if sum(len(residual) for residual in residuals) < FEW_READINGS:
+        return chain
+    # A single wild reading must not be taken for noise.
+    most = OUTLYING * float(np.median(np.abs(np.concatenate(residuals))))
+    clipped = [np.clip(residual, -most, most) for residual in residuals]
+    products = np.concatenate([residual[1:] * residual[:-1] for residual in clipped])
+    low = (1e-7 * signals.states[angle].scale) ** 2
+    sensors = np.array([max(low, min(-float(products.mean()), float(chain.rough[0])))])
+    return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
 
 
 def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:

@@ -16,8 +16,8 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.chains import Chain
+from twinloop.identification.coasting import coasted, coasting
 from twinloop.identification.noise import floor_of
-from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.signals import Signals
 
@@ -75,9 +75,7 @@ def _moved(run: Run, signals: Signals, offsets: Floats) -> Run:
             begun[:, others] -= size * shares[others] * slopes[:, others]
         # Back in time, derivatives of odd order have the other sign.
         signs = np.where(orders % 2 == 1, np.sign(size), 1.0)
-        ended = signs * _coasting(signals, abs(size)).step(
-            signs * begun, np.zeros((len(states), signals.n_u))
-        )
+        ended = signs * coasting(signals, abs(size)).step(signs * begun, np.zeros((len(states), signals.n_u)))
         states[:, late] = ended[:, late]
     return replace(run, states=states, smooth=states)
 
@@ -89,14 +87,6 @@ def _order(signals: Signals, state: int) -> int:
         return 1
     of = signals.states[state].derivative_of
     return 0 if of is None else 1 + _order(signals, signals.state_names.index(of))
-
-
-def _coasting(signals: Signals, dt: float) -> _core.Model:
-    """What states do in a time of dt where nothing drives them."""
-    outputs: list[dict[int, float]] = [{} for _ in signals.driven]
-    program = Pool(signals.n_x + signals.n_u).program(outputs)
-    with engine_input():
-        return _core.Model(program, "acceleration", replace(signals, dt=dt).engine)
 
 
 def search_offsets(
@@ -187,16 +177,12 @@ class _Group:
 
 def _unexplained(runs: Sequence[Run], signals: Signals, chain: Chain) -> _core.Regression:
     """Of a chain on nothing; what body rates have turned is taken out of an angle's readings."""
-    coasting = _coasting(signals, signals.dt)
     records = []
     for run in runs:
         readings = run.states[:, list(chain.states)]
         nothing = np.zeros((len(run.commands), 1))
         if chain.output is None:
-            middle = run.states[:-1].copy()
-            turning = [i for i in range(signals.n_x) if _order(signals, i) > 0]
-            middle[:, turning] = 0.5 * (run.states[:-1, turning] + run.states[1:, turning])
-            turned = coasting.step(middle, np.zeros_like(run.commands)) - run.states[:-1]
+            turned = coasted(run.states, signals) - run.states[:-1]
             readings[1:] -= np.cumsum(turned[:, list(chain.states)], axis=0)
         records.append((readings, run.weights[:, list(chain.states)], nothing, nothing, nothing))
     with engine_input():

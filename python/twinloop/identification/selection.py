@@ -64,7 +64,7 @@ class Selection:
         self.scales = np.array([state.scale for state in signals.states])
         every = chains(signals, options.form_for(signals), guessed_noise(runs, self.scales))
         self.driven = [declared_noise(chain, signals) for chain in every if chain.output is not None]
-        self.given = [given_noise(chain, signals.dt) for chain in every if chain.output is None]
+        self.given = [given_noise(chain, signals) for chain in every if chain.output is None]
         self.ladder = self._ladder()
         self.told = told(options, pool, signals)
         self._admit_bounded()
