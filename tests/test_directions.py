@@ -76,7 +76,7 @@ def test_what_is_fixed_counts_and_what_is_not_finite_gives_no_direction():
     signals, pool = machine(2), Pool(4)
     rows = np.tile([0.3, 1.0, 1.0, 0.2], (4, 1))
     [chain] = driven(signals, 1)
-    difference = pool.add(("-", 1, 2))
+    difference = pool.add("-", 1, 2)
     both = ((1, 1.0), (2, 1.0))
     fixed = {chain.states[0]: [difference]}
     assert directions(problem_of(pool, rows), [Sum({0: 1.0}, 0.0, chain)], signals) == [both]
@@ -84,7 +84,7 @@ def test_what_is_fixed_counts_and_what_is_not_finite_gives_no_direction():
         ((1, 1.0), (2, -1.0)),
         both,
     ]
-    endless = pool.add(("exp", pool.add(("*", 1, 1e6)), None))
+    endless = pool.add("exp", pool.add("*", 1, 1e6))
     assert directions(problem_of(pool, rows), [Sum({endless: 1.0}, 0.0, chain)], signals) == [both]
     assert directions(problem_of(pool, rows), [], machine(1)) == []
 
@@ -111,9 +111,9 @@ def test_terms_of_a_direction_are_it_its_squares_and_it_times_each_state(shares)
 def test_a_direction_is_written_as_a_person_would():
     pool, symbols = Pool(5), ["x", *(f"u{i}" for i in range(1, 5))]
     yaw = together(pool, ((1, 1.0), (2, -1.0), (3, 1.0), (4, -0.5)))
-    assert pool.text(yaw, symbols) == "(u1 - u2 + u3 - u4 * 0.5)"
-    assert pool.text(pool.product(0, yaw), symbols) == "x * (u1 - u2 + u3 - u4 * 0.5)"
-    assert pool.text(pool.add(("-", 0, yaw)), symbols) == "(x - (u1 - u2 + u3 - u4 * 0.5))"
+    assert pool.text(yaw, symbols) == "u1 - u2 + u3 - 0.5*u4"
+    assert pool.text(pool.product(0, yaw), symbols) == "x*u1 - x*u2 + x*u3 - 0.5*x*u4"
+    assert pool.text(pool.add("-", 0, yaw), symbols) == "x - u1 + u2 - u3 + 0.5*u4"
 
 
 # Chosen

@@ -15,7 +15,6 @@ import twinloop as tl
 from twinloop import _core
 from twinloop.cli import main
 from twinloop.exam import bars, campaigns, held_out, kinds, least_squares, measures, operon, quality, study
-from twinloop.exam.expressions import program
 from twinloop.exam.integrals import regression
 from twinloop.exam.kinds import Campaigner, Fitter, Flyer, Optimum
 from twinloop.exam.learners import LEARNERS, for_smoke, key
@@ -26,6 +25,7 @@ from twinloop.exam.store import Address, Row, Store
 from twinloop.exam.systems import Subject, subject
 from twinloop.exam.tables import as_markdown, render, tables
 from twinloop.exam.tuning import score, tuned, variants
+from twinloop.law.parsing import program_of
 from twinloop.models import Twin
 from twinloop.presets import options_of
 
@@ -280,14 +280,14 @@ def test_a_formula_becomes_a_program_that_computes_it():
         a,
         np.full(40, 1.25),
     ]
-    found = program(formulas, {"a": 0, "b": 2}, 3).run(inputs)
+    found = program_of(formulas, {"a": 0, "b": 2}, 3).run(inputs)
     np.testing.assert_allclose(found, np.stack(expected, axis=1), rtol=1e-12)
 
 
 @pytest.mark.parametrize("formula", ["a + c", "a ** 0.5", "a if b else 1", "log(a)", "a +"])
 def test_a_formula_that_no_program_can_compute_is_refused(formula):
     with pytest.raises(tl.InvalidInput, match="expected"):
-        program([formula], {"a": 0, "b": 1}, 2)
+        program_of([formula], {"a": 0, "b": 1}, 2)
 
 
 @pytest.mark.filterwarnings("default")
@@ -338,7 +338,7 @@ def test_a_pyoperon_formula_becomes_a_program_that_predicts_the_same():
     target = 1.5 * inputs[:, 0] * inputs[:, 1] - 0.7 * inputs[:, 2] ** 2
     found = search(inputs, target, {"length": 30, "evaluations": 5000}, 1)
     names = {f"X{i + 1}": i for i in range(3)}
-    values = program([formula(found)], names, 3).run(inputs)[:, 0]
+    values = program_of([formula(found)], names, 3).run(inputs)[:, 0]
     np.testing.assert_allclose(values, found.predict(inputs), rtol=1e-3, atol=1e-4)  # it predicts in float32
 
 

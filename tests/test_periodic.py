@@ -233,7 +233,7 @@ def test_a_target_a_whole_turn_away_is_no_task(new_campaign):
 def test_terms_of_an_angle_that_wraps_are_its_sine_and_cosine():
     pool = Pool(3)
     ladder = rungs(pool, rig(periodic=True), LIBRARIES, 450)
-    sine, cosine = pool.add(("sin", 0, None)), pool.add(("cos", 0, None))
+    sine, cosine = pool.add("sin", 0), pool.add("cos", 0)
     assert {sine, cosine, 1, 2} <= set(ladder[0]) and 0 not in ladder[-1]
     degrees = Pool(3)
     rungs(

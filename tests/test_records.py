@@ -17,7 +17,7 @@ from twinloop import _core
 from twinloop.identification.chains import Chain
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.pool import ONE, Pool
+from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.structure import Sum
 from twinloop.law.actuation import Actuation
@@ -194,12 +194,12 @@ def pools(draw):
         a, b = (draw(st.integers(0, len(pool) - 1)) for _ in range(2))
         kind = draw(st.sampled_from(["sum", "constant", "function", "hidden"]))
         if kind == "function":
-            pool.add((draw(st.sampled_from(["abs", "sin"])), a, None))
+            pool.add(draw(st.sampled_from(["abs", "sin"])), a)
         elif kind == "hidden":
             pool.hidden(draw(st.integers(0, 1)))
         else:
             second = b if kind == "sum" else draw(st.sampled_from([2.0, 1.0, -0.0, 0.1]))
-            pool.add((draw(st.sampled_from(["+", "-", "*", "/", "min"])), a, second))
+            pool.add(draw(st.sampled_from(["+", "-", "*", "/", "min"])), a, second)
     for number in draw(st.lists(st.integers(0, len(pool) - 1), unique=True)):
         pool.rungs[number] = draw(st.integers(0, 3))
         pool.found[number] = draw(st.floats(0.0, 50.0))
@@ -397,17 +397,22 @@ def test_a_record_that_is_none_is_refused_with_what_is_wrong(record, word):
     "nodes",
     [
         [],
-        [["+", 0, 1]],
-        [["one", 0, None], ["+", 0, 9]],
-        [["one", 0, None], ["+", 0, 1], ["+", 0, 1]],
-        [["one", 0, None], ["os.system", 0, None]],
-        [["one", 0, None], *(["*", 2 + i, 2 + i] for i in range(40))],
+        [["+", [0, 9], 0.0]],
+        [["+", [0, 1], 0.0], ["+", [0, 1], 0.0]],
+        [["constant", [], 1.0]],
+        [["sin", [0, 1], 0.0]],
+        [["sin", [0], 2.0]],
+        [["input", [], 0.0]],
+        [["input", [], 2.5]],
+        [["os.system", [0], 0.0]],
+        [["**", [0], 3.0]],
+        [["*", [2 + i, 2 + i], 0.0] for i in range(40)],
     ],
 )
 def test_a_pool_that_never_was_is_refused(nodes):
     record = {**Pool(2).to_record(), "nodes": nodes}
     if not nodes:
-        assert Pool.from_record(record).nodes == [ONE]
+        assert Pool.from_record(record).nodes == Pool(2).nodes
         return
     with pytest.raises(tl.InvalidInput):
         Pool.from_record(record)
@@ -415,7 +420,7 @@ def test_a_pool_that_never_was_is_refused(nodes):
 
 def test_what_was_identified_of_other_signals_is_refused(pendulum_signals, quadrotor):
     pool = Pool(3)
-    program = pool.program([{0: 1.0}])
+    program = pool.program_of_sums([{0: 1.0}])
     chain = Chain((1, 0), 0, True, np.ones(2), np.ones(2))
     model = _core.Model(program, "acceleration", pendulum_signals.engine)
     direct = Actuation.direct(pendulum_signals)

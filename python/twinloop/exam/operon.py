@@ -10,8 +10,8 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
-from twinloop.exam.expressions import program
 from twinloop.exam.library import model_inputs, variables_of
+from twinloop.law.parsing import program_of
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 
@@ -41,7 +41,7 @@ def fit(
     formulas = [formula(found) for found in searches]
     with engine_input():
         return _core.Model(
-            program(formulas, names, signals.n_x + signals.n_u), "acceleration", signals.engine
+            program_of(formulas, names, signals.n_x + signals.n_u), "acceleration", signals.engine
         )
 
 

@@ -24,7 +24,7 @@ def coasting(signals: Signals, dt: float) -> _core.Model:
         The engine's model; states that are driven stay, those that others move go on.
     """
     outputs: list[dict[int, float]] = [{} for _ in signals.driven]
-    program = Pool(signals.n_x + signals.n_u).program(outputs)
+    program = Pool(signals.n_x + signals.n_u).program_of_sums(outputs)
     with engine_input():
         return _core.Model(program, "acceleration", replace(signals, dt=dt).engine)
 

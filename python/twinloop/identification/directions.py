@@ -58,8 +58,8 @@ def together(pool: Pool, direction: Direction, *, squared: bool = False) -> int:
     node: int | None = None
     for place, share in direction:
         part = pool.product(place, place) if squared else place
-        part = part if abs(share) == 1.0 else pool.add(("*", part, abs(share)))
-        node = part if node is None else pool.add(("+" if share > 0.0 else "-", node, part))
+        part = part if abs(share) == 1.0 else pool.add("*", part, abs(share))
+        node = part if node is None else pool.add("+" if share > 0.0 else "-", node, part)
     assert node is not None
     return node
 

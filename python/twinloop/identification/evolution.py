@@ -12,9 +12,10 @@ from collections.abc import Sequence
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.elementary import log
-from twinloop.identification.pool import UNARY, Pool
+from twinloop.identification.pool import Pool
 from twinloop.identification.problem import Problem
 from twinloop.identification.structure import Sum, search
+from twinloop.law.expressions import UNARY
 from twinloop.streams import Unit
 
 PRODUCTS = 0.5
@@ -110,14 +111,14 @@ def _drawn(pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _
     operation = operators[draw.below(len(operators))]
     if draw.uniform() < CONSTANTS:
         size = draw.log_uniform(0.1, 10.0)
-        a = pool.add(("+" if draw.uniform() < 0.5 else "*", a, size if draw.uniform() < 0.5 else -size))
+        a = pool.add("+" if draw.uniform() < 0.5 else "*", a, size if draw.uniform() < 0.5 else -size)
     if a == pool.one:
         return None
     if operation in UNARY:
-        return pool.add((operation, a, None))
+        return pool.add(operation, a)
     if b == pool.one or (operation in ("-", "/", "min", "max") and a == b):
         return None
-    return pool.add((operation, a, b))
+    return pool.add(operation, a, b)
 
 
 def _whole(pool: Pool, found: Sum, taken: set[int]) -> dict[int, float]:
@@ -126,8 +127,8 @@ def _whole(pool: Pool, found: Sum, taken: set[int]) -> dict[int, float]:
         return {}
     node: int | None = None
     for term, weight in found.weights.items():
-        part = pool.add(("*", term, weight))
-        node = part if node is None else pool.add(("+", node, part))
+        part = pool.add("*", term, weight)
+        node = part if node is None else pool.add("+", node, part)
     assert node is not None
     taken.add(node)
     return {node: float(log(pool.inputs + 1))}

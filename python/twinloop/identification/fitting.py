@@ -133,7 +133,7 @@ class Fitting:
         """
         known = [node for nodes in self.told.fixed.values() for node in nodes]
         used = [term for found in sums for term in found.weights if term != self.pool.one]
-        held = [node for node in self.pool.needed([*used, *known]) if self._holds_constant(node)]
+        held = self.pool.held([*used, *known])
         kept = {self.pool.one, *self.pool.needed(known)}
         free = [place for place, node in enumerate(held) if node not in kept]
         place, weights = len(held), []
@@ -166,12 +166,6 @@ class Fitting:
         """Bounds of a sum's coefficients, by node."""
         return self.told.bounds.get(found.chain.states[0], {})
 
-    def _holds_constant(self, number: int) -> bool:
-        if number == self.pool.one:
-            return True
-        node = self.pool.node(number)
-        return node is not None and isinstance(node[2], float)
-
     def _without_weak(self, tuned: Tuned) -> tuple[list[Sum], float]:
         """The sums without terms whose uncertain weights do not pay for them, and what those cost."""
         if not tuned.covariance.size:
@@ -203,7 +197,7 @@ class Fitting:
         if self.form == "absolute":
             for i, terms in enumerate(outputs):
                 terms[i] = terms.get(i, 0.0) + 1.0
-        program = self.pool.program(outputs, len(actuation.hidden))
+        program = self.pool.program_of_sums(outputs, len(actuation.hidden))
         with engine_input():
             return _core.Model(program, self.form, self.signals.engine, actuation.actuators, actuation.hidden)
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import ast
 import math
-import sys
 
 from twinloop.errors import InvalidInput
-from twinloop.identification.pool import UNARY, Pool
+from twinloop.identification.pool import Pool
+from twinloop.law.parsing import parsed
 from twinloop.signals import Bounds, Signals
 
-BINARY: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 LONGEST = 500
 """Characters of a formula at most."""
-HIGHEST = 6
-"""Power of an expression at most."""
 
 
 def parsed_term(text: str, pool: Pool, signals: Signals) -> int:
@@ -36,15 +32,8 @@ def parsed_term(text: str, pool: Pool, signals: Signals) -> int:
     if len(text) > LONGEST:
         raise InvalidInput(f"Term: expected at most {LONGEST} characters, found {len(text)}; split it.")
     names = {name: i for i, name in enumerate((*signals.state_names, *signals.command_names))}
-    try:
-        tree = ast.parse(text, mode="eval").body
-        if not all(abs(number) <= sys.float_info.max for number in _numbers(tree)):
-            raise InvalidInput(
-                f"Term {text!r}: expected finite numbers, found a larger one; write it smaller."
-            )
-        return _node(tree, text, pool, names)
-    except (SyntaxError, RecursionError, MemoryError) as reason:  # the last two where it is nested too deeply
-        raise InvalidInput(f"Term {text!r}: expected a formula such as 'rate * abs(rate)'.") from reason
+    # A number alone is 1 times it: only its coefficient is searched.
+    return parsed(text, pool, names, lambda value: pool.add("*", pool.one, value))
 
 
 def fixed_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int]:
@@ -68,7 +57,7 @@ def fixed_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int]:
             f" {', '.join(signals.state_names)}; such as '{signals.state_names[-1]}: -9.81 * sin(angle)'."
         )
     # Times 1, so that it is never one of the terms that are searched.
-    known = pool.add(("*", parsed_term(formula.strip(), pool, signals), 1.0))
+    known = pool.add("*", parsed_term(formula.strip(), pool, signals), 1.0)
     return signals.state_names.index(name.strip()), known
 
 
@@ -111,8 +100,15 @@ def bounded_term(text: str, pool: Pool, signals: Signals) -> tuple[int, int, Bou
 def bare_term(node: int, pool: Pool) -> tuple[int, float]:
     """A term without the numbers that it is multiplied by, and their product."""
     factor = 1.0
-    while (parts := pool.node(node)) is not None and parts[0] == "*" and isinstance(parts[2], float):
-        node, factor = parts[1], factor * parts[2]
+    while pool[node].operation == "*":
+        a, b = pool[node].operands
+        values = pool.constant_value(a), pool.constant_value(b)
+        if values[1] is not None:
+            node, factor = a, factor * values[1]
+        elif values[0] is not None:
+            node, factor = b, factor * values[0]
+        else:
+            break
     return node, factor
 
 
@@ -130,55 +126,3 @@ def _bound(written: str, text: str, without: float) -> float:
             " write one, or leave it out."
         )
     return value
-
-
-def _node(tree: ast.expr, text: str, pool: Pool, names: dict[str, int]) -> int:
-    def inner(part: ast.expr) -> int:
-        return _node(part, text, pool, names)
-
-    constant = _constant(tree)
-    if constant is not None:
-        return pool.add(("*", pool.one, constant))
-    match tree:
-        case ast.Name(id=name) if name in names:
-            return names[name]
-        case ast.BinOp(left=left, op=ast.Mult(), right=right) if _constant(left) is not None:
-            return pool.add(("*", inner(right), _constant(left)))
-        case ast.BinOp(left=left, op=ast.Mult(), right=right) if _constant(right) is not None:
-            return pool.add(("*", inner(left), _constant(right)))
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return pool.add(("*", inner(operand), -1.0))
-        case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int(power))) if (
-            1 <= power <= HIGHEST
-        ):
-            return pool.product(*[inner(left)] * power)
-        case ast.BinOp(left=left, op=operator, right=right) if type(operator) in BINARY:
-            return pool.add((BINARY[type(operator)], inner(left), inner(right)))
-        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in UNARY:
-            return pool.add((name, inner(argument), None))
-        case ast.Call(func=ast.Name(id=name), args=[first, second], keywords=[]) if name in ("min", "max"):
-            return pool.add((name, inner(first), inner(second)))
-        case _:
-            known = ", ".join(names)
-            raise InvalidInput(
-                f"Term {text!r}: expected numbers, + - * / **, abs, sqrt, sin, cos, tanh, exp, min, max and the"
-                f" names {known}, found {ast.unparse(tree)!r}; write it with those."
-            )
-
-
-def _numbers(tree: ast.expr) -> list[float]:
-    """All numbers of a formula, without their signs."""
-    values = [part.value for part in ast.walk(tree) if isinstance(part, ast.Constant)]
-    return [value for value in values if isinstance(value, (int, float))]
-
-
-def _constant(tree: ast.expr) -> float | None:
-    """The value of a number as it is written, with a sign or without; None for anything else."""
-    match tree:
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            value = _constant(operand)
-            return None if value is None else -value
-        case ast.Constant(value=value) if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value)
-        case _:
-            return None

@@ -32,7 +32,7 @@ def damping(pool: Pool, signals: Signals) -> Terms:
     """|x| x of inputs with two signs that are no angles: what slows a motion both ways, as its square does not."""
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
-    return [pool.product(pool.add(("abs", i, None)), i) for i in signed]
+    return [pool.product(pool.add("abs", i), i) for i in signed]
 
 
 def roots(pool: Pool, signals: Signals) -> Terms:
@@ -46,13 +46,13 @@ def roots(pool: Pool, signals: Signals) -> Terms:
         terms += [root, *(pool.product(j, root) for j in range(signals.n_x, pool.inputs))]
     for i, j in combinations(levels(signals), 2):
         if signals.states[i].unit == signals.states[j].unit:
-            terms.append(_signed_root(pool, pool.add(("-", i, j))))
+            terms.append(_signed_root(pool, pool.add("-", i, j)))
     return terms
 
 
 def _signed_root(pool: Pool, node: int) -> int:
     """The root of a size, with its sign: below zero, where only noise or a wrong model leads, it still pulls back."""
-    return pool.add(("/", node, pool.add(("sqrt", node, None))))
+    return pool.add("/", node, pool.add("sqrt", node))
 
 
 def friction(pool: Pool, signals: Signals) -> Terms:
@@ -61,13 +61,13 @@ def friction(pool: Pool, signals: Signals) -> Terms:
     for group in speeds(signals):
         for i in group:
             # Dry friction: a step at rest, of which tuning finds the width.
-            steep = pool.add(("*", i, FRICTION / signals.states[i].scale))
-            terms.append(pool.add(("tanh", steep, None)))
+            steep = pool.add("*", i, FRICTION / signals.states[i].scale)
+            terms.append(pool.add("tanh", steep))
         if len(group) > 1:
             total = pool.product(group[0], group[0])
             for i in group[1:]:
-                total = pool.add(("+", total, pool.product(i, i)))
-            length = pool.add(("sqrt", total, None))
+                total = pool.add("+", total, pool.product(i, i))
+            length = pool.add("sqrt", total)
             terms += [pool.product(length, i) for i in group]
     return terms
 
@@ -89,7 +89,7 @@ def quotients(pool: Pool, signals: Signals) -> Terms:
     commands = range(signals.n_x, pool.inputs)
     above = [pool.one, *commands, *(pool.product(j, j) for j in commands)]
     below = [size for i in distances(signals) for size in (i, pool.product(i, i))]
-    return [pool.add(("/", a, size)) for size in below for a in above]
+    return [pool.add("/", a, size) for size in below for a in above]
 
 
 def cubic(pool: Pool, signals: Signals) -> Terms:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from twinloop.law.expansion import Expansion, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.law import Law
 from twinloop.law.spread import Spread, spreads
-from twinloop.law.writing import EXACT, Term, Writer
+from twinloop.law.writing import EXACT, TEXT, Term, Writer
 
 WIDTH = 100
 """Columns of a line."""
@@ -262,3 +263,20 @@ def _unused(prefix: str, taken: Sequence[str]) -> str:
     while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in taken):
         prefix += "_"
     return prefix
+
+
+def readable(expressions: Expressions, number: int, symbols: Sequence[str], digits: int = 4) -> str:
+    """One expression on one line, multiplied out.
+
+    Args:
+        expressions: where it is.
+        number: its node.
+        symbols: a name for each input, by its place.
+        digits: significant digits of constants.
+    """
+    target = Expressions()
+    for place in range(len(symbols)):
+        target.input(place)
+    root = written(target, Expansion(expressions, target).polynomial(number))
+    endless = replace(TEXT, longest=sys.maxsize, worth=sys.maxsize)
+    return Writer(target, [root], symbols, digits, "t", False, endless).text(root)

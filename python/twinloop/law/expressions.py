@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from twinloop import _core
@@ -18,6 +18,9 @@ BINARY = ("+", "-", "*", "/", "min", "max")
 COMMUTING = ("+", "*")
 INPUT, CONSTANT, POWER, UPRIGHT = "input", "constant", "**", "upright"
 """Leaves, whole powers, and a cosine kept away from 0 (see `GIMBAL`), which programs do not have."""
+
+Instruction = tuple[str, int, int, "int | float | None"]
+"""(operation, destination, first operand, second operand): a register an int, a constant a float."""
 
 
 class Node(NamedTuple):
@@ -189,7 +192,9 @@ class Expressions:
         Returns:
             The program; its values are those of the nodes to the bit.
         """
-        return Compiler(self, inputs, len(roots)).program([[(root, None)] for root in roots])
+        compiler = Compiler(self, inputs, len(roots))
+        compiler.compute(roots, {root: inputs + i for i, root in reversed([*enumerate(roots)])})
+        return compiler.program([[(root, None)] for root in roots])
 
 
 class Compiler:
@@ -203,70 +208,87 @@ class Compiler:
 
     def __init__(self, expressions: Expressions, inputs: int, outputs: int) -> None:
         self.expressions, self.inputs, self.outputs = expressions, inputs, outputs
-        self._lines: list[str] = []
-        self._registers: dict[int, str] = {}
+        self.held: list[int] = []
+        """For each constant of the instructions so far, in their order, the node in whose instruction it stands."""
+        self._page: list[Instruction] = []
+        self._registers: dict[int, int] = {}
         self._free = inputs + outputs
 
+    def compute(self, numbers: Iterable[int], places: Mapping[int, int] | None = None) -> None:
+        """Writes what computes some nodes.
+
+        Args:
+            numbers: the nodes.
+            places: registers in which some of them are to be found, each for one node.
+        """
+        for number in self.expressions.needed(numbers):
+            self._compute(number, places or {})
+
     def program(self, outputs: Sequence[Sequence[tuple[int, float | None]]]) -> _core.Program:
-        """The program of weighted sums of nodes; a weight of None is none at all."""
-        for number in self.expressions.needed(n for terms in outputs for n, _ in terms):
-            self._compute(number)
-        spare = self._new() if any(len(terms) > 1 for terms in outputs) else ""
+        """The program of sums of nodes that are computed; a constant need not be.
+
+        Args:
+            outputs: for each output nodes with their weights; None: no weight, for a node alone.
+        """
+        spare = self._new() if any(len(terms) > 1 for terms in outputs) else -1
         for target, terms in enumerate(outputs, start=self.inputs):
-            started = False
-            for number, weight in terms:
+            for place, (number, weight) in enumerate(terms):
                 value = self.expressions.constant_value(number)
                 if value is not None:
-                    value = value if weight is None else value * weight
-                    self._lines.append(f"r{target} = r{target} + {value!r}")
+                    self._page.append(("+", target, target, value if weight is None else value * weight))
                 elif weight is None:
-                    self._lines.append(f"r{target} = r{target} + {self._registers[number]}")
-                elif not started:
-                    self._lines.append(f"r{target} = {self._registers[number]} * {weight!r}")
+                    if self._registers[number] != target:
+                        self._page.append(("+", target, target, self._registers[number]))
+                elif place == 0:
+                    self._page.append(("*", target, self._registers[number], weight))
                 else:
-                    self._lines.append(f"{spare} = {self._registers[number]} * {weight!r}")
-                    self._lines.append(f"r{target} = r{target} + {spare}")
-                started = True
-        head = f"program inputs={self.inputs} outputs={self.outputs} registers={self._free}"
-        return _core.Program.parse("\n".join([head, "page 1", *self._lines]) + "\n")
+                    self._page.append(("*", spare, self._registers[number], weight))
+                    self._page.append(("+", target, target, spare))
+        return _core.Program(self.inputs, self.outputs, self._free, [self._page])
 
-    def _compute(self, number: int) -> None:
-        """Writes what computes a node; constants are written where they are used."""
+    def _compute(self, number: int, places: Mapping[int, int]) -> None:
+        """Writes what computes a node of nodes that are computed; constants are written where they are used."""
         operation, operands, value = self.expressions[number]
         if operation == INPUT:
-            self._registers[number] = f"r{int(value)}"
+            self._registers[number] = int(value)
         elif operation == POWER:
             base = first = self._register(operands[0])
             for _ in range(int(value) - 1):
-                first = self._written(f"{first} * {base}")
+                first = self._written("*", first, base, self._new())
             self._registers[number] = first
         elif operation in UNARY:
-            self._registers[number] = self._written(f"{operation}({self._register(operands[0])})")
+            first = self._register(operands[0])
+            self._registers[number] = self._written(operation, first, None, self._place(number, places))
         elif operation in BINARY:
             a, b = operands
             # An instruction may hold a constant as its second operand only.
-            if operation in COMMUTING and self.expressions.constant_value(a) is not None:
-                a, b = b, a
-            first, constant = self._register(a), self.expressions.constant_value(b)
-            second = self._register(b) if constant is None else repr(constant)
-            between = f"{operation}({first}, {second})" if operation in ("min", "max") else None
-            self._registers[number] = self._written(between or f"{first} {operation} {second}")
+            constants = self.expressions.constant_value(a), self.expressions.constant_value(b)
+            if operation in COMMUTING and constants[0] is not None and constants[1] is None:
+                (a, b), constants = (b, a), constants[::-1]
+            first = self._register(a)
+            second = self._register(b) if constants[1] is None else constants[1]
+            self.held += [number] if constants[1] is not None else []
+            self._registers[number] = self._written(operation, first, second, self._place(number, places))
         elif operation != CONSTANT:
             raise ValueError(f"expected an operation of programs, found {operation!r}")
 
-    def _register(self, number: int) -> str:
+    def _register(self, number: int) -> int:
         """Where a node is found; a constant is put there."""
         if number not in self._registers:
+            value = self.expressions.constant_value(number)
+            assert value is not None  # operands come first
             register = self._new()
-            self._lines.append(f"{register} = {register} + {self.expressions.constant_value(number)!r}")
-            self._registers[number] = register
+            self._registers[number] = self._written("+", register, value, register)
+            self.held.append(number)
         return self._registers[number]
 
-    def _written(self, computed: str) -> str:
-        register = self._new()
-        self._lines.append(f"{register} = {computed}")
+    def _place(self, number: int, places: Mapping[int, int]) -> int:
+        return places[number] if number in places else self._new()
+
+    def _written(self, operation: str, first: int, second: int | float | None, register: int) -> int:
+        self._page.append((operation, register, first, second))
         return register
 
-    def _new(self) -> str:
+    def _new(self) -> int:
         self._free += 1
-        return f"r{self._free - 1}"
+        return self._free - 1

@@ -36,6 +36,7 @@ class Dialect:
         power: how a whole power is written of its base and exponent.
         number: a constant with so many digits as text.
         longest: characters above which a part of an expression gets a name.
+        worth: characters above which a part that is written several times gets a name.
     """
 
     functions: Mapping[str, str]
@@ -44,6 +45,7 @@ class Dialect:
     power: str = "{}**{}"
     number: Callable[[float, int], str] = decimal
     longest: int = LONGEST_PART
+    worth: int = WORTH_A_NAME
 
 
 TEXT = Dialect({"sqrt": "sqrt(abs({}))", "min": "Min({}, {})", "max": "Max({}, {})", UPRIGHT: "{}"})
@@ -147,7 +149,7 @@ class Writer:
     def _pays(self, number: int) -> bool:
         """Whether a part that is used twice gets a name, where short ones do not."""
         whole = self.expressions[number].operation not in ("*", "/", "+", "-", POWER)
-        return whole and len(self._texts[number][0]) > WORTH_A_NAME
+        return whole and len(self._texts[number][0]) > self.dialect.worth
 
     def _composed(self, number: int) -> tuple[str, int]:
         """A node as text of its operands, and how tightly it binds."""
