@@ -20,6 +20,8 @@ FIELDS = {
         "tests": "every test that was made, in order",
         "experiments": "`[number of the test, experiment]`, in the order they were told",
         "asked": "`[iteration, planned or test_loop]` of each test that was asked for",
+        "failures": "tests that failed, each behind its number",
+        "abandoned": "numbers of tests that will not be flown",
     },
     "pool": {
         "inputs": "how many inputs a program has",

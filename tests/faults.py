@@ -54,8 +54,9 @@ def fly(store, preset):
 
 def digest(campaign):
     """A hash of all that was flown, learnt and found, without what tells campaigns apart."""
-    record = campaign.to_record()
+    # First the look: what it learns is kept too, and a kill may come right after that.
     best = to_text(campaign.best_test.to_record())
+    record = campaign.to_record()
     text = to_text(record) + best + campaign.twin.equations(17)
     return hashlib.sha256(text.replace(record["logbook"]["identity"], "").encode()).hexdigest()
 

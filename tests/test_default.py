@@ -299,6 +299,7 @@ def test_a_twin_that_does_not_follow_its_own_runs_is_not_followed(begin, pendulu
     best, test = campaign.best_test, campaign.ask()
     assert same_bits(best.genes, first.genes) and "does not follow" in best.reason
     assert same_bits(test.genes, first.genes) and "again" in test.reason
+    assert "agree" not in test.reason and "cannot say" in test.reason
     assert any("check the signs" in remark for remark in campaign.history[0].remarks)
     honest = told(begin(), pendulum)
     assert not same_bits(honest.best_test.genes, first.genes)

@@ -28,7 +28,7 @@ def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False):
     rate = size * 3.0 * np.cos(3.0 * t + 0.3 * seed) - 1.4 * size * np.sin(7.0 * t)
     states = np.column_stack([0.1 * t, angle, rate]) + noise * stream.normal(size=(STEPS + 1, 3))
     trajectory = tl.Trajectory(t, change(states), np.zeros((STEPS, 1)))
-    return SimpleNamespace(trajectory=trajectory, quality=None if cut else 1.0)
+    return SimpleNamespace(trajectory=trajectory, complete=not cut)
 
 
 def said(*runs, follows=True):

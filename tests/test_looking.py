@@ -44,6 +44,10 @@ LIFE = ("tell", "tell", "ask", "ask", "tell", "tell", "ask", "tell", "own", "own
 """Two runs before the first question, two questions at once, their answers, and runs that nobody asked for."""
 
 
+FULL_LIFE = ("tell", "attach", "ask", "fail", "ask", "ask", "abandon", "tell", "attach", "attach")
+"""The same with flights that nobody asked for, a test that failed and one that was never flown."""
+
+
 def new(preset, seed=0):
     return tl.Campaign(
         SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
@@ -59,6 +63,12 @@ def lived(campaign, life, look=lambda campaign, step: campaign):
     for step, event in enumerate(life):
         if event == "ask":
             waiting.append(campaign.ask())
+        elif event == "attach":
+            campaign.attach(plant.run(campaign.experiments[0].test))
+        elif event == "fail":
+            campaign.tell_failed(waiting.pop(0), "the motor cut out")
+        elif event == "abandon":
+            campaign.abandon(waiting.pop(0))
         else:
             test = campaign.test(OTHER_GAINS) if event == "own" else waiting.pop(0)
             run = plant.run(test)
@@ -126,6 +136,16 @@ def test_looking_at_a_campaign_of_the_paper_changes_no_bit(looks):
 )
 def test_looking_at_a_campaign_of_default_changes_no_bit(looks):
     assert seen("default", looks) == unseen("default")
+
+
+def test_looking_changes_no_bit_of_what_follows_attached_failed_and_abandoned_flights():
+    def look(campaign, step):
+        for what in ("controller", "twin", "printing"):
+            LOOKS[what](campaign)
+        return copy.copy(campaign)
+
+    expected = outcome(lived(new("default"), FULL_LIFE))
+    assert outcome(lived(new("default"), FULL_LIFE, look)) == expected
 
 
 @pytest.mark.parametrize("preset", ["paper", "default"])

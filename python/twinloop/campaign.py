@@ -15,7 +15,7 @@ from twinloop import _core
 from twinloop.arrays import floats, whole
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
-from twinloop.history import Experiment, Iteration, Lesson, Progress
+from twinloop.history import Experiment, Failure, Iteration, Lesson, Progress
 from twinloop.keeping import Keeping, look
 from twinloop.law.law import Law
 from twinloop.linear.margins import Margins, margins_of
@@ -388,27 +388,86 @@ class Campaign(Recorded, kind="campaign"):
         Raises:
             InvalidInput: a test of another campaign, or a useless trajectory; nothing has changed.
         """
-        # Of the last `ask`, not of the last look: `before` must not depend on who looked.
-        model = self._method.asked_model
-
-        def error_so_far(alone: _core.SelectedTests) -> float | None:
-            if model is None:
-                return None
-            return float(closed_loop([model], alone, self._workers)[0, 0])
-
         with self._entering():
-            self._book.tell(test, trajectory, error_so_far)
+            self._book.tell(test, trajectory, self._error_so_far)
         self.interrupted = False
+
+    def tell_failed(self, test: Test, reason: str, partial: Trajectory | None = None) -> None:
+        """Tells that a test failed on the system: that, too, is a result.
+
+        It has no quality, counts as a run, and speaks against its gains: the preset "default" never takes them, or
+        gains close to them, for known to fly.
+
+        Args:
+            test: from this campaign.
+            reason: what happened, in a few words.
+            partial: what was recorded until then, of at least one step; it is learnt from. None: nothing.
+
+        Raises:
+            InvalidInput: a test of another campaign, no reason, or a useless record; nothing has changed.
+        """
+        with self._entering():
+            self._book.fail(test, reason, partial, self._error_so_far)
+        self.interrupted = False
+
+    def attach(self, trajectory: Trajectory) -> None:
+        """Adds a run that nobody asked for, of any length and under any commands, to what is to be learnt.
+
+        The twin is judged on it by its free run under the recorded commands. It has no quality, and is no run of a
+        test: `run` does not count it.
+
+        Args:
+            trajectory: of the same signals.
+
+        Raises:
+            InvalidInput: a useless trajectory; nothing has changed.
+            NotAvailable: the preset "paper" learns from tests of its controllers only.
+        """
+        if isinstance(self._method, Coevolution):
+            raise NotAvailable(
+                "Campaign.attach: expected the preset 'default', found 'paper', which learns from tests of its"
+                ' controllers only; choose preset="default".'
+            )
+        with self._entering():
+            self._book.attach(trajectory, self._error_so_far)
+        self.interrupted = False
+
+    def abandon(self, test: Test) -> None:
+        """Says that a test will not be flown: `run` does not fly it. If it is flown after all, tell it.
+
+        Args:
+            test: from this campaign, of which no run was told.
+
+        Raises:
+            InvalidInput: a test of another campaign, or one that was flown.
+        """
+        with self._entering():
+            self._book.abandon(test)
+
+    def status(self, test: Test) -> str:
+        """Where a test is in its life.
+
+        Args:
+            test: from this campaign.
+
+        Returns:
+            "asked", "flown" (one run at least was complete), "aborted" (none was), "failed" or "abandoned".
+
+        Raises:
+            InvalidInput: a test of another campaign.
+        """
+        return self._book.status(test)
 
     def run(self, system: System, experiments: int = 4) -> Campaign:
         """The whole loop; the last test is that of `ask(last=True)`.
 
-        What was asked for and not told yet is flown first. Where nothing was told, the first test is the
-        last one made by `campaign.test`, or that of `system.default_gains`.
+        What was asked for, and neither told nor abandoned, is flown first. Where nothing was told, the first test is
+        the last one made by `campaign.test`, or that of `system.default_gains`.
 
         Args:
             system: anything with `signals` and `run(test)`.
-            experiments: runs on the system in all, the first and those told before included.
+            experiments: runs on the system in all, the first, those told before and those that failed included, those
+                that were attached not.
 
         Returns:
             The campaign.
@@ -427,7 +486,7 @@ class Campaign(Recorded, kind="campaign"):
                 "Campaign.run, system: expected an object with twinloop.Signals as `signals` and with `run(test)`, "
                 f"found {type(system).__name__}; add them."
             )
-        told = len(self._book.experiments)
+        told = self._book.runs
         if budget < told:
             raise InvalidInput(
                 f"Campaign.run, experiments: expected at least the {told} runs that were told already, found {budget};"
@@ -437,8 +496,8 @@ class Campaign(Recorded, kind="campaign"):
         if self._keeping is not None:
             self._keeping.fly(system)
         with self._interruptible():
-            while len(self._book.experiments) < budget:
-                test = self._next(system, last=len(self._book.experiments) + 1 == budget)
+            while self._book.runs < budget:
+                test = self._next(system, last=self._book.runs + 1 == budget)
                 check_signals(test, system.signals)
                 self._report_experiment()
                 self.tell(test, system.run(test))
@@ -458,8 +517,12 @@ class Campaign(Recorded, kind="campaign"):
 
         With the preset "default": the gains tuned on the committee, unless it is not confident that they beat the
         best ones flown. With "paper": the flown test that ended nearest to its target. It carries the quality that
-        the twin predicts and, if it was flown, the measured one. Runs that were cut do not count, unless there are
-        no others. To fly and tell it, make a test of it with `campaign.test`.
+        the twin predicts and, if it was flown, the measured one. To fly and tell it, make a test of it with
+        `campaign.test`.
+
+        Raises:
+            NotAvailable: nothing was told; or, with "default", there is no controller to fly: none has flown to its
+                end, and the twin cannot answer for the one that it prefers.
         """
         self._learn()
         with self._interruptible():
@@ -533,8 +596,13 @@ class Campaign(Recorded, kind="campaign"):
 
     @property
     def experiments(self) -> tuple[Experiment, ...]:
-        """All that was told, in order."""
+        """All that was told and attached, in order."""
         return tuple(self._book.experiments)
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """Tests that failed, in the order they were told."""
+        return tuple(self._book.failures)
 
     @property
     def history(self) -> tuple[Iteration, ...] | tuple[Lesson, ...]:
@@ -559,6 +627,11 @@ class Campaign(Recorded, kind="campaign"):
             self._method.learn(self._book, at_once=self.interrupted)
             self._keep()
 
+    def _error_so_far(self, alone: _core.SelectedTests) -> float | None:
+        """On a run that is being told, of the model that the last `ask` knew: a look must not change it."""
+        model = self._method.asked_model
+        return None if model is None else float(closed_loop([model], alone, self._workers)[0, 0])
+
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
         try:
@@ -570,10 +643,18 @@ class Campaign(Recorded, kind="campaign"):
 
     def _next(self, system: System, last: bool) -> Test:
         waiting = self._book.waiting()
-        if waiting is not None:
-            return waiting
+        if waiting:
+            return waiting[0]
+        made = self._book.made()
+        if made is not None:
+            return made
         if self._book.experiments:
             return self.ask(last)
+        if self._book.failures:
+            raise NotAvailable(
+                "Campaign.run: expected a first test that has not failed, found none; make one with"
+                " campaign.test(gains), from another controller that you trust."
+            )
         gains = getattr(system, "default_gains", None)
         if gains is None:
             raise NotAvailable(
@@ -593,6 +674,18 @@ class Campaign(Recorded, kind="campaign"):
             "experiment", self._method.iteration, 0, 0, len(self._book.experiments), (), (), (), 0, 0
         )
         self._report(progress)
+
+
+def controller_to_fly(campaign: Campaign) -> tuple[Test | None, str]:
+    """The best test of a campaign, if there is any, and why there is none.
+
+    Args:
+        campaign: with at least one experiment.
+    """
+    try:
+        return campaign.best_test, ""
+    except NotAvailable as reason:
+        return None, str(reason)
 
 
 def available_threads() -> int:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import click
 
 from twinloop import __version__
-from twinloop.campaign import Campaign
+from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.console import Watch
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
 from twinloop.exam.command import bench
@@ -154,7 +154,7 @@ def run(
     if plot is not None:
         _uninterrupted(lambda: _draw(campaign, plot))
         click.echo(f"Picture: {plot}", err=True)
-    context.exit(130 if campaign.interrupted else 0)
+    context.exit(130 if campaign.interrupted else 1 if result["controller"] is None else 0)
 
 
 main.add_command(bench)
@@ -171,7 +171,7 @@ def _worked(
 ) -> Result:
     with watch, suppress(KeyboardInterrupt):
         campaign.run(rig, experiments)
-        _ = campaign.best_test  # learns the last flight
+        controller_to_fly(campaign)  # learns the last flight
     if not campaign.experiments or _knows_nothing(campaign):
         raise KeyboardInterrupt
     return _uninterrupted(lambda: summary(campaign, system, clock.info()))

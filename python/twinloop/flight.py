@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
 from twinloop.signals import Signals
 from twinloop.test import Test
@@ -63,6 +64,28 @@ def fly(
         ended="completed" if completed else "diverged",
         reason=reason,
         true_states=runs.states[0, : lasted + 1],
+    )
+
+
+def driven(signals: Signals, initial_state: Floats, commands: Floats) -> Test:
+    """A test that sends given commands, whatever the states do.
+
+    Its controller asks for nothing, so that there is no second loop: the commands are its excitation.
+
+    Args:
+        signals: of the system.
+        initial_state: where it starts (n_x,), SI units, radians.
+        commands: at least one row (n, n_u), in their units; what lies beyond a bound is clipped.
+
+    Returns:
+        The test.
+    """
+    name = signals.state_names[0]
+    gains = {f"{name}.{term}": (0.0, 1.0) for term in ("kp", "ki", "kd")}
+    nothing = PID(axes=[(name, None)], gains=gains, output=Mixer(np.zeros((signals.n_u, 1))))
+    family = nothing.bind(signals)
+    return Test(
+        family, np.zeros(family.size), initial_state, initial_state, len(commands), excitation=commands
     )
 
 

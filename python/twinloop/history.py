@@ -13,24 +13,46 @@ from twinloop.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Experiment(Recorded, kind="experiment", given=("test",)):
+class Experiment(Recorded, kind="experiment", given=("replayed",)):
     """One run on the system.
 
     Args:
-        test: what was asked for.
+        replayed: what a twin flies to be compared with it: the test, or the commands as they were recorded.
         trajectory: what the system answered.
         before: closed-loop error on the run of the twin that the last `ask` knew; None if nothing was asked yet.
         frozen: closed-loop error of the model that never moves, on the run.
-        final_distance: distance of the last measured state to the target; None if the run was cut.
-        quality: what the campaign minimises, as measured; None if the run was cut.
+        final_distance: distance of the last measured state to the target; None if the run was cut, or has no target.
+        quality: what the campaign minimises, as measured; None if the run was cut, or has no target.
+        attached: whether nobody asked for it.
     """
 
-    test: Test
+    replayed: Test
     trajectory: Trajectory
     before: float | None
     frozen: float
     final_distance: float | None
     quality: float | None
+    attached: bool = False
+
+    @property
+    def test(self) -> Test | None:
+        """What was asked for; None for a run that nobody asked for."""
+        return None if self.attached else self.replayed
+
+    @property
+    def number(self) -> int | None:
+        """Of the test; None for a run that nobody asked for."""
+        return None if self.test is None else self.test.number
+
+    @property
+    def complete(self) -> bool:
+        """Whether it ran to its end."""
+        return self.trajectory.ended == "completed" and self.trajectory.steps == self.replayed.steps
+
+    @property
+    def kept_envelope(self) -> bool:
+        """Whether it ran to its end and never left the envelope: where a run was cut nobody knows."""
+        return self.complete and not self.left_envelope
 
     @property
     def usage(self) -> float:
@@ -45,7 +67,7 @@ class Experiment(Recorded, kind="experiment", given=("test",)):
 
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""
-        most, signals = np.zeros(len(self.trajectory.states)), self.test.family.signals
+        most, signals = np.zeros(len(self.trajectory.states)), self.replayed.family.signals
         middle = np.array([0.0 if s.envelope is None else 0.5 * sum(s.envelope) for s in signals.states])
         off = np.abs(signals.difference(self.trajectory.states, middle))
         for distances, state in zip(off.T, signals.states, strict=True):
@@ -53,6 +75,21 @@ class Experiment(Recorded, kind="experiment", given=("test",)):
                 low, high = state.envelope
                 most = np.maximum(most, distances / (0.5 * (high - low)))
         return most
+
+
+@dataclass(frozen=True)
+class Failure(Recorded, kind="failure", given=("test",)):
+    """A test that failed on the system.
+
+    Args:
+        test: that was flown.
+        reason: what happened, in a few words.
+        recorded: whether what was recorded until then is among the experiments.
+    """
+
+    test: Test
+    reason: str
+    recorded: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,7 +157,7 @@ class Lesson(Recorded, kind="lesson"):
 
     Args:
         iteration: its number, from 1.
-        tests: numbers of the selected tests, in the order they were told.
+        tests: numbers of the selected tests, in the order they were told; None for a run that nobody asked for.
         form: what the model's outputs mean.
         terms: of the equations.
         misfit: χ² of the predictions for each reading; 1 where only noise is left.
@@ -141,7 +178,7 @@ class Lesson(Recorded, kind="lesson"):
     """
 
     iteration: int
-    tests: tuple[int, ...]
+    tests: tuple[int | None, ...]
     form: str
     terms: int
     misfit: float
@@ -202,7 +239,7 @@ class Progress:
         generation: of the loop that is running.
         generations: that it will run.
         told: experiments that were told.
-        tests: numbers of the tests that are being learnt.
+        tests: numbers of the tests that are being learnt; None for a run that nobody asked for.
         open_loop: of the best trade-off, one for each of them.
         closed_loop: of the best trade-off, one for each of them.
         archive_size: of the loop that is running.
@@ -214,7 +251,7 @@ class Progress:
     generation: int
     generations: int
     told: int
-    tests: tuple[int, ...]
+    tests: tuple[int | None, ...]
     open_loop: tuple[float, ...]
     closed_loop: tuple[float, ...]
     archive_size: int

@@ -13,7 +13,8 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput, engine_input
-from twinloop.history import Experiment, Iteration, Lesson, Planned, TestLoop
+from twinloop.flight import driven
+from twinloop.history import Experiment, Failure, Iteration, Lesson, Planned, TestLoop
 from twinloop.objectives import frozen_error
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.setup import Setup
@@ -25,6 +26,8 @@ FAR = 5.0
 NEXT = 9
 """Readings after the first that are looked at for this."""
 Asked = TypeVar("Asked", TestLoop, Planned)
+Judge = Callable[[_core.SelectedTests], float | None]
+"""The error, on the one test of a set, of what is known so far; None where nothing is."""
 
 
 class Logbook(Recorded, kind="logbook"):
@@ -39,16 +42,19 @@ class Logbook(Recorded, kind="logbook"):
         self.tests: list[Test] = []
         self.experiments: list[Experiment] = []
         self.asked: list[tuple[int, TestLoop | Planned]] = []
+        self.failures: list[Failure] = []
+        self.abandoned: list[int] = []
         self.selected = setup.none_selected()
+        self.attached: _core.SelectedTests | None = None
         self.identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
         """Names of the fields that a record has, in order."""
-        return "identity", "tests", "experiments", "asked"
+        return "identity", "tests", "experiments", "asked", "failures", "abandoned"
 
     def to_record(self) -> Record:
-        """All entries: experiments with the number of their test, what was asked with that of the iteration."""
+        """All entries: experiments and failures with the number of their test, what was asked with the iteration's."""
         return {**self._head(), "identity": self.identity, **self.entries({})}
 
     def entries(self, known: Mapping[str, int]) -> dict[str, list[Any]]:
@@ -58,10 +64,13 @@ class Logbook(Recorded, kind="logbook"):
             known: how many of the first ones are left out, by list.
         """
         runs = self.experiments[known.get("experiments", 0) :]
+        failures = self.failures[known.get("failures", 0) :]
         return {
             "tests": plain(self.tests[known.get("tests", 0) :]),
-            "experiments": [[run.test.number, run.to_record()] for run in runs],
+            "experiments": [[run.number, run.to_record()] for run in runs],
             "asked": plain(self.asked[known.get("asked", 0) :]),
+            "failures": [[failure.test.number, failure.to_record()] for failure in failures],
+            "abandoned": plain(self.abandoned[known.get("abandoned", 0) :]),
         }
 
     @classmethod
@@ -77,12 +86,18 @@ class Logbook(Recorded, kind="logbook"):
                     f"Record {where}.tests[{number}]: expected test {number} of this campaign, found test"
                     f" {test.number} of another place; keep the tests in their order."
                 )
-        runs = read(list[tuple[int, Any]], found["experiments"], f"{where}.experiments")
+        runs = read(list[tuple[int | None, Any]], found["experiments"], f"{where}.experiments")
         for i, (number, run) in enumerate(runs):
             at = f"{where}.experiments[{i}]"
-            if not 0 <= number < len(book.tests):
-                raise InvalidInput(f"Record {at}: expected the number of a test, found {number}.")
-            book._enter(Experiment.from_record(run, book.tests[number]))
+            replayed = _attached(run, setup) if number is None else book._numbered(number, at)
+            book._enter(Experiment.from_record(run, replayed))
+        failures = read(list[tuple[int, Any]], found["failures"], f"{where}.failures")
+        for i, (number, failure) in enumerate(failures):
+            at = f"{where}.failures[{i}]"
+            book.failures.append(Failure.from_record(failure, book._numbered(number, at)))
+        book.abandoned = read(list[int], found["abandoned"], f"{where}.abandoned")
+        for i, number in enumerate(book.abandoned):
+            book._numbered(number, f"{where}.abandoned[{i}]")
         book.asked = read(list[tuple[int, TestLoop | Planned]], found["asked"], f"{where}.asked")
         if not all(0 <= asked.test < len(book.tests) for _, asked in book.asked):
             raise InvalidInput(
@@ -105,7 +120,7 @@ class Logbook(Recorded, kind="logbook"):
                 " another campaign."
             )
         book = self.copied()
-        book.experiments, book.selected = [], self.setup.none_selected()
+        book.experiments, book.selected, book.attached = [], self.setup.none_selected(), None
         for run in self.experiments[:told]:
             book._enter(run)
         return book
@@ -114,13 +129,14 @@ class Logbook(Recorded, kind="logbook"):
         """The same entries in a book of its own."""
         book = Logbook(self.setup)
         book.tests, book.experiments, book.asked = list(self.tests), list(self.experiments), list(self.asked)
-        book.selected, book.identity = self.selected, self.identity
+        book.failures, book.abandoned = list(self.failures), list(self.abandoned)
+        book.selected, book.attached, book.identity = self.selected, self.attached, self.identity
         return book
 
     @property
     def revision(self) -> int:
         """Number of entries; it grows with each."""
-        return len(self.tests) + len(self.experiments)
+        return len(self.tests) + len(self.experiments) + len(self.failures) + len(self.abandoned)
 
     def new_test(
         self,
@@ -166,6 +182,17 @@ class Logbook(Recorded, kind="logbook"):
         self.tests.append(test)
         return test
 
+    def of_task(self, genes: Floats, number: int) -> Test:
+        """A test of the campaign's own task without excitation; it is not entered.
+
+        Args:
+            genes: gains (size,), in their units.
+            number: that it is given.
+        """
+        setup = self.setup
+        ends = setup.initial_state, setup.target_state
+        return Test(setup.family, genes, *ends, setup.steps, number=number, campaign=self.identity)
+
     def enter_loop(self, iteration: int, test: Test, search: _core.TestSearch) -> None:
         """Enters the test loop that gave a test.
 
@@ -196,36 +223,122 @@ class Logbook(Recorded, kind="logbook"):
         """
         self.asked.append((iteration, planned))
 
-    def tell(
-        self, test: object, trajectory: Trajectory, judge: Callable[[_core.SelectedTests], float | None]
-    ) -> None:
+    def tell(self, test: object, trajectory: object, judge: Judge, least: int = 2) -> None:
         """Enters an experiment.
 
         Args:
             test: that was run.
             trajectory: what the system answered.
             judge: the error on it of what is known so far.
+            least: steps that it must have.
 
         Raises:
             InvalidInput: a test of another campaign, or a trajectory that cannot be learnt from.
         """
-        known = self._known(test)
-        check_recorded(trajectory, self.setup.signals, known.steps, self.setup.options.divergence_factor)
-        trajectory = continued(trajectory, self.setup.signals, known.initial_state)
-        _check_first_reading(trajectory, known)
-        before = judge(_with_run(self.setup.none_selected(), known, trajectory))
-        complete = trajectory.ended == "completed" and trajectory.steps == known.steps
-        distance = None
-        if complete:
-            distance = final_distance(trajectory.states[-1], known.target_state, self.setup.signals)
-        quality = distance
-        if complete and self.setup.preset != "paper":
-            quality = self.setup.quality.flown(trajectory, known.target_state)
-        self._enter(
-            Experiment(
-                known, trajectory, before, frozen_error(trajectory, self.setup.signals), distance, quality
-            )
+        known, signals = self.known(test), self.setup.signals
+        recorded = check_recorded(
+            trajectory, signals, known.steps, self.setup.options.divergence_factor, least
         )
+        recorded = continued(recorded, signals, known.initial_state)
+        _check_first_reading(recorded, known)
+        before = judge(_with_run(self._none(known), known, recorded))
+        distance = quality = None
+        if recorded.ended == "completed" and recorded.steps == known.steps:
+            distance = quality = final_distance(recorded.states[-1], known.target_state, signals)
+            if self.setup.preset != "paper":
+                quality = self.setup.quality.flown(recorded, known.target_state)
+        self._enter(Experiment(known, recorded, before, frozen_error(recorded, signals), distance, quality))
+
+    def attach(self, trajectory: object, judge: Judge) -> None:
+        """Enters a run that nobody asked for.
+
+        Args:
+            trajectory: what was recorded, of any length.
+            judge: the error on it of what is known so far.
+
+        Raises:
+            InvalidInput: a trajectory that cannot be learnt from.
+        """
+        signals = self.setup.signals
+        recorded = check_recorded(trajectory, signals, None, self.setup.options.divergence_factor)
+        recorded = continued(recorded, signals, recorded.states[0])
+        replayed = driven(signals, recorded.states[0], recorded.commands)
+        before = judge(_with_run(self._none(replayed), replayed, recorded))
+        self._enter(
+            Experiment(replayed, recorded, before, frozen_error(recorded, signals), None, None, attached=True)
+        )
+
+    def fail(self, test: object, reason: str, partial: Trajectory | None, judge: Judge) -> None:
+        """Enters that a test failed on the system.
+
+        Args:
+            test: that was flown.
+            reason: what happened.
+            partial: what was recorded until then, of at least one step.
+            judge: the error on it of what is known so far.
+
+        Raises:
+            InvalidInput: a test of another campaign, no reason, or a record that cannot be learnt from.
+        """
+        known = self.known(test)
+        if not isinstance(reason, str) or not reason.strip():
+            raise InvalidInput(
+                f"Campaign.tell_failed, reason: expected what happened, in words, found {reason!r}; write it down."
+            )
+        if isinstance(partial, Trajectory):
+            ended = "diverged" if partial.ended == "diverged" else "aborted"
+            partial = dataclasses.replace(partial, ended=ended, reason=reason)
+        if partial is not None:
+            self.tell(known, partial, judge, least=1)
+        self.failures.append(Failure(known, reason, recorded=partial is not None))
+
+    def abandon(self, test: object) -> None:
+        """Enters that a test will not be flown.
+
+        Args:
+            test: that was asked for.
+
+        Raises:
+            InvalidInput: a test of another campaign, or one that was flown.
+        """
+        known = self.known(test)
+        if known.number in self.flown:
+            raise InvalidInput(
+                f"Campaign.abandon: expected a test that was not flown, found test {known.number}, of which"
+                " a run was told; nothing is left to abandon."
+            )
+        self.abandoned.append(known.number)
+
+    @property
+    def flown(self) -> set[int]:
+        """Numbers of the tests that were flown, whatever became of them."""
+        told = {run.test.number for run in self.experiments if run.test is not None}
+        return told | {failure.test.number for failure in self.failures}
+
+    @property
+    def outcomes(self) -> int:
+        """Number of experiments and failures; it grows with each."""
+        return len(self.experiments) + len(self.failures)
+
+    @property
+    def runs(self) -> int:
+        """Runs of tests on the system, the failed ones too."""
+        told = sum(run.test is not None for run in self.experiments)
+        return told + sum(not failure.recorded for failure in self.failures)
+
+    def status(self, test: object) -> str:
+        """Where a test is in its life: "asked", "flown", "aborted", "failed" or "abandoned".
+
+        Args:
+            test: of this campaign.
+        """
+        number = self.known(test).number
+        runs = [run for run in self.experiments if run.number == number]
+        if any(failure.test.number == number for failure in self.failures):
+            return "failed"
+        if runs:
+            return "flown" if any(run.complete for run in runs) else "aborted"
+        return "abandoned" if number in self.abandoned else "asked"
 
     def measured(self, test: int) -> float | None:
         """Quality of a test on the system, mean over complete runs; None if there was none.
@@ -233,26 +346,55 @@ class Logbook(Recorded, kind="logbook"):
         Args:
             test: its number.
         """
-        values = [
-            run.quality for run in self.experiments if run.test.number == test and run.quality is not None
-        ]
+        values = [run.quality for run in self.experiments if run.number == test and run.quality is not None]
         return math.fsum(values) / len(values) if values else None
 
-    def best(self) -> Test:
-        """The flown test of the best quality; the first one if no run was complete.
+    def best(self) -> Test | None:
+        """The flown test of the best quality; the first one if no run was complete, None if no test was flown.
 
-        Tests that left the envelope, of which the paper knows nothing, come after all others; then those that began or
-        led elsewhere than the campaign's own task, whose quality says nothing of it.
+        Tests that are not known to fly, of which the paper knows nothing, come after all others; then those that began
+        or led elsewhere than the campaign's own task, whose quality says nothing of it.
         """
 
-        def rank(test: Test) -> tuple[bool, bool, float]:
+        def rank(test: Test) -> tuple[bool, bool, bool, float]:
             measured = self.measured(test.number)
             if measured is None:
-                return True, True, math.inf
-            left = self.setup.preset != "paper" and self.left_envelope(test.number)
-            return left, not self.on_task(test), measured
+                return True, True, True, math.inf
+            unfit = self.setup.preset != "paper" and not self.flies(test.number)
+            return False, unfit, not self.on_task(test), measured
 
-        return min((run.test for run in self.experiments), key=rank)
+        flown = (run.test for run in self.experiments if run.test is not None)
+        return min(flown, key=rank, default=None)
+
+    def first_flown(self) -> Experiment | None:
+        """The first run of a test, if there is any."""
+        return next((run for run in self.experiments if run.test is not None), None)
+
+    def flies(self, test: int) -> bool:
+        """Whether a test is known to fly: each of its runs went to its end inside the envelope.
+
+        Args:
+            test: its number.
+        """
+        runs = [run for run in self.experiments if run.number == test]
+        return bool(runs) and all(run.kept_envelope for run in runs) and not self.failed(test)
+
+    def finishes(self, test: int) -> bool:
+        """Whether each run of a test went to its end, inside the envelope or not.
+
+        Args:
+            test: its number.
+        """
+        runs = [run for run in self.experiments if run.number == test]
+        return bool(runs) and all(run.complete for run in runs) and not self.failed(test)
+
+    def failed(self, test: int) -> bool:
+        """Whether a test has failed on the system.
+
+        Args:
+            test: its number.
+        """
+        return any(failure.test.number == test for failure in self.failures)
 
     def on_task(self, test: Test) -> bool:
         """Whether a test begins and leads where the campaign does.
@@ -263,21 +405,16 @@ class Logbook(Recorded, kind="logbook"):
         ends = (test.initial_state, self.setup.initial_state), (test.target_state, self.setup.target_state)
         return all(np.array_equal(*pair) for pair in ends)
 
-    def left_envelope(self, test: int) -> bool:
-        """Whether any run of a test left the envelope.
+    def waiting(self) -> list[Test]:
+        """Tests that were asked for, and neither told nor abandoned, in their order."""
+        done = self.flown | set(self.abandoned)
+        return [self.tests[entry.test] for _, entry in self.asked if entry.test not in done]
 
-        Args:
-            test: its number.
-        """
-        return any(run.left_envelope for run in self.experiments if run.test.number == test)
-
-    def waiting(self) -> Test | None:
-        """The first test that was asked for and not told; before the first flight, the last that was made."""
-        told = {run.test.number for run in self.experiments}
-        for _, loop in self.asked:
-            if loop.test not in told:
-                return self.tests[loop.test]
-        return self.tests[-1] if self.tests and not told else None
+    def made(self) -> Test | None:
+        """Before there is a run of any test: the last one that was made, and neither failed nor was abandoned."""
+        done = self.flown | set(self.abandoned)
+        left = [test for test in self.tests if test.number not in done]
+        return left[-1] if left and self.first_flown() is None else None
 
     def with_plans(self, records: Sequence[Lesson]) -> tuple[Lesson, ...]:
         """Lessons with the tests that were planned after each.
@@ -317,21 +454,55 @@ class Logbook(Recorded, kind="logbook"):
 
     def _enter(self, run: Experiment) -> None:
         check_recorded(
-            run.trajectory, self.setup.signals, run.test.steps, self.setup.options.divergence_factor
+            run.trajectory,
+            self.setup.signals,
+            run.replayed.steps,
+            self.setup.options.divergence_factor,
+            least=1,
         )
-        self.selected = _with_run(self.selected, run.test, run.trajectory)
+        if run.attached:
+            self.attached = _with_run(self.attached or self._none(run.replayed), run.replayed, run.trajectory)
+        else:
+            self.selected = _with_run(self.selected, run.replayed, run.trajectory)
         self.experiments.append(run)
 
-    def _known(self, test: object) -> Test:
+    def _numbered(self, number: int, where: str) -> Test:
+        if not 0 <= number < len(self.tests):
+            raise InvalidInput(f"Record {where}: expected the number of a test, found {number}.")
+        return self.tests[number]
+
+    def _none(self, test: Test) -> _core.SelectedTests:
+        """No selected tests yet, of the family of a test."""
+        with engine_input():
+            return _core.SelectedTests(
+                self.setup.signals.engine, test.family.engine, self.setup.options.divergence_factor
+            )
+
+    def known(self, test: object) -> Test:
+        """A test of this campaign.
+
+        Args:
+            test: to be looked up.
+
+        Raises:
+            InvalidInput: it is none.
+        """
         check_signals(test, self.setup.signals)
         assert isinstance(test, Test)  # check_signals has refused everything else
         if test.number >= len(self.tests) or not self.tests[test.number].same_as(test):
             raise InvalidInput(
-                f"Campaign.tell: expected a test of this campaign as it was made, found test {test.number} "
+                f"Campaign: expected a test of this campaign as it was made, found test {test.number} "
                 "of another one, or changed; "
                 "tell it to the campaign that made it, or make it here with campaign.test(gains)."
             )
         return self.tests[test.number]
+
+
+def _attached(record: object, setup: Setup) -> Test:
+    """What a twin flies to be compared with a recorded run that nobody asked for."""
+    found = record.get("trajectory") if isinstance(record, Mapping) else None
+    trajectory = Trajectory.from_record(found)
+    return driven(setup.signals, trajectory.states[0], trajectory.commands)
 
 
 def _with_run(selected: _core.SelectedTests, test: Test, run: Trajectory) -> _core.SelectedTests:

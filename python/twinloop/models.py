@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop.arrays import Floats, floats, number
-from twinloop.controllers import PID, Mixer
 from twinloop.elementary import exp
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.exports.export import Source, asked, c_name, exported
-from twinloop.flight import fly
+from twinloop.flight import driven, fly
 from twinloop.law.equations import equations
 from twinloop.law.law import Law
 from twinloop.linear.plant import Linear, linearised, resting, trimmed
@@ -34,9 +33,10 @@ class TestErrors(Recorded, kind="test_errors"):
     """How well a twin follows one selected test.
 
     Args:
-        test: number of the test; a replicate has a row of its own.
+        test: number of the test, None for a run that nobody asked for; a replicate has a row of its own.
         open_loop: mean squared error one step ahead, over steps and components, SI units squared.
-        closed_loop: mean squared error of the free run under the test's own controller, the same units.
+        closed_loop: mean squared error of the free run under the test's own controller, or, for a run that nobody asked
+            for, under its recorded commands; the same units.
         normalised: closed_loop over that of the model that never moves; 1 means useless.
         before: closed-loop error of the twin that the last `ask` before it knew; None if nothing was asked yet.
         after: closed-loop error now.
@@ -44,7 +44,7 @@ class TestErrors(Recorded, kind="test_errors"):
 
     __test__ = False
 
-    test: int
+    test: int | None
     open_loop: float
     closed_loop: float
     normalised: float
@@ -64,8 +64,9 @@ class ErrorTable(tuple[TestErrors, ...]):
         lines = [head]
         for row in self:
             before = "-" if row.before is None else f"{row.before:.4g}"
+            test = "-" if row.test is None else row.test
             lines.append(
-                f"{row.test:>4}  {row.open_loop:>10.4g}  {row.closed_loop:>11.4g}  {row.normalised:>10.4g}  "
+                f"{test:>4}  {row.open_loop:>10.4g}  {row.closed_loop:>11.4g}  {row.normalised:>10.4g}  "
                 f"{before:>10}  {row.after:>10.4g}"
             )
         return "\n".join(lines)
@@ -428,11 +429,7 @@ class Twin(Recorded, kind="twin"):
         u = floats("Commands", commands, (None, self.signals.n_u))
         if len(u) == 0:
             return Trajectory(np.zeros(1), state[np.newaxis], u)
-        # A controller that asks for nothing, so that there is no second loop: the commands are its excitation.
-        name = self.signals.state_names[0]
-        gains = {f"{name}.{term}": (0.0, 1.0) for term in ("kp", "ki", "kd")}
-        nothing = PID(axes=[(name, None)], gains=gains, output=Mixer(np.zeros((self.signals.n_u, 1))))
-        test = Test(nothing.bind(self.signals), np.zeros(3), state, state, len(u), excitation=u)
+        test = driven(self.signals, state, u)
         return fly(self.model, test, divergence_factor=self.divergence_factor)
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.campaign import Campaign
+from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.errors import NotAvailable
 from twinloop.objectives import normalised_error
 from twinloop.presets import DefaultOptions
@@ -97,7 +97,7 @@ def _normalised(campaign: Campaign) -> dict[int, list[tuple[float, float]]]:
             for record in campaign.history
             if test in record.tests
         ]
-        for test in dict.fromkeys(run.test.number for run in campaign.experiments)
+        for test in dict.fromkeys(run.test.number for run in campaign.experiments if run.test is not None)
     }
 
 
@@ -106,10 +106,11 @@ def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
     learnt: dict[int, float] = {}
     for record in campaign.history:
         for test in record.tests:
-            learnt.setdefault(test, float(record.iteration))
+            if test is not None:
+                learnt.setdefault(test, float(record.iteration))
     label = "before it was learnt"
     for i, run in enumerate(campaign.experiments):
-        if run.before is None or not run.before > 0.0 or run.test.number not in learnt:
+        if run.before is None or not run.before > 0.0 or run.test is None or run.test.number not in learnt:
             continue
         axes.plot(
             learnt[run.test.number] - 1.0, normalised_error(run.before, run.frozen),
@@ -124,11 +125,12 @@ def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
 
 
 def _qualities(axes: Any, campaign: Campaign, label: str) -> None:
-    flown = [(run.test.number, run.quality) for run in campaign.experiments if run.quality is not None]
+    flown = [(run.number, run.quality) for run in campaign.experiments if run.quality is not None]
+    tests = [run.test for run in campaign.experiments if run.test is not None]
     foretold = [
-        (run.test.number, run.test.predicted, run.test.spread or 0.0)
-        for run in campaign.experiments
-        if run.test.predicted is not None and math.isfinite(run.test.predicted)
+        (test.number, test.predicted, test.spread or 0.0)
+        for test in tests
+        if test.predicted is not None and math.isfinite(test.predicted)
     ]
     numbers = [number for number, _, _ in foretold]
     axes.plot(
@@ -140,8 +142,8 @@ def _qualities(axes: Any, campaign: Campaign, label: str) -> None:
         yerr=[spread for _, _, spread in foretold],
         color=TWIN, marker="D", markersize=4.5, linestyle="none", capsize=3.0, label="predicted ± spread",
     )  # fmt: skip
-    best = campaign.best_test
-    if best.predicted is not None and math.isfinite(best.predicted):
+    best = controller_to_fly(campaign)[0]
+    if best is not None and best.predicted is not None and math.isfinite(best.predicted):
         axes.axhline(
             best.predicted, color=TWIN, linewidth=0.8, linestyle=":", label="controller to fly, predicted"
         )
@@ -195,17 +197,20 @@ def _runs(figure: Any, campaign: Campaign) -> None:
     banded = twin.noise is not None
     rows = len(states) + banded
     grid = figure.subplots(rows, len(runs), sharex=True, sharey="row", squeeze=False)
-    best = campaign.best_test.number
+    best = controller_to_fly(campaign)[0]
     for column, run in enumerate(runs):
-        predicted = twin.simulate(twin.as_flown(run.test, run.trajectory))
+        predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
         start = run.trajectory.t[0]
-        title = f"test {run.test.number}" + (" (best)" if run.test.number == best else "")
+        title = "attached" if run.test is None else f"test {run.test.number}"
+        if run.test is not None and best is not None and run.test.number == best.number:
+            title += " (best)"
         grid[0, column].set_title(title, loc="left")
         for row, state in enumerate(states):
             axes, (factor, unit) = grid[row, column], shown_unit(state.unit)
             flown = factor * run.trajectory.states[:, row]
-            target = factor * _near(run.test.target_state[row], run.trajectory.states[-1, row], state)
-            axes.axhline(target, color=TARGET, linewidth=0.8, linestyle=":", label="target")
+            if run.test is not None:
+                target = factor * _near(run.test.target_state[row], run.trajectory.states[-1, row], state)
+                axes.axhline(target, color=TARGET, linewidth=0.8, linestyle=":", label="target")
             if predicted.band is not None:
                 low, high = factor * predicted.band[:, :, row]
                 axes.fill_between(predicted.t, low, high, label="90 % band of the twin", **BAND)

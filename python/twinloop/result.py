@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.campaign import Campaign
+from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.controllers import Gain
 from twinloop.flight import fly
 from twinloop.history import Experiment, Lesson
@@ -44,9 +44,8 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         KeyboardInterrupt: while learning; calling again gives the best so far.
         NotAvailable: nothing was told.
     """
-    twin, best = campaign.twin, campaign.best_test
+    twin, (best, why) = campaign.twin, controller_to_fly(campaign)
     identified = isinstance(campaign.options, DefaultOptions)
-    first = campaign.experiments[0]
     result: dict[str, object] = {
         "system": dict(system),
         "preset": campaign.setup.preset,
@@ -82,31 +81,55 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "program": str(twin.model.program).splitlines(),
             "intron_share": twin.model.program.intron_share,
         },
-        "controller": {
-            "test": best.number,
-            "gains": [
-                {
-                    "name": gain.name,
-                    "value": best.parameters[gain.name],
-                    "unit": gain.unit,
-                    "low": gain.low if isinstance(gain, Gain) else None,
-                    "high": gain.high if isinstance(gain, Gain) else None,
-                }
-                for gain in campaign.family.law_gains
-            ],
-            "predicted": best.predicted,
-            "measured": best.measured,
-        },
-        "first_controller": {
-            "test": first.test.number,
-            "gains": first.test.parameters,
-            "measured": first.quality if identified else first.final_distance,
-        },
+        "failures": [
+            {"test": failure.test.number, "gains": failure.test.parameters, "reason": failure.reason}
+            for failure in campaign.failures
+        ],
+        "controller": None if best is None else _controller(campaign, best, identified),
+        "no_controller": why or None,
+        "first_controller": _first_controller(campaign, twin, identified),
         "run_info": dict(run_info),
     }
     if identified:
-        _add_identified(result, campaign)
+        _add_identified(result, campaign, best)
     return plain_dict(result)
+
+
+def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, object]:
+    found: dict[str, object] = {
+        "test": best.number,
+        "gains": [
+            {
+                "name": gain.name,
+                "value": best.parameters[gain.name],
+                "unit": gain.unit,
+                "low": gain.low if isinstance(gain, Gain) else None,
+                "high": gain.high if isinstance(gain, Gain) else None,
+            }
+            for gain in campaign.family.law_gains
+        ],
+        "predicted": best.predicted,
+        "measured": best.measured,
+    }
+    if identified:
+        flown = any(run.number == best.number for run in campaign.experiments)
+        found |= {"spread": best.spread, "risk": best.risk, "why": best.reason, "flown": flown}
+    return found
+
+
+def _first_controller(campaign: Campaign, twin: Twin, identified: bool) -> dict[str, object] | None:
+    """Of the first test that was flown; None where none was."""
+    for run in campaign.experiments:
+        if run.test is not None:
+            found: dict[str, object] = {
+                "test": run.test.number,
+                "gains": run.test.parameters,
+                "measured": run.quality if identified else run.final_distance,
+            }
+            return found | (
+                {"predicted": _first_predicted(campaign, twin, run.test.quiet())} if identified else {}
+            )
+    return None
 
 
 def quality_unit(quality: Quality) -> str:
@@ -133,36 +156,37 @@ def quality_unit(quality: Quality) -> str:
 
 
 def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str, object]:
+    test = run.test
+    predicted = None if test is None else test.predicted
     found: dict[str, object] = {
-        "test": run.test.number,
-        "gains": run.test.parameters,
+        "test": run.number,
+        "gains": None if test is None else test.parameters,
         "ended": run.trajectory.ended,
         "reason": run.trajectory.reason,
         "steps": run.trajectory.steps,
-        "predicted": run.test.predicted,
+        "predicted": predicted,
         "measured": run.quality if identified else run.final_distance,
         **{key: value for key, value in dataclasses.asdict(row).items() if key != "test"},
         "frozen": run.frozen,
     }
     if identified:
-        both = run.test.predicted is not None and run.quality is not None
+        both = predicted is not None and run.quality is not None
         found |= {
-            "spread": run.test.spread,
-            "predicted_minus_measured": run.test.predicted - run.quality if both else None,  # type: ignore[operator]
-            "risk": run.test.risk,
-            "why": run.test.reason,
-            "excited": run.test.excitation is not None,
+            "spread": None if test is None else test.spread,
+            "predicted_minus_measured": predicted - run.quality if both else None,  # type: ignore[operator]
+            "risk": None if test is None else test.risk,
+            "why": "" if test is None else test.reason,
+            "excited": test is not None and test.excitation is not None,
             "final_distance": run.final_distance,
             "normalised_before": None if row.before is None else normalised_error(row.before, run.frozen),
         }
     return found
 
 
-def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
+def _add_identified(result: dict[str, Any], campaign: Campaign, best: Test | None) -> None:
     """What only the preset `default` knows: noise, actuators, what is left, what another experiment would bring."""
-    twin, best, lesson = campaign.twin, campaign.best_test, campaign.history[-1]
+    twin, lesson = campaign.twin, campaign.history[-1]
     assert isinstance(lesson, Lesson)
-    first = campaign.experiments[0].test.quiet()
     result["twin"] |= {
         "terms": lesson.terms,
         "misfit": lesson.misfit,
@@ -195,13 +219,6 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
         "disturbances": _disturbances(campaign, twin, lesson),
         "remarks": list(lesson.remarks),
     }
-    result["controller"] |= {
-        "spread": best.spread,
-        "risk": best.risk,
-        "why": best.reason,
-        "flown": any(run.test.number == best.number for run in campaign.experiments),
-    }
-    result["first_controller"]["predicted"] = _first_predicted(campaign, twin, first)
     result["advice"] = _advice(campaign, twin, best)
 
 
@@ -229,7 +246,7 @@ def _errors_by_state(campaign: Campaign, twin: Twin) -> list[float]:
     """Root mean square of flown minus simulated over all flights, for each state in its unit."""
     squares, rows = np.zeros(campaign.signals.n_x), 0
     for run in campaign.experiments:
-        test = twin.as_flown(run.test, run.trajectory)
+        test = twin.as_flown(run.replayed, run.trajectory)
         # Without the committee's band, which `twin.simulate` would draw for each flight.
         simulated = fly(twin.model, test, divergence_factor=twin.divergence_factor).states[1:]
         flown = run.trajectory.states[1 : len(simulated) + 1]
@@ -244,15 +261,15 @@ def _first_predicted(campaign: Campaign, twin: Twin, first: Test) -> float | Non
     return None if np.isnan(values).any() else float(np.mean(values))
 
 
-def _advice(campaign: Campaign, twin: Twin, best: Test) -> dict[str, object]:
+def _advice(campaign: Campaign, twin: Twin, best: Test | None) -> dict[str, object]:
     """What another experiment would bring, by the committee's own estimate, beside what a repeated flight scatters."""
     lessons = [lesson for lesson in campaign.history if isinstance(lesson, Lesson)]
     judged = [(plan, lesson) for lesson in lessons for plan in lesson.asked if math.isfinite(plan.predicted)]
     gain = judged[-1][0].gain if judged else None
     # A model that does not follow its own runs, then or now, can advise nobody.
     trusted = bool(judged) and judged[-1][1].follows and lessons[-1].follows
-    scatter = _scatter(campaign, twin, best)
-    quality = best.predicted if best.measured is None else best.measured
+    scatter = None if best is None else _scatter(campaign, twin, best)
+    quality = None if best is None else best.predicted if best.measured is None else best.measured
     known = gain is not None and quality is not None and math.isfinite(quality) and quality > 0.0
     return {
         "before_test": judged[-1][0].test if judged else None,

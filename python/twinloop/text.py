@@ -99,13 +99,13 @@ def _errors(result: Mapping[str, Any]) -> str:
     return "ERRORS OF THE TWIN, ONE ROW A TEST\n" + table(head, rows) + "\n" + note
 
 
-def _gains(best: Mapping[str, Any], first: Mapping[str, Any]) -> list[list[object]]:
+def _gains(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[list[object]]:
     """A row a gain: name, value, the first controller's, unit, bounds."""
     return [
         [
             gain["name"],
             gain["value"],
-            first["gains"][gain["name"]],
+            None if first is None else first["gains"][gain["name"]],
             gain["unit"],
             "fixed" if gain["low"] is None else f"{gain['low']:g} to {gain['high']:g}",
         ]
@@ -259,14 +259,22 @@ def _flights(result: Mapping[str, Any]) -> str:
     keys = ("test", "predicted", "spread", "measured", "predicted_minus_measured", "risk")
     rows = [[run[key] for key in keys] for run in result["experiments"]]
     reasons = [
-        f"Test {run['test']}: {run['why'] or _own(run)}"
-        + (f" It was cut: {run['reason']}." if run["reason"] else "")
+        _of_run(run) + (f" It was cut: {run['reason']}." if run["reason"] else "")
         for run in result["experiments"]
+    ]
+    reasons += [
+        f"Test {failure['test']} failed: {failure['reason']}." for failure in result.get("failures", ())
     ]
     measure = result["quality"]
     title = f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; less is better."
     note = "Spread: standard deviation over the committee. Risk: probability that the flight leaves the envelope."
     return "\n".join([title, table(head, rows), note, *reasons])
+
+
+def _of_run(run: Mapping[str, Any]) -> str:
+    if run["test"] is None:
+        return f"A run of {run['steps']} steps that nobody asked for."
+    return f"Test {run['test']}: {run['why'] or _own(run)}"
 
 
 def _own(run: Mapping[str, Any]) -> str:
@@ -275,15 +283,15 @@ def _own(run: Mapping[str, Any]) -> str:
 
 def _controller_to_fly(result: Mapping[str, Any]) -> str:
     best, first = result["controller"], result["first_controller"]
+    if best is None:
+        return f"NO CONTROLLER TO FLY\n{result['no_controller'].removeprefix('No controller to fly: ')}"
     gains = _gains(best, first)
     state = f"TEST {best['test']}, FLOWN" if best["flown"] else "NOT FLOWN YET"
-    qualities = [
-        ["this controller", best["predicted"], best["spread"], best["measured"]],
-        ["first controller", first["predicted"], None, first["measured"]],
-    ]
-    excited = (
-        "\nThe first controller was excited when it was flown." if result["experiments"][0]["excited"] else ""
-    )
+    qualities = [["this controller", best["predicted"], best["spread"], best["measured"]]]
+    if first is not None:
+        qualities.append(["first controller", first["predicted"], None, first["measured"]])
+    gently = any(run["excited"] for run in result["experiments"][:1])
+    excited = "\nThe first controller was excited when it was flown." if gently else ""
     return "\n".join(
         [
             f"CONTROLLER TO FLY: {state}",

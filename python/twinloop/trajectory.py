@@ -75,14 +75,17 @@ class Trajectory(Recorded, kind="trajectory"):
         return len(self.commands)
 
 
-def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_factor: float) -> Trajectory:
+def check_recorded(
+    trajectory: object, signals: Signals, steps: int | None, divergence_factor: float, least: int = 2
+) -> Trajectory:
     """Refuses what cannot be learnt from.
 
     Args:
         trajectory: what a system answered.
         signals: what it should consist of.
-        steps: how many steps the test asked for.
+        steps: how many steps the test asked for; None where nobody asked.
         divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+        least: steps that it must have.
 
     Returns:
         The trajectory, unchanged.
@@ -103,12 +106,12 @@ def check_recorded(trajectory: object, signals: Signals, steps: int, divergence_
             raise InvalidInput(
                 f"Trajectory: expected {expected} {what} as in the signals, found {found}; check the columns."
             )
-    if trajectory.steps < 2:
+    if trajectory.steps < least:
         raise InvalidInput(
-            f"Trajectory: expected at least 2 steps to learn from, found {trajectory.steps}; run the test"
-            " again."
+            f"Trajectory: expected at least {least} step{'s' if least > 1 else ''} to learn from, found"
+            f" {trajectory.steps}; run the test again."
         )
-    if trajectory.steps > steps:
+    if steps is not None and trajectory.steps > steps:
         raise InvalidInput(
             f"Trajectory: expected at most the {steps} steps of the test, found {trajectory.steps}; cut the"
             " record."

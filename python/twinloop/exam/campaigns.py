@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twinloop.campaign import Campaign
+from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.exam import quality
 from twinloop.exam.held_out import PENALTY, HeldOut
 from twinloop.exam.kinds import Campaigner
@@ -68,7 +68,7 @@ def campaign(
         following = loop.ask() if k < experiments else None
         twin = loop.twin
         measures["ask_seconds" if following is not None else "learn_seconds"] = time.monotonic() - started
-        measures |= of_twin(twin, held_out) | of_controller(subject, loop.best_test)
+        measures |= of_twin(twin, held_out) | of_controller(subject, controller_to_fly(loop)[0])
         yield k, measures, flight, time.monotonic() - clock
         clock = time.monotonic()
         test = test if following is None else following
@@ -118,17 +118,17 @@ def of_twin(twin: Twin, held_out: HeldOut) -> dict[str, float | None]:
     }
 
 
-def of_controller(subject: Subject, best: Test) -> dict[str, float | None]:
+def of_controller(subject: Subject, best: Test | None) -> dict[str, float | None]:
     """True quality of the controller to fly.
 
     Args:
         subject: the system.
-        best: test with the controller's gains.
+        best: test with the controller's gains; None where there is no controller to fly.
 
     Returns:
         Measures by name.
     """
-    return {"quality": subject.judged(subject.test(best.genes, best.family))}
+    return {"quality": None if best is None else subject.judged(subject.test(best.genes, best.family))}
 
 
 def of_flight(subject: Subject, test: Test, flight: Trajectory) -> dict[str, float | None]:

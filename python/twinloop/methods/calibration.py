@@ -79,7 +79,7 @@ def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergenc
     left = []
     for flight in flights:
         states = flight.trajectory.states
-        test = dataclasses.replace(flight.test, initial_state=states[0])
+        test = dataclasses.replace(flight.replayed, initial_state=states[0])
         free = fly(model, test, divergence_factor=divergence_factor).states
         rows = min(len(states), len(free))
         errors = test.family.signals.difference(states[:rows], free[:rows])

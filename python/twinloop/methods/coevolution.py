@@ -120,7 +120,9 @@ class Coevolution:
 
     def best_test(self, book: Logbook) -> Test:
         """The flown test that ended nearest to its target."""
-        best = book.best().quiet()
+        best = book.best()
+        assert best is not None  # the paper learns tests only
+        best = best.quiet()
         return best.judged(self._predicted(best.genes), book.measured(best.number))
 
     def first_excitation(self, number: int) -> Floats | None:

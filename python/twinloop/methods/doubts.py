@@ -54,7 +54,7 @@ def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, s
         said.append(
             f"{copies} of {len(experiments)} records equal an earlier one to the last bit: they were learnt from once."
         )
-    if all(run.quality is None for run in experiments):
+    if not any(run.complete for run in experiments):
         longest = max(run.trajectory.steps for run in experiments)
         said.append(
             f"No run was complete, the longest had {longest} of {steps} steps: what comes after them nobody has seen."

@@ -19,11 +19,12 @@ from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.logbook import Logbook
 from twinloop.methods.calibration import OF_PARTS, factor, left_of_flights, needed_factor
+from twinloop.methods.choice import Choice
 from twinloop.methods.doubts import distinct, doubts
-from twinloop.methods.errors import errors
+from twinloop.methods.errors import errors, free_runs
 from twinloop.models import TestErrors, Twin
-from twinloop.objectives import closed_loop, normalised_error
-from twinloop.planning.judging import Committee, Task, expected, risk
+from twinloop.objectives import normalised_error
+from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner
 from twinloop.presets import DefaultOptions
 from twinloop.records import Record, Recorded
@@ -43,8 +44,6 @@ STEPS = (
     "candidates",
 )
 """What there is to see while it works, in order."""
-DOUBT = 3.0
-"""Standard deviations of predicted flights by which they may be worse than one that was measured."""
 FEWEST = 4
 """Members of a committee that are kept in any case."""
 WRONG = 0.5
@@ -82,7 +81,7 @@ class Memory(Recorded, kind="memory_of_default"):
     Args:
         asked: what was known when the last test was asked for. Learning begins here, whoever looks in between.
         latest: what was learnt last; shown to whoever looks, and used by `ask` if it is of all that was told.
-        gains: tuned on the latest committee, after so many tests were told.
+        gains: tuned on the latest committee, after so many experiments and failures.
         best: the controller to fly, at the revision of the logbook that it was chosen at.
     """
 
@@ -114,7 +113,7 @@ class IdentifyAndPlan:
         self.workers = workers
         self.report = report
         self.memory = Memory()
-        self._told: tuple[int, ...] = ()
+        self._told: tuple[int | None, ...] = ()
         task = Task(setup.initial_state, setup.target_state, setup.steps)
         self.planner = Planner(
             setup.family,
@@ -149,7 +148,7 @@ class IdentifyAndPlan:
         latest = self.memory.latest
         if latest is not None and (at_once or latest.told == len(book.experiments)):
             return
-        self._told = tuple(run.test.number for run in book.experiments)
+        self._told = tuple(run.number for run in book.experiments)
         self.memory = Memory(asked=self.memory.asked, latest=self._learnt(book))
 
     def _learnt(self, book: Logbook) -> Learnt:
@@ -167,7 +166,7 @@ class IdentifyAndPlan:
             workers=self.workers,
             watch=self._watch,
         )
-        free = closed_loop(identified.members, book.selected, self.workers)
+        free = free_runs(identified.members, book, self.workers)
         frozen = np.array([run.frozen for run in book.experiments])
         # A member that cannot follow the flights that it was learnt from is no member (E-SINDy's stability filter).
         wrong = (free > np.maximum(WRONG * frozen, 4.0 * free[0])).any(axis=1)
@@ -185,7 +184,7 @@ class IdentifyAndPlan:
         """The next test, with what is expected of it."""
         number = len(book.tests)
         if self.options.tests != "ask":
-            genes, excitation = self.planner.baseline(number, book.experiments[0].test.genes)
+            genes, excitation = self.planner.baseline(number, self._first_genes(book))
             test = book.new_test(genes, excitation=excitation, reason="No committee was asked.")
             plan = Planned(
                 test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
@@ -193,26 +192,26 @@ class IdentifyAndPlan:
             book.enter_plan(self.iteration, plan)
             self.memory = replace(self.memory, asked=self._latest())
             return test
-        committee = self._committee()
+        committee, best = self._committee(), book.best()
+        if best is None and not committee.trusted:
+            raise NotAvailable(
+                "Campaign.ask: expected a twin that follows the runs that it was learnt from, or a flown test, found"
+                " neither; fly a controller that you trust: campaign.test(gains), then campaign.tell."
+            )
         tuned = self._gains(book)
-        told = {run.test.number for run in book.experiments}
-        waiting = any(plan.test not in told for _, plan in book.asked)
-        exploit = not waiting and (
-            (last and self.options.exploit_last) or (self.setup.goal == "control" and len(told) > 1)
-        )
-        best = book.best()
         found = self.planner.propose(
             committee,
             tuned,
             Flown(
-                best.genes,
-                not book.left_envelope(best.number),
+                tuned if best is None else best.genes,
+                best is not None and book.flies(best.number),
                 [run.usage for run in book.experiments],
                 self._first_quality(book),
+                [failure.test.genes for failure in book.failures],
             ),
             self.setup.goal,
             number,
-            exploit,
+            self._exploits(book, tuned, last),
         )
         test = book.new_test(
             found.genes,
@@ -243,49 +242,8 @@ class IdentifyAndPlan:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
         if self.memory.best is not None and self.memory.best[0] == book.revision:
             return self.memory.best[1]
-        committee, best = self._committee(), book.best()
-        # That of another task says nothing of the campaign's own, and is none to be given back.
-        setup, on_task = self.setup, book.on_task(best)
-        flown = replace(best.quiet(), initial_state=setup.initial_state, target_state=setup.target_state)
-        tuned = self._gains(book)
-        genes = np.stack([tuned, flown.genes])
-        members = self.planner.lasting(committee.members, genes)
-        judged = self.planner.judge(members, genes, committee.sds, self.options.draws)
-        measured = book.measured(flown.number) if on_task else None
-        new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
-        better = float((new < old).mean())
-        elsewhere = self.planner.judge(
-            members, genes[:1], committee.sds, self.options.draws, off=_off_start(book)
-        )
-        safe = max(float(flights.usages[:, :, 0].max()) for flights in (judged, elsewhere)) <= 1.0
-        left = book.left_envelope(flown.number)
-        recorded = self.planner.judge(
-            members, genes, committee.sds, self.options.draws, measured=True
-        ).qualities
-        doubtful = measured is not None and self._doubtful(members, committee.sds, best, recorded, measured)
-        trusted = (
-            committee.trusted and safe and (left or (better >= self.options.confidence and not doubtful))
-        )
-        pick = 0 if trusted else 1
-        known = next((t for t in book.tests if t.genes.tobytes() == tuned.tobytes()), None)
-        predicted, spread = expected(recorded[:, :, pick].mean(axis=1))
-        if pick == 1:
-            reason = self._refusal(committee.trusted, safe, doubtful, better, tuned, flown.genes)
-            if left:
-                reason += " They left the envelope when they flew."
-            test = flown.judged(predicted, measured)
-        else:
-            share = f"{100 * better:.3g} %"
-            reason = f"Tuned on the twin, which prefers them to the best flown in {share} of its predictions."
-            if left:
-                reason = (
-                    "Tuned on the twin: no model sees them leave the envelope, as the best gains flown did."
-                )
-            number = len(book.tests) if known is None else known.number
-            quiet = known is not None and known.excitation is None and book.on_task(known)
-            test = replace(flown, genes=tuned, number=number)
-            test = test.judged(predicted, book.measured(number) if quiet else None)
-        answer = test.explained(spread, risk(judged.usages[:, :, pick]), reason)
+        choice = Choice(self.planner, self._committee(), book, self.options.draws, self.options.confidence)
+        answer = choice.between(self._gains(book), book.best())
         self.memory = replace(self.memory, best=(book.revision, answer))
         return answer
 
@@ -325,7 +283,7 @@ class IdentifyAndPlan:
         if known.identified.of_parts:
             return known.needed
         twin = self._twin(known, book, [])
-        needed = [needed_factor(twin, run.test, run.trajectory) for run in book.experiments[known.told :]]
+        needed = [needed_factor(twin, run.replayed, run.trajectory) for run in book.experiments[known.told :]]
         return (*known.needed, *(found for found in needed if found is not None))
 
     @property
@@ -358,23 +316,39 @@ class IdentifyAndPlan:
         lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
         return bool(np.isfinite(known.left)) and 2 * int(lost.sum()) <= len(lost)
 
+    def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
+        """Whether the tuned gains are flown as they are, unless that is what a test that is waiting does."""
+        wanted = (last and self.options.exploit_last) or (
+            self.setup.goal == "control" and len(book.flown) > 1
+        )
+        return wanted and not any(
+            test.genes.tobytes() == tuned.tobytes() and test.excitation is None for test in book.waiting()
+        )
+
+    def _first_genes(self, book: Logbook) -> Floats:
+        """Of the first test that was flown; the middle of the box where none was."""
+        first = book.first_flown()
+        if first is not None and first.test is not None:
+            return first.test.genes
+        return self.setup.family.from_unit(np.full(self.setup.family.size, 0.5))
+
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
         told = len(book.experiments)
-        if self.memory.gains is not None and self.memory.gains[0] == told:
+        if self.memory.gains is not None and self.memory.gains[0] == book.outcomes:
             return self.memory.gains[1]
         committee, asked = self._committee(), self.memory.asked
-        starts = [book.best().genes]
+        best, first = book.best(), self._first_genes(book)
+        starts = [first if best is None else best.genes]
         if asked is not None and asked.gains is not None:
             starts.append(asked.gains)
-        first = book.experiments[0].test.genes
         if first.tobytes() != starts[0].tobytes():
             starts.append(first)
         starts += self._linear_gains(committee)
         genes = self.planner.tune(committee, starts, told) if committee.trusted else starts[0]
         # What an interruption has left unlearnt must not show in what is tuned afterwards.
         if self._latest().told == told:
-            self.memory = replace(self.memory, gains=(told, genes))
+            self.memory = replace(self.memory, gains=(book.outcomes, genes))
         return genes
 
     def _linear_gains(self, committee: Committee) -> list[Floats]:
@@ -387,50 +361,17 @@ class IdentifyAndPlan:
         except (NotAvailable, InvalidInput):
             return []
 
-    def _doubtful(
-        self, members: Sequence[_core.Model], sds: Floats, flown: Test, recorded: Floats, measured: float
-    ) -> bool:
-        """Whether the twin expects less of its own gains than was measured of the best, and of that flight too."""
-        ends = flown.initial_state[np.newaxis], flown.target_state[np.newaxis]
-        excitation = None if flown.excitation is None else flown.excitation[np.newaxis]
-        again = self.planner.judge(
-            members, flown.genes[np.newaxis], sds, self.options.draws, excitation, ends, measured=True
-        )
-        least = 1.01 * measured + DOUBT * float(again.qualities.std())
-        return bool(recorded[:, :, 0].mean() > least and again.mean[0] > least)
-
-    def _refusal(
-        self, trusted: bool, safe: bool, doubtful: bool, better: float, tuned: Floats, flown: Floats
-    ) -> str:
-        """Why the best gains flown are kept."""
-        if not trusted:
-            return "The best gains flown: the twin does not follow the runs that it was learnt from."
-        if tuned.tobytes() == flown.tobytes():
-            return "The best gains flown: the twin knows no better ones."
-        if not safe:
-            return "The best gains flown: a model sees those that the twin prefers leave the envelope."
-        if doubtful:
-            return (
-                "The best gains flown: the twin expects worse of others than was measured of these, but of these it"
-                " expects worse, too, and so is not believed here."
-            )
-        share, asked = (f"{100 * part:.3g} %" for part in (better, self.options.confidence))
-        return (
-            f"The best gains flown: the twin prefers others in {share} of its predictions, and {asked} are asked"
-            " for."
-        )
-
     def _first_quality(self, book: Logbook) -> float:
         """Of the first controller, as flown or predicted; infinite where it left the envelope."""
-        first = book.experiments[0].test
-        if book.left_envelope(first.number):
+        first = book.first_flown()
+        if first is None or first.test is None or not book.flies(first.test.number):
             return float("inf")
-        measured = book.measured(first.number)
+        measured = book.measured(first.test.number)
         if measured is not None:
             return measured
         committee = self._committee()
         return float(
-            self.planner.judge(committee.members[:1], first.genes[np.newaxis], committee.sds, 1).mean[0]
+            self.planner.judge(committee.members[:1], first.test.genes[np.newaxis], committee.sds, 1).mean[0]
         )
 
     def _rests(self) -> list[Floats]:
@@ -489,10 +430,3 @@ class IdentifyAndPlan:
                 evaluations=0,
             )
         )
-
-
-def _off_start(book: Logbook) -> Floats:
-    """How far flights began from where they were asked to, root mean square of the first readings (n_x,)."""
-    signals = book.setup.signals
-    off = [signals.difference(run.trajectory.states[0], run.test.initial_state) for run in book.experiments]
-    return np.asarray(np.sqrt(np.square(off).mean(axis=0)), dtype=np.float64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -15,8 +16,27 @@ Score = Callable[[Floats], Floats]
 """Scores (K,), to be minimised, of genes (K, size)."""
 OFFSPRING = 32
 """Genes of a generation."""
+NEAR = 0.02
+"""Shares of the box by which each gain may differ before a controller is taken for another one."""
 LEAST = 1e-300
 """What a place outside the box costs where its score is zero: less than any score."""
+
+
+def nearby(family: Family, genes: Floats, others: Sequence[Floats]) -> NDArray[np.bool_]:
+    """Which genes are so close to some others that they stand for the same controller.
+
+    Args:
+        family: of the controllers.
+        genes: (K, size), in the units of the gains.
+        others: each (size,), likewise; may be none.
+
+    Returns:
+        A flag each (K,).
+    """
+    if not len(others):
+        return np.zeros(len(genes), dtype=np.bool_)
+    gaps = np.abs(family.to_unit(genes)[:, np.newaxis] - family.to_unit(np.stack(others)))
+    return np.asarray(gaps.max(axis=2, initial=0.0).min(axis=1) <= NEAR)
 
 
 def tune_gains(

@@ -13,9 +13,9 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.elementary import log, power
 from twinloop.flights import disagreements
-from twinloop.planning.candidates import candidates
+from twinloop.planning.candidates import Candidates, candidates
 from twinloop.planning.excitation import binary, chirps
-from twinloop.planning.gains import tune_gains
+from twinloop.planning.gains import nearby, tune_gains
 from twinloop.planning.judging import DIVERGED, Committee, Judge, Judged, Task, expected, risk
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
@@ -34,17 +34,19 @@ class Flown:
     """What has flown so far.
 
     Args:
-        best: genes of the best flight.
-        kept: whether it kept the envelope.
+        best: genes of the best flight; those tuned where no test was flown.
+        kept: whether they are known to fly: to the end, and inside the envelope.
         usages: largest usage of the envelope in each flight.
         first_quality: of the first controller, as flown or predicted; infinite where it left the envelope: a flight
             that keeps it may then be worse.
+        failed: genes of tests that failed on the system.
     """
 
     best: Floats
     kept: bool
     usages: Sequence[float]
     first_quality: float
+    failed: Sequence[Floats] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +211,8 @@ class Planner(Judge):
             np.maximum(committee.sds, self._smallest()),
             workers=self.workers,
         )
-        keeps = quiet.worst_usage <= self._reach(goal, flown.usages)
+        possible = self._possible(drafts, flown)
+        keeps = possible & (quiet.worst_usage <= self._reach(goal, flown.usages))
         scatter = 0.0 if goal == "model" else self._scatter(committee, tuned)
         promised = float(quiet.mean[0])
         first = flown.first_quality if np.isfinite(flown.first_quality) else 2.0 * promised
@@ -234,15 +237,14 @@ class Planner(Judge):
 
         found = _first_that_lasts(wanted, noisy, max(limit, flown.first_quality + 2.0 * scatter))
         if found is None:
-            # What was flown and kept the envelope will again, whatever the members make of it. Where no model is to be
-            # trusted, nothing is known but that these gains have flown: again, with another excitation.
-            known = drafts.repeats if flown.kept or not committee.trusted else 0
-            chosen = known + int(np.argmin(quiet.worst_usage[known:]))
+            # What was flown and kept the envelope will again, whatever the members make of it.
+            likely = possible & (np.arange(len(possible)) >= drafts.repeats) if flown.kept else possible
+            chosen = int(np.argmin(np.where(likely, quiet.worst_usage, np.inf)))
             found = chosen, noisy([chosen])
         chosen, flights = found
         repeats = chosen >= drafts.repeats
         inside = quiet.worst_usage[chosen] <= 1.0 - self.options.margin and flights.usages.max() <= 1.0
-        safe = bool(inside and (flown.kept or not repeats))
+        safe = bool(inside)
         predicted, spread = expected(flights.qualities.mean(axis=(1, 2)))
         excitation, disagreement = drafts.excitation[chosen], float(tells[chosen])
         return Proposal(
@@ -257,11 +259,23 @@ class Planner(Judge):
             disagreement=disagreement,
             gain=_gain(quiet.qualities.mean(axis=1)[:, keeps]),
             reason=self._reason(
-                exploit and chosen == 0, repeats, flown.kept, safe, disagreement, where[chosen].tolist()
+                committee.trusted,
+                exploit and chosen == 0,
+                repeats,
+                safe,
+                disagreement,
+                where[chosen].tolist(),
             ),
         )
 
     # Inside
+
+    def _possible(self, drafts: Candidates, flown: Flown) -> Flags:
+        """Candidates that are no flight that failed, or was cut, once more."""
+        possible = ~nearby(self.family, drafts.genes, flown.failed)
+        possible[drafts.repeats :] &= flown.kept
+        # Where all of them are, the safest of them is still the best that can be said.
+        return possible if possible.any() else np.ones_like(possible)
 
     def _reach(self, goal: str, used: Sequence[float]) -> float:
         """Usage of the envelope that a proposal may have, where that of each flight so far is known."""
@@ -295,16 +309,25 @@ class Planner(Judge):
         return np.array([1e-6 * state.scale for state in self.signals.states])
 
     def _reason(
-        self, exploits: bool, repeats: bool, kept: bool, safe: bool, value: float, where: Sequence[int]
+        self,
+        trusted: bool,
+        exploits: bool,
+        repeats: bool,
+        safe: bool,
+        value: float,
+        where: Sequence[int],
     ) -> str:
         """Why this test; `where`: step, state and the two members that are the furthest apart."""
         row, state, high, low = where
         sentences = []
         if repeats:
             change = "a stronger excitation" if self.options.excitation > 0.0 else "a small variation"
-            known = "they are known to fly" if kept else "they left the envelope when they flew"
-            sentences.append(f"The best gains flown, again, with {change}: {known}.")
-        if exploits:
+            sentences.append(f"The best gains flown, again, with {change}: they are known to fly.")
+        if not trusted:
+            sentences.append(
+                "The twin does not follow the flights so far: it cannot say what this one will tell."
+            )
+        elif exploits:
             sentences.append("The best gains that the twin knows, flown as they are.")
         elif value > 0.0 and high != low:
             sentences.append(

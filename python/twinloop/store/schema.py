@@ -51,7 +51,11 @@ experiments = _entries(
     Column("runs", Integer),
 )
 """What was told, behind the number of its test; its hash, and how many runs the system had made."""
-ENTRIES = {table.name: table for table in (tests, asked, experiments)}
+failures = _entries("failures")
+"""Tests that failed, behind their number."""
+abandoned = _entries("abandoned")
+"""Numbers of tests that will not be flown."""
+ENTRIES = {table.name: table for table in (tests, asked, experiments, failures, abandoned)}
 """Lists of a logbook that only grow, by their names there."""
 
 checkpoints = Table(

@@ -27,6 +27,8 @@ def upgrade() -> None:
     _entries("asked", _text("record"))
     runs = sa.Column("runs", sa.Integer)
     _entries("experiments", _text("record"), _text("told", 40), _text("sha256", 64), runs)
+    _entries("failures", _text("record"))
+    _entries("abandoned", _text("record"))
     op.create_table("checkpoints", _campaign(), _text("saved", 40), _text("record"))
 
 
