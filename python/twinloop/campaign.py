@@ -303,6 +303,11 @@ class Campaign(Recorded, kind="campaign"):
             campaign._open(where, kept.name)
         return campaign
 
+    @property
+    def store(self) -> str | None:
+        """Where it is kept; None: nowhere."""
+        return None if self._keeping is None else self._keeping.store
+
     def close(self) -> None:
         """Lets others write the campaign in its store; nothing that is done afterwards is kept there."""
         if self._keeping is not None:
@@ -494,7 +499,7 @@ class Campaign(Recorded, kind="campaign"):
             )
         self.interrupted = False
         if self._keeping is not None:
-            self._keeping.fly(system)
+            self._keeping.fly(system, budget)
         with self._interruptible():
             while self._book.runs < budget:
                 test = self._next(system, last=self._book.runs + 1 == budget)

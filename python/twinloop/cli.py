@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from twinloop import __version__
-from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign import Campaign
 from twinloop.console import Watch
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
 from twinloop.exam.command import bench
-from twinloop.files import check_picture, check_writable, write_text
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
-from twinloop.presets import PRESETS, DefaultOptions, options_of, parsed
+from twinloop.presets import PRESETS, options_of, parsed
 from twinloop.reproduce.command import reproduce
-from twinloop.result import Result, quality_unit, summary, to_json
-from twinloop.run_info import Stopwatch
+from twinloop.stored import resume, show
 from twinloop.systems import BUILT_IN, Quadrotor
-from twinloop.terminal import is_closed, is_utf_8, prepared
-from twinloop.text import quality_words, render
-
-Answer = TypeVar("Answer")
+from twinloop.terminal import prepared
+from twinloop.working import answers, check_answer, work
 
 
 class OneSentence(click.Group):
@@ -85,9 +79,11 @@ def main(context: click.Context) -> None:
 )
 @click.option("--harsh", is_flag=True, help="The same vehicle with drag, slow motors, gusts and noise 0.001.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Any other option of the preset.")
-@click.option("--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON.")
-@click.option("--plot", type=Path, metavar="FILE.svg|png", help="Also draw the runs and the errors.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option(
+    "--store", metavar="FILE.db|URL", help="Keep the campaign there; go on with the one that is there."
+)
+@click.option("--name", default="campaign", show_default=True, help="Of the campaign in its store.")
+@answers
 @click.pass_context
 def run(
     context: click.Context,
@@ -104,6 +100,8 @@ def run(
     gyroscopic: str,
     harsh: bool,
     changes: tuple[str, ...],
+    store: str | None,
+    name: str,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -119,6 +117,7 @@ def run(
     options |= _generations(preset, generations, test_generations)
     rig = _vehicle(system, noise, seed, gyroscopic, harsh)
     watch = Watch(options_of(preset, options), experiments, system)
+    check_answer(output, plot)
     campaign = Campaign(
         rig.signals,
         controller=rig.controller,
@@ -132,82 +131,16 @@ def run(
         quality=quality,
         threads=threads,
         progress=watch,
+        store=store,
+        name=name,
     )
-    if output is not None:
-        check_writable(output, [".json"])
-    elif is_closed():
-        raise InvalidInput(
-            "Standard output: expected somewhere to print the result, found it closed; open it, or pass --output."
-        )
-    if plot is not None:
-        check_picture(plot)
-
-    stopwatch = Stopwatch(campaign.threads)
-    result = _worked(campaign, rig, watch, experiments, _described(system, rig), stopwatch)
-    try:
-        if output is not None:
-            write_text(output, to_json(result))
-            click.echo(f"Result: {output}", err=True)
-    finally:  # a full disk must not take the result with it
-        text = to_json(result, ascii_only=not is_utf_8()) if as_json else render(result)
-        click.echo(text, nl=False)
-    if plot is not None:
-        _uninterrupted(lambda: _draw(campaign, plot))
-        click.echo(f"Picture: {plot}", err=True)
-    context.exit(130 if campaign.interrupted else 1 if result["controller"] is None else 0)
+    context.exit(work(campaign, rig, watch, experiments, output, plot, as_json))
 
 
+main.add_command(resume)
+main.add_command(show)
 main.add_command(bench)
 main.add_command(reproduce)
-
-
-def _worked(
-    campaign: Campaign,
-    rig: Quadrotor,
-    watch: Watch,
-    experiments: int,
-    system: dict[str, object],
-    clock: Stopwatch,
-) -> Result:
-    with watch, suppress(KeyboardInterrupt):
-        campaign.run(rig, experiments)
-        controller_to_fly(campaign)  # learns the last flight
-    if not campaign.experiments or _knows_nothing(campaign):
-        raise KeyboardInterrupt
-    return _uninterrupted(lambda: summary(campaign, system, clock.info()))
-
-
-def _knows_nothing(campaign: Campaign) -> bool:
-    """Whether the first identification was never finished: there is nothing to show then."""
-    return isinstance(campaign.options, DefaultOptions) and not campaign.history
-
-
-def _uninterrupted(work: Callable[[], Answer]) -> Answer:
-    """Does short work to its end, even if Ctrl-C is pressed once more."""
-    try:
-        return work()
-    except KeyboardInterrupt:
-        return work()
-
-
-def _described(name: str, rig: Quadrotor) -> dict[str, object]:
-    return {
-        "name": name,
-        "noise": rig.noise,
-        "gyroscopic": rig.gyroscopic,
-        "inertia": rig.inertia.tolist(),
-        "natural_frequency": rig.natural_frequency,
-        "drag": rig.drag.tolist(),
-        "motor_lag": rig.motor_lag,
-        "gusts": rig.gusts,
-    }
-
-
-def _draw(campaign: Campaign, path: Path) -> None:
-    from twinloop.plots import campaign_picture  # only who draws pays for matplotlib
-
-    measure = campaign.setup.quality
-    campaign_picture(campaign, path, quality_words(measure.kind, quality_unit(measure)))
 
 
 def _change(preset: str, text: str) -> tuple[str, object]:

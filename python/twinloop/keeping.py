@@ -59,6 +59,7 @@ class Keeping:
             raise
         self.kept: Kept = held
         self._runs: int | None = held.runs
+        self._system: Record | None = held.system
         self._flown: object = None
         self._memory: object = None
         self._saved = time.monotonic()
@@ -95,22 +96,26 @@ class Keeping:
             self._keeper.keep({}, method.to_record())
             self._memory, self._saved = method.memory, time.monotonic()
 
-    def fly(self, system: object) -> None:
+    def fly(self, system: object, experiments: int) -> None:
         """Takes up a system where the campaign left it: one that counts its runs, as its noise depends on them.
 
         Args:
             system: that will be run.
+            experiments: runs on it in all.
 
         Raises:
             InvalidInput: it is another one than the campaign has flown so far.
+            StoreFailure: the store cannot be written.
         """
-        if isinstance(system, Recorded):
-            record = system.to_record()
-            known = self._keeper.fly(record)
+        record = system.to_record() if isinstance(system, Recorded) else None
+        if record is not None and self._system is not None:
+            what = f"Campaign.run, system: expected the one that {self.name} has flown so far,"
+            _check_same({**self._system, "runs": None}, {**record, "runs": None}, what, "system")
             if self._runs is None:
-                self._runs = known.get("runs")
-            what = f"Campaign.run, system: expected the one that {self.name} has flown so far"
-            _check_same({**known, "runs": None}, {**record, "runs": None}, what, "system")
+                self._runs = self._system.get("runs")
+        elif record is not None:
+            self._system = record
+        self._keeper.fly(self._system, experiments)
         runs = getattr(system, "runs", None)
         if not isinstance(runs, int) or isinstance(runs, bool):
             self._flown = None
@@ -118,6 +123,11 @@ class Keeping:
         if self._flown is None and self._runs is not None and runs < self._runs:
             setattr(system, "runs", self._runs)  # noqa: B010 - a system need not declare it
         self._flown = system
+
+    @property
+    def store(self) -> str:
+        """The file, or the address without its password."""
+        return self._keeper.store.name
 
     @property
     def name(self) -> str:

@@ -29,6 +29,7 @@ class Kept:
         memory: its record; None where nothing was learnt.
         system: record of the system that it flies, where that has one.
         runs: how many runs the system had made at the last experiment; None where it does not count.
+        experiments: that it will make in all, as was said last; None: nobody has said.
         created: when, in UTC.
         sessions: versions and processor each time it was opened to be written.
     """
@@ -39,6 +40,7 @@ class Kept:
     memory: Record | None
     system: Record | None
     runs: int | None
+    experiments: int | None
     created: str
     sessions: tuple[Record, ...]
 
@@ -119,6 +121,7 @@ def found(store: Store, name: str | None) -> Kept | None:
         memory=None if memory is None else from_text(memory, what),
         system=None if row.system is None else from_text(row.system, what),
         runs=runs[-1].runs if runs else None,
+        experiments=row.experiments,
         created=row.created,
         sessions=tuple({"started": s.started, **from_text(s.provenance, what)} for s in opened),
     )
@@ -215,30 +218,24 @@ class Keeper:
                 connection.execute(checkpoints.insert(), row)
         self.rows = grown
 
-    def fly(self, system: Record) -> Record:
-        """The system that the campaign flies: the one that was kept, or this one from now on.
+    def fly(self, system: Record | None, experiments: int) -> None:
+        """Enters what the campaign flies from now on.
 
         Args:
-            system: its record.
-
-        Returns:
-            What is kept.
+            system: its record; None where it has none.
+            experiments: runs on it in all.
 
         Raises:
             StoreFailure: the database refuses.
         """
-        from sqlalchemy import select, update
+        from sqlalchemy import update
 
         from twinloop.store.schema import campaigns
 
-        of_this = campaigns.c.id == self._id
+        flown = None if system is None else to_text(system)
         with self.store.transaction() as connection:
-            known = connection.execute(select(campaigns.c.system).where(of_this)).scalar()
-            if known is None:
-                connection.execute(update(campaigns).where(of_this).values(system=to_text(system)))
-                return system
-        answer: Record = from_text(known, f"Store {self.store.name}")
-        return answer
+            row = update(campaigns).where(campaigns.c.id == self._id)
+            connection.execute(row.values(system=flown, experiments=experiments))
 
     def close(self) -> None:
         """Lets others write."""

@@ -20,8 +20,9 @@ campaigns = Table(
     Column("created", String(40), nullable=False),
     Column("setup", Text, nullable=False),
     Column("system", Text),
+    Column("experiments", Integer),
 )
-"""One row a campaign: its setup, and the system that it flies where that has a plain form."""
+"""One row a campaign: its setup, the system that it flies where that has a plain form, and how often it will."""
 
 sessions = Table(
     "sessions",

@@ -21,6 +21,7 @@ def upgrade() -> None:
         sa.Column("created", sa.String(40), nullable=False),
         sa.Column("setup", sa.Text, nullable=False),
         sa.Column("system", sa.Text),
+        sa.Column("experiments", sa.Integer),
     )
     _entries("sessions", _text("started", 40), _text("provenance"))
     _entries("tests", _text("record"))
