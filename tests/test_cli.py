@@ -349,7 +349,7 @@ def test_a_result_that_cannot_be_written_is_printed(monkeypatch, tmp_path):
     def full(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("twinloop.cli.write_text", full)
+    monkeypatch.setattr("twinloop.working.write_text", full)
     done = invoke(*TINY, "--json", "--output", str(tmp_path / "result.json"))
     assert done.exit_code == 1 and "No space left" in done.stderr
     assert len(json.loads(done.stdout)["experiments"]) == 1
