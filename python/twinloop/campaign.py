@@ -605,6 +605,11 @@ class Campaign(Recorded, kind="campaign"):
         return tuple(self._book.experiments)
 
     @property
+    def waiting(self) -> tuple[Test, ...]:
+        """Tests that were asked for, and neither told nor abandoned, in their order."""
+        return tuple(self._book.waiting())
+
+    @property
     def failures(self) -> tuple[Failure, ...]:
         """Tests that failed, in the order they were told."""
         return tuple(self._book.failures)

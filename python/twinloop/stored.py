@@ -110,7 +110,6 @@ def _named(held: Kept) -> dict[str, object]:
 
 
 def _facts(held: Kept, campaign: Campaign) -> dict[str, object]:
-    waiting = campaign._book.waiting()
     return {
         "name": held.name,
         "created": held.created,
@@ -119,7 +118,8 @@ def _facts(held: Kept, campaign: Campaign) -> dict[str, object]:
         "tests": len(held.logbook["tests"]),
         "told": len(campaign.experiments),
         "experiments": held.experiments,
-        "waiting": None if waiting is None else waiting.number,
+        "waiting": [test.number for test in campaign.waiting],
+        "failed": [failure.test.number for failure in campaign.failures],
         "sessions": list(held.sessions),
     }
 
@@ -131,8 +131,10 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
         f"Preset {facts['preset']}, seed {facts['seed']}.",
         f"{facts['told']}{of} experiments told, {facts['tests']} tests made.",
     ]
-    if facts["waiting"] is not None:
-        lines.append(f"Test {facts['waiting']} waits to be flown.")
+    for key, words in (("waiting", "waiting to be flown"), ("failed", "failed")):
+        if facts[key]:
+            numbers = ", ".join(str(number) for number in facts[key])
+            lines.append(f"Tests {words}: {numbers}.")
     return "\n".join(lines) + "\n"
 
 

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 
 import click
 
-from twinloop.campaign import Campaign
+from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.console import Watch
 from twinloop.errors import InvalidInput
 from twinloop.files import check_picture, check_writable, write_text
 from twinloop.presets import DefaultOptions
-from twinloop.result import Result, controller_to_fly, quality_unit, summary, to_json
+from twinloop.result import Result, quality_unit, summary, to_json
 from twinloop.run_info import Stopwatch
 from twinloop.systems import Quadrotor
 from twinloop.terminal import is_closed, is_utf_8
