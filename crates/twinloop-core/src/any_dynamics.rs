@@ -15,6 +15,7 @@ pub enum AnyDynamics<'a> {
 }
 
 /// The workspace of the one that is flown.
+#[expect(clippy::large_enum_variant, reason = "there is one for each roll-out, and it is never moved")]
 pub enum AnyWorkspace<'a, V: Vector> {
     /// Of a model.
     Model(<Model<'a> as Dynamics>::Workspace<V>),

@@ -56,12 +56,12 @@ pub use regression::{
     Annealing, Chain, Choices, Found, Gram, Noise, Record, Solution, likelihood, most_likely_noise, search,
 };
 pub use rng::{Purpose, Stream, Unit};
-pub use rollout::{Seen, Start, Watch, rollout};
+pub use rollout::{Commands, Seen, Start, Watch, rollout};
 pub use rows::{run_rows, step_rows};
 pub use selected::{Experiment, SelectedTests};
 pub use signals::{RigidBody, Signals};
 pub use task::Task;
 pub use test_loop::{TestSearch, TestSettings};
-pub use trajectory::{Influences, Trajectory, record, record_one};
+pub use trajectory::{Influences, Trajectory, record, record_one, replay};
 pub use tuning::{Observed, Recorded, Tuned, Tuning};
 pub use workers::Workers;

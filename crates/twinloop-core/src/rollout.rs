@@ -1,29 +1,42 @@
-//! The roll-out: closes the loop of a controller around dynamics. There is no second one.
+//! The roll-out: dynamics under the commands of a controller that reads them, or of a record. There is no second one.
 
 use crate::controller::{Controllers, Family};
 use crate::dynamics::{Dynamics, step_apart};
 use crate::lanes::{Apart, Vector};
+use crate::task::target_at;
 
-/// What closed loops start from, one a lane.
+/// What runs start from, one a lane.
 pub struct Start<'a, V> {
-    /// The family of the controllers.
-    pub family: &'a Family,
-    /// Parameters of each lane's controller (size).
-    pub parameters: &'a [V],
+    /// Where their commands come from.
+    pub commands: Commands<'a, V>,
     /// First state (n_x).
     pub initial: &'a [V],
-    /// State that the controllers lead to (n_x).
-    pub target: &'a [V],
     /// Steps to run, n.
     pub steps: usize,
     /// Magnitude of each state at which a lane has diverged (n_x).
     pub limits: &'a [f64],
     /// What the sensors add to the state that the controller reads, (n + 1) × n_x; empty for perfect sensors.
     pub noise: &'a [V],
-    /// What is added to the commands before they are clipped to their bounds, n × n_u; empty for nothing.
-    pub excitation: &'a [V],
     /// What is added to the true state after each step, n × n_x: process noise, gusts; empty for nothing.
     pub disturbance: &'a [V],
+}
+
+/// The two sources of commands. Both are in the same loop, for each copy of it takes its time to compile.
+#[derive(Clone, Copy)]
+pub enum Commands<'a, V> {
+    /// Controllers that answer what they read.
+    Law {
+        /// The family of the controllers.
+        family: &'a Family,
+        /// Parameters of each lane's controller (size).
+        parameters: &'a [V],
+        /// State that the controllers lead to: constant (n_x), or a row for each state ((n + 1) × n_x).
+        target: &'a [V],
+        /// What is added to the commands before they are clipped to their bounds, n × n_u; empty for nothing.
+        excitation: &'a [V],
+    },
+    /// A record, n × n_u, sent as it is.
+    Record(&'a [V]),
 }
 
 /// One step of the loops, as it is shown to a watcher.
@@ -52,13 +65,16 @@ pub fn rollout<D: Dynamics, V: Vector>(
     start: &Start<'_, V>,
     watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
-    let Start { family, parameters, initial, target, steps, limits, noise, excitation, disturbance } = *start;
-    let (states, commands) = (initial.len(), family.commands());
+    let Start { commands, initial, steps, limits, noise, disturbance } = *start;
+    let states = initial.len();
     let mut workspace = dynamics.workspace::<V>();
-    let mut controllers = family.start(parameters);
+    let (mut controllers, width) = match commands {
+        Commands::Law { family, parameters, .. } => (Some(family.start(parameters)), family.commands()),
+        Commands::Record(rows) => (None, rows.len() / steps),
+    };
     let mut state = initial.to_vec();
     let mut reading = initial.to_vec();
-    let mut command = vec![V::splat(0.0); commands];
+    let mut command = vec![V::splat(0.0); width];
     let mut alive = V::splat(1.0);
     let mut lasted = vec![steps; V::LANES];
     for step in 0..steps {
@@ -66,13 +82,11 @@ pub fn rollout<D: Dynamics, V: Vector>(
         if !noise.is_empty() {
             add(&mut reading, &noise[step * states..]);
         }
-        let excitation = excitation.get(step * commands..).unwrap_or_default();
         V::apart(Send {
-            family,
-            controllers: &mut controllers,
+            commands,
+            controllers: controllers.as_mut(),
+            step,
             reading: &reading,
-            target,
-            excitation,
             command: &mut command,
         });
         step_apart(dynamics, &mut workspace, &mut state, &command);
@@ -101,21 +115,28 @@ pub fn rollout<D: Dynamics, V: Vector>(
 
 /// What is sent in a period, as a function of its own: it is compiled once for each vector, not in every loop.
 struct Send<'a, V> {
-    family: &'a Family,
-    controllers: &'a mut Controllers<V>,
+    commands: Commands<'a, V>,
+    /// Of a law.
+    controllers: Option<&'a mut Controllers<V>>,
+    step: usize,
     reading: &'a [V],
-    target: &'a [V],
-    /// Of this step and those after it; empty for nothing.
-    excitation: &'a [V],
     command: &'a mut [V],
 }
 
 impl<V: Vector> Apart for Send<'_, V> {
     #[inline(always)]
     fn run(self) {
-        self.family.command(self.controllers, self.reading, self.target, self.command);
-        if !self.excitation.is_empty() {
-            self.family.excite(self.command, self.excitation);
+        let row = self.step * self.command.len();
+        match (self.commands, self.controllers) {
+            (Commands::Law { family, target, excitation, .. }, Some(controllers)) => {
+                let target = target_at(target, self.reading.len(), self.step);
+                family.command(controllers, self.reading, target, self.command);
+                if !excitation.is_empty() {
+                    family.excite(self.command, &excitation[row..]);
+                }
+            }
+            (Commands::Record(rows), _) => self.command.copy_from_slice(&rows[row..][..self.command.len()]),
+            (Commands::Law { .. }, None) => unreachable!("a law has its controllers"),
         }
     }
 }

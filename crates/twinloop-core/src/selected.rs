@@ -13,7 +13,7 @@ use crate::signals::Signals;
 pub struct Experiment {
     /// Parameters of the controller (size).
     pub parameters: Vec<f64>,
-    /// Target state η_d (n_x).
+    /// Target state η_d: constant (n_x), or a row for each state of the test, as many as were recorded or more.
     pub target: Vec<f64>,
     /// Measured states, (n + 1) × n_x.
     pub states: Vec<f64>,
@@ -46,7 +46,7 @@ pub(crate) struct Loops {
     pub parameters: Vec<f64>,
     /// n_x × lanes
     pub initial: Vec<f64>,
-    /// n_x × lanes
+    /// n_x × lanes, or (n + 1) × n_x × lanes, n that of the longest.
     pub target: Vec<f64>,
     /// n × n_u × lanes, n that of the longest; empty if no test of the group has any.
     pub excitation: Vec<f64>,
@@ -146,9 +146,13 @@ impl SelectedTests {
                 commands.len()
             ));
         }
-        if parameters.len() != self.family.parameters().len() || target.len() != n_x {
+        let rows = target.len() / n_x;
+        let follows = rows == 1 || rows > steps;
+        if parameters.len() != self.family.parameters().len() || !target.len().is_multiple_of(n_x) || !follows
+        {
             return invalid(format!(
-                "test: expected {} parameters and a target of {n_x} states, found {} and {}",
+                "test: expected {} parameters and a target of {n_x} states, or a row of it for each recorded state, \
+                 found {} and {}",
                 self.family.parameters().len(),
                 parameters.len(),
                 target.len()
@@ -204,17 +208,31 @@ fn loops(group: &[Arc<Experiment>], n_x: usize, n_u: usize) -> Loops {
     let recorded = group.iter().map(|experiment| resized(&experiment.states, (longest + 1) * n_x, 0.0));
     // Minus zero is the one number that leaves every command as it is to the bit, a zero of either sign too.
     let excitation = group.iter().map(|experiment| resized(&experiment.excitation, longest * n_u, -0.0));
+    let target = targets(group, n_x, longest);
     let excited = group.iter().any(|experiment| !experiment.excitation.is_empty());
     let initial: Vec<&[f64]> = group.iter().map(|experiment| &experiment.states[..n_x]).collect();
     Loops {
         tests: group.len(),
         parameters: part(|experiment| &experiment.parameters),
         initial: interleave(&initial, lanes),
-        target: part(|experiment| &experiment.target),
+        target: interleave(&target, lanes),
         excitation: if excited { interleave(&excitation.collect::<Vec<_>>(), lanes) } else { vec![] },
         recorded: interleave(&recorded.collect::<Vec<_>>(), lanes),
         steps,
     }
+}
+
+/// Targets of a group: constant, or a row for each state as soon as one of them varies.
+fn targets(group: &[Arc<Experiment>], n_x: usize, longest: usize) -> Vec<Vec<f64>> {
+    if group.iter().all(|experiment| experiment.target.len() == n_x) {
+        return group.iter().map(|experiment| experiment.target.clone()).collect();
+    }
+    let rows = |experiment: &Arc<Experiment>| {
+        let last = experiment.target.len() / n_x - 1;
+        let row = |k: usize| &experiment.target[k.min(last) * n_x..][..n_x];
+        (0..=longest).flat_map(row).copied().collect()
+    };
+    group.iter().map(rows).collect()
 }
 
 /// Cut to a length, or filled up to it.

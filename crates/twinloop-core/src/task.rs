@@ -8,7 +8,7 @@ use crate::error::{Result, invalid};
 pub struct Task {
     /// First state η_1 (n_x).
     pub initial: Vec<f64>,
-    /// State to lead to η_d (n_x).
+    /// State to lead to η_d: constant (n_x), or a row for each state ((n + 1) × n_x).
     pub target: Vec<f64>,
     /// Number of steps n.
     pub steps: usize,
@@ -20,11 +20,13 @@ impl Task {
 
     /// Refuses a task that no run can have.
     pub fn new(initial: Vec<f64>, target: Vec<f64>, steps: usize) -> Result<Self> {
-        if initial.len() != target.len() || initial.is_empty() {
+        if initial.is_empty() || !is_target(target.len(), initial.len(), steps) {
             return invalid(format!(
-                "task: expected an initial and a target state of the same length, found {} and {}",
-                initial.len(),
-                target.len()
+                "task: expected a target state of the same length as the initial one, or a row of it for each of {} \
+                 states, found {} and {} numbers",
+                steps.saturating_add(1),
+                target.len(),
+                initial.len()
             ));
         }
         if !initial.iter().chain(&target).all(|x| x.is_finite()) || !(1..=Self::MOST_STEPS).contains(&steps) {
@@ -38,6 +40,17 @@ impl Task {
 
     /// ‖η_d − η_1‖: the final distance of a system that never moves.
     pub fn distance(&self, periods: &Periods) -> f64 {
-        periods.distance(&self.initial, &self.target)
+        periods.distance(&self.initial, target_at(&self.target, self.initial.len(), self.steps))
     }
+}
+
+/// Whether so many numbers are a target of n_x states: constant, or a row for each state of a run.
+pub(crate) fn is_target(numbers: usize, n_x: usize, steps: usize) -> bool {
+    numbers == n_x || Some(numbers) == steps.checked_add(1).and_then(|rows| rows.checked_mul(n_x))
+}
+
+/// The state that a target asks for at state k of a run (n_x).
+#[inline(always)]
+pub(crate) fn target_at<T>(target: &[T], n_x: usize, k: usize) -> &[T] {
+    if target.len() == n_x { target } else { &target[k * n_x..][..n_x] }
 }

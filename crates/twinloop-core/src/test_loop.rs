@@ -70,8 +70,8 @@ impl Tests {
             return invalid("test search: expected a committee of one model or more, found none");
         }
         family.check(signals)?;
-        if task.target.len() != family.states() {
-            let (expected, found) = (family.states(), task.target.len());
+        if task.initial.len() != family.states() {
+            let (expected, found) = (family.states(), task.initial.len());
             return invalid(format!("test search: expected a task of {expected} states, found {found}"));
         }
         if task.distance(&signals.periods) == 0.0 {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::controller::Family;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, with_test_lanes};
-use crate::rollout::{Seen, Start, Watch, rollout};
+use crate::rollout::{Commands, Seen, Start, Watch, rollout};
 use crate::task::Task;
 
 /// One run, step by step. After the step that it lasted to, nothing in it means anything.
@@ -75,6 +75,26 @@ pub fn record_one<D: Dynamics>(
     Record { dynamics, family, parameters, task, limits, influences }.lanes::<Scalar>().pop()
 }
 
+/// A free run from a state (n_x) under recorded commands (n × n_u, n at least 1), without a controller.
+pub fn replay<D: Dynamics>(
+    dynamics: &D,
+    initial: &[f64],
+    commands: &[f64],
+    steps: usize,
+    limits: &[f64],
+) -> Trajectory {
+    let rows: Vec<Scalar> = pack(&[commands]);
+    let start = Start {
+        commands: Commands::Record(&rows),
+        initial: &pack::<Scalar, _>(&[initial]),
+        steps,
+        limits,
+        noise: &[],
+        disturbance: &[],
+    };
+    recorded(dynamics, &start, initial, 1).remove(0)
+}
+
 struct Record<'a, D> {
     dynamics: &'a D,
     family: &'a Family,
@@ -97,31 +117,43 @@ impl<D: Dynamics> Record<'_, D> {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> Vec<Trajectory> {
         let Task { initial, target, steps } = self.task;
-        let noise: Vec<V> = pack(self.influences.noise);
         let start = Start {
-            family: self.family,
-            parameters: &pack::<V, _>(self.parameters),
+            commands: Commands::Law {
+                family: self.family,
+                parameters: &pack::<V, _>(self.parameters),
+                target: &pack::<V, _>(&[target]),
+                excitation: &pack::<V, _>(self.influences.excitation),
+            },
             initial: &pack::<V, _>(&[initial]),
-            target: &pack::<V, _>(&[target]),
             steps: *steps,
             limits: self.limits,
-            noise: &noise,
-            excitation: &pack::<V, _>(self.influences.excitation),
+            noise: &pack::<V, _>(self.influences.noise),
             disturbance: &pack::<V, _>(self.influences.disturbance),
         };
-        let empty = || Trajectory { states: initial.clone(), measured: vec![], commands: vec![], lasted: 0 };
-        let mut runs: Vec<_> = self.parameters.iter().map(|_| empty()).collect();
-        let lasted = rollout(self.dynamics, &start, &mut Recorder(&mut runs));
-        for (l, run) in runs.iter_mut().enumerate() {
-            let (states, seen) = (initial.len(), run.measured.len());
-            for j in 0..states {
-                let noise = noise.get(seen + j).map_or(0.0, |noise| noise.lane(l));
-                run.measured.push(run.states[seen + j] + noise);
-            }
-            run.lasted = lasted[l];
-        }
-        runs
+        recorded(self.dynamics, &start, initial, self.parameters.len())
     }
+}
+
+/// Every step of the first lanes of a roll-out.
+#[inline(always)]
+fn recorded<D: Dynamics, V: Vector>(
+    dynamics: &D,
+    start: &Start<'_, V>,
+    initial: &[f64],
+    count: usize,
+) -> Vec<Trajectory> {
+    let empty = || Trajectory { states: initial.to_vec(), measured: vec![], commands: vec![], lasted: 0 };
+    let mut runs: Vec<_> = (0..count).map(|_| empty()).collect();
+    let lasted = rollout(dynamics, start, &mut Recorder(&mut runs));
+    for (l, run) in runs.iter_mut().enumerate() {
+        let (states, seen) = (initial.len(), run.measured.len());
+        for j in 0..states {
+            let noise = start.noise.get(seen + j).map_or(0.0, |noise| noise.lane(l));
+            run.measured.push(run.states[seen + j] + noise);
+        }
+        run.lasted = lasted[l];
+    }
+    runs
 }
 
 /// Keeps every step of the lanes that a run is wanted of.

@@ -48,6 +48,44 @@ pub fn optional_blocks(name: &str, array: Option<Cube<'_>>, expected: [usize; 3]
     Ok(array.outer_iter().map(|block| block.iter().copied().collect()).collect())
 }
 
+/// A vector, or rows of vectors.
+#[derive(FromPyObject)]
+pub enum VectorOrRows<'py> {
+    One(Vector<'py>),
+    Rows(Matrix<'py>),
+}
+
+impl VectorOrRows<'_> {
+    /// All numbers, row after row.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::One(vector) => vector.as_array().iter().copied().collect(),
+            Self::Rows(rows) => rows.as_array().iter().copied().collect(),
+        }
+    }
+}
+
+/// A row for each of several, or a matrix for each.
+#[derive(FromPyObject)]
+pub enum RowsOrBlocks<'py> {
+    Rows(Matrix<'py>),
+    Blocks(Cube<'py>),
+}
+
+impl RowsOrBlocks<'_> {
+    /// The numbers of each, row after row.
+    pub fn each(&self) -> Vec<Vec<f64>> {
+        match self {
+            Self::Rows(rows) => {
+                rows.as_array().outer_iter().map(|row| row.iter().copied().collect()).collect()
+            }
+            Self::Blocks(blocks) => {
+                blocks.as_array().outer_iter().map(|block| block.iter().copied().collect()).collect()
+            }
+        }
+    }
+}
+
 /// Views of rows.
 pub fn views(rows: &[Vec<f64>]) -> Vec<&[f64]> {
     rows.iter().map(Vec::as_slice).collect()

@@ -8,8 +8,8 @@ use twinloop_core::{
 };
 
 use crate::arrays::{
-    Cube, Matrix, Vector, optional_blocks, optional_rows, rows, to_cube, to_integer_rows, to_vector, vector,
-    views,
+    Cube, Matrix, RowsOrBlocks, Vector, optional_blocks, optional_rows, rows, to_cube, to_integer_rows,
+    to_vector, vector, views,
 };
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
@@ -35,7 +35,7 @@ impl PyFlights {
         family: &PyFamily,
         parameters: Matrix<'_>,
         initial_states: Matrix<'_>,
-        target_states: Matrix<'_>,
+        target_states: RowsOrBlocks<'_>,
         steps: usize,
         excitation: Option<Cube<'_>>,
         divergence_factor: f64,
@@ -43,7 +43,7 @@ impl PyFlights {
         let (n_x, n_u) = (signals.0.states(), signals.0.commands());
         let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
         let initial = rows("initial states", &initial_states, n_x)?;
-        let target = rows("target states", &target_states, n_x)?;
+        let target = target_states.each();
         let count = parameters.len();
         if initial.len() != count || target.len() != count {
             return Err(misuse(format!(

@@ -51,7 +51,7 @@ mod _core {
     #[pymodule_export]
     use crate::rng::{PyStream, purposes};
     #[pymodule_export]
-    use crate::rollout::{PyRuns, PyTask, rollout};
+    use crate::rollout::{PyRuns, PyTask, replay, rollout};
     #[pymodule_export]
     use crate::search::{PyModelSearch, PyTestSearch, PyTestSettings, PyVariation};
     #[pymodule_export]

@@ -74,7 +74,8 @@ pub fn final_distances<'py>(
     let workers = or_default(workers)?;
     let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
     let models: Vec<_> = models.iter().map(|model| model.get().core()).collect();
-    if models.iter().any(|model| !model.frame.fits(&signals.0)) || task.0.target.len() != signals.0.states() {
+    if models.iter().any(|model| !model.frame.fits(&signals.0)) || task.0.initial.len() != signals.0.states()
+    {
         return Err(misuse("expected models and a task with the states and commands of the signals".into()));
     }
     let limits = signals.0.limits(divergence_factor);

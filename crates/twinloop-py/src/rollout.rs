@@ -9,7 +9,7 @@ use twinloop_core::{
 };
 
 use crate::arrays::{
-    Cube, Matrix, Vector, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
+    Cube, Matrix, Vector, VectorOrRows, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
 };
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
@@ -25,8 +25,8 @@ pub struct PyTask(pub Task);
 #[pymethods]
 impl PyTask {
     #[new]
-    fn new(initial: Vector<'_>, target: Vector<'_>, steps: usize) -> Result<Self> {
-        Ok(Self(Task::new(vector(&initial), vector(&target), steps)?))
+    fn new(initial: Vector<'_>, target: VectorOrRows<'_>, steps: usize) -> Result<Self> {
+        Ok(Self(Task::new(vector(&initial), target.numbers(), steps)?))
     }
 }
 
@@ -116,10 +116,7 @@ pub fn rollout(
     let (excitation, disturbance) = (views(&excitation), views(&disturbance));
     let influences = Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
     let (family, task, width) = (&*family.0, &task.0, workers.width());
-    let known = dynamics.cast::<PyModel>().map(|model| AnyDynamics::Model(model.get().core()));
-    let known =
-        known.or_else(|_| dynamics.cast::<PyQuadrotor>().map(|plant| AnyDynamics::Quadrotor(&plant.get().0)));
-    let runs = if let Ok(known) = known {
+    let runs = if let Some(known) = known(dynamics) {
         flown(py, || record(&known, family, &parameters, task, &limits, influences, width))?
     } else {
         let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
@@ -135,6 +132,39 @@ pub fn rollout(
         runs
     };
     Ok(PyRuns { runs, steps, states, commands })
+}
+
+/// A free run from a state under commands, each held for one period, without a controller.
+#[pyfunction]
+#[pyo3(signature = (dynamics, initial, commands, signals, *, divergence_factor = 10.0))]
+pub fn replay(
+    py: Python<'_>,
+    dynamics: &Bound<'_, PyAny>,
+    initial: Vector<'_>,
+    commands: Matrix<'_>,
+    signals: &PySignals,
+    divergence_factor: f64,
+) -> Result<PyRuns> {
+    let signals = &signals.0;
+    let (states, width) = (signals.states(), signals.commands());
+    let (initial, commands) = (vector(&initial), rows("commands", &commands, width)?);
+    let steps = commands.len();
+    let Some(dynamics) = known(dynamics).filter(|_| initial.len() == states && steps > 0) else {
+        return Err(misuse(format!(
+            "replay: expected a model or plant, {states} states and at least one row of commands, found {} states and \
+             {steps} rows",
+            initial.len()
+        )));
+    };
+    let (commands, limits) = (commands.concat(), signals.limits(divergence_factor));
+    let run = py.detach(|| twinloop_core::replay(&dynamics, &initial, &commands, steps, &limits));
+    Ok(PyRuns { runs: vec![run], steps, states, commands: width })
+}
+
+/// Dynamics that the engine has; none for a function.
+fn known<'a>(dynamics: &'a Bound<'_, PyAny>) -> Option<AnyDynamics<'a>> {
+    let model = dynamics.cast::<PyModel>().map(|model| AnyDynamics::Model(model.get().core()));
+    model.or_else(|_| dynamics.cast::<PyQuadrotor>().map(|plant| AnyDynamics::Quadrotor(&plant.get().0))).ok()
 }
 
 /// A step function in Python, called on the thread that asked for the roll-out.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use twinloop_core::{Experiment, SelectedTests};
 
-use crate::arrays::{Matrix, Vector, optional_rows, rows, vector};
+use crate::arrays::{Matrix, Vector, VectorOrRows, optional_rows, rows, vector};
 use crate::controller::PyFamily;
 use crate::error::Result;
 use crate::model::PySignals;
@@ -27,7 +27,7 @@ impl PySelectedTests {
     fn with_test(
         &self,
         parameters: Vector<'_>,
-        target: Vector<'_>,
+        target: VectorOrRows<'_>,
         states: Matrix<'_>,
         commands: Matrix<'_>,
         excitation: Option<Matrix<'_>>,
@@ -35,7 +35,7 @@ impl PySelectedTests {
         let signals = self.0.signals();
         let experiment = Experiment {
             parameters: vector(&parameters),
-            target: vector(&target),
+            target: target.numbers(),
             states: rows("states", &states, signals.states())?.concat(),
             commands: rows("commands", &commands, signals.commands())?.concat(),
             excitation: optional_rows("excitation", excitation, signals.commands())?.concat(),

@@ -16,9 +16,9 @@ use std::sync::Arc;
 use crate::controller::Family;
 use crate::error::{Result, invalid};
 use crate::lanes::{Vector, groups, interleave, lanes_for, vectors};
-use crate::rollout::Start;
+use crate::rollout::{Commands, Start};
 use crate::signals::Signals;
-use crate::task::Task;
+use crate::task::{Task, is_target};
 
 /// One flight that could be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Candidate {
     pub parameters: Vec<f64>,
     /// First state (n_x).
     pub initial: Vec<f64>,
-    /// State to lead to (n_x).
+    /// State to lead to: constant (n_x), or a row for each state ((n + 1) × n_x).
     pub target: Vec<f64>,
     /// What is added to the commands before they are clipped, n × n_u; empty for nothing.
     pub excitation: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Flights {
 }
 
 impl Flights {
-    /// Candidates that fly `steps` steps each, all with an excitation or none of them. A flight that leaves
+    /// Candidates that fly `steps` steps each, all with an excitation or none of them, all to constant targets or none. A flight that leaves
     /// `divergence_factor` times the scale of a state counts as diverged.
     pub fn new(
         signals: Arc<Signals>,
@@ -67,7 +67,16 @@ impl Flights {
             ));
         }
         let excitation = if candidates[0].excitation.is_empty() { 0 } else { steps * signals.commands() };
-        let lengths = [family.parameters().len(), signals.states(), signals.states(), excitation];
+        let target = candidates[0].target.len();
+        if !is_target(target, signals.states(), steps) {
+            return invalid(format!(
+                "flights: expected targets of {} states, or a row of them for each of {} states of a flight, found \
+                 {target} numbers",
+                signals.states(),
+                steps + 1
+            ));
+        }
+        let lengths = [family.parameters().len(), signals.states(), target, excitation];
         for (i, Candidate { parameters, initial, target, excitation }) in candidates.iter().enumerate() {
             let parts = [parameters, initial, target, excitation];
             let found = parts.map(Vec::len);
@@ -108,14 +117,16 @@ impl Flights {
     #[inline(always)]
     fn start<'a, V: Vector>(&'a self, lanes: &'a GroupLanes<V>, noise: &'a [V]) -> Start<'a, V> {
         Start {
-            family: &self.family,
-            parameters: &lanes.parameters,
+            commands: Commands::Law {
+                family: &self.family,
+                parameters: &lanes.parameters,
+                target: &lanes.target,
+                excitation: &lanes.excitation,
+            },
             initial: &lanes.initial,
-            target: &lanes.target,
             steps: self.steps,
             limits: &self.limits,
             noise,
-            excitation: &lanes.excitation,
             disturbance: &[],
         }
     }
@@ -130,7 +141,7 @@ struct Group {
     parameters: Vec<f64>,
     /// n_x × lanes
     initial: Vec<f64>,
-    /// n_x × lanes
+    /// n_x × lanes, or (n + 1) × n_x × lanes.
     target: Vec<f64>,
     /// n × n_u × lanes, or empty.
     excitation: Vec<f64>,

@@ -6,6 +6,7 @@ use crate::difference::Periods;
 use crate::error::{Error, Result, invalid};
 use crate::lanes::Vector;
 use crate::signals::Signals;
+use crate::task::target_at;
 
 /// How the distance to the target counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,7 +114,8 @@ impl<V: Vector> Tally<'_, V> {
     pub(super) fn add(&mut self, step: usize, command: &[V], next: &[V]) {
         let Quality { kind, weights, effort, effort_rate } = self.quality;
         let mut error = V::splat(0.0);
-        for (i, ((state, target), &weight)) in next.iter().zip(self.target).zip(weights).enumerate() {
+        let target = target_at(self.target, next.len(), step + 1);
+        for (i, ((state, target), &weight)) in next.iter().zip(target).zip(weights).enumerate() {
             let difference = self.periods.difference(i, *state, *target);
             let size = if *kind == QualityKind::Iae { difference.abs() } else { difference * difference };
             error = error + size * weight;

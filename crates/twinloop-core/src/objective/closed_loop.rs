@@ -4,7 +4,7 @@ use super::divergence_penalty;
 use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, vectors, with_test_lanes};
-use crate::rollout::{Seen, Start, Watch, rollout};
+use crate::rollout::{Commands, Seen, Start, Watch, rollout};
 use crate::selected::{Loops, SelectedTests};
 
 /// Mean squared error of each test's run over its recorded steps and components (N).
@@ -31,14 +31,16 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
     fn of_group<V: Vector>(&self, loops: &Loops, errors: &mut Vec<f64>) {
         let states = self.selected.signals().states();
         let start = Start {
-            family: self.selected.family(),
-            parameters: &vectors::<V>(&loops.parameters),
+            commands: Commands::Law {
+                family: self.selected.family(),
+                parameters: &vectors::<V>(&loops.parameters),
+                target: &vectors::<V>(&loops.target),
+                excitation: &vectors::<V>(&loops.excitation),
+            },
             initial: &vectors::<V>(&loops.initial),
-            target: &vectors::<V>(&loops.target),
             steps: loops.steps.iter().copied().max().unwrap_or(0),
             limits: self.selected.limits(),
             noise: &[],
-            excitation: &vectors::<V>(&loops.excitation),
             disturbance: &[],
         };
         let steps = (0..V::LANES).map(|l| loops.steps.get(l).map_or(0.0, |&steps| steps as f64));

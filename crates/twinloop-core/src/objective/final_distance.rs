@@ -4,8 +4,8 @@ use crate::controller::Family;
 use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_test_lanes};
-use crate::rollout::{Seen, Start, Watch, rollout};
-use crate::task::Task;
+use crate::rollout::{Commands, Seen, Start, Watch, rollout};
+use crate::task::{Task, target_at};
 use crate::workers::Workers;
 
 /// Final distances of each controller on each of the dynamics (dynamics × controllers); infinite where the run diverged.
@@ -49,18 +49,21 @@ impl<D: Dynamics> OfGroup<'_, D> {
         let Task { initial, target, steps } = self.task;
         let target: Vec<V> = pack(&[target]);
         let start = Start {
-            family: self.family,
-            parameters: &pack::<V, _>(self.parameters),
+            commands: Commands::Law {
+                family: self.family,
+                parameters: &pack::<V, _>(self.parameters),
+                target: &target,
+                excitation: &[],
+            },
             initial: &pack::<V, _>(&[initial]),
-            target: &target,
             steps: *steps,
             limits: self.limits,
             noise: &[],
-            excitation: &[],
             disturbance: &[],
         };
         let periods = self.family.periods();
-        let mut last = LastStep { periods, steps: *steps, target: &target, squared: V::splat(0.0) };
+        let target = target_at(&target, initial.len(), *steps);
+        let mut last = LastStep { periods, steps: *steps, target, squared: V::splat(0.0) };
         let lasted = rollout(self.dynamics, &start, &mut last);
         let of_lane = |l: usize| {
             if lasted[l] < *steps { f64::INFINITY } else { last.squared.lane(l).sqrt() }
