@@ -73,6 +73,7 @@ __all__ = [
     "purposes",
     "qualities",
     "ranks",
+    "replay",
     "rollout",
     "search_subsets",
     "select",
@@ -349,7 +350,8 @@ class Controller:
 class Task:
     """Where runs start, where they should end, how long they last."""
 
-    def __new__(cls, initial: ArrayLike, target: ArrayLike, steps: int) -> Task: ...
+    def __new__(cls, initial: ArrayLike, target: ArrayLike, steps: int) -> Task:
+        """Target (n_x,), or a row for each state (steps + 1, n_x)."""
 
 @final
 class Runs:
@@ -367,6 +369,16 @@ class Runs:
     @property
     def lasted(self) -> _Integers:
         """Steps before each run stopped (m,); n if it did not."""
+
+def replay(
+    dynamics: Model | Quadrotor,
+    initial: ArrayLike,
+    commands: ArrayLike,
+    signals: Signals,
+    *,
+    divergence_factor: float = 10.0,
+) -> Runs:
+    """A free run from a state (n_x,) under commands (n, n_u), without a controller."""
 
 def rollout(
     dynamics: Model | Quadrotor | Callable[[_Floats, _Floats], ArrayLike],

@@ -60,7 +60,8 @@ class Campaign(Recorded, kind="campaign"):
         signals: of the system.
         controller: a family of controllers, such as `twinloop.controllers.PID`.
         initial_state: where every test starts (n_x,), SI units, radians.
-        target_state: where every test should end (n_x,), the same units.
+        target_state: where every test should end (n_x,), the same units. A reference that varies with time is a
+            function of it in s, sampled at `dt`, or a row for each period and one for the end (n + 1, n_x).
         duration: of a test, s; a whole number of periods.
         preset: "default", or "paper" for the algorithm of the paper to the letter.
         seed: of all random numbers; equal seeds give equal bits.
@@ -89,7 +90,7 @@ class Campaign(Recorded, kind="campaign"):
         *,
         controller: UnboundFamily,
         initial_state: ArrayLike,
-        target_state: ArrayLike,
+        target_state: ArrayLike | Callable[[float], ArrayLike],
         duration: float,
         preset: str = "default",
         seed: int = 0,
@@ -576,7 +577,7 @@ class Campaign(Recorded, kind="campaign"):
             axes = getattr(described, "axes", None)
             names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
         laws = [twin.law, *(Law.of(member, self.signals) for member in twin.members)]
-        return margins_of(laws, self.family, genes, self.setup.target_state, mixer, names, broken_at)
+        return margins_of(laws, self.family, genes, self.setup.final_target, mixer, names, broken_at)
 
     @property
     def committee(self) -> tuple[_core.Model, ...]:

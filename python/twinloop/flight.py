@@ -54,8 +54,43 @@ def fly(
             disturbance=_one(disturbance),
             divergence_factor=divergence_factor,
         )
+    return _trajectory(runs, test.steps, signals, divergence_factor)
+
+
+def fly_commands(
+    dynamics: _core.Model | _core.Quadrotor,
+    initial_state: Floats,
+    commands: Floats,
+    signals: Signals,
+    *,
+    divergence_factor: float = 10.0,
+) -> Trajectory:
+    """A free run under given commands, without a controller.
+
+    Args:
+        dynamics: an engine's model or plant.
+        initial_state: where it starts (n_x,), in the units of the states.
+        commands: each held for a period (n, n_u), n at least 1, in their units, sent as they are.
+        signals: of the dynamics.
+        divergence_factor: multiple of a state's scale beyond which the run counts as diverged and is cut.
+
+    Returns:
+        The run; cut before the step that diverged.
+
+    Raises:
+        InvalidInput: the engine refused the arguments.
+    """
+    with engine_input():
+        runs = _core.replay(
+            dynamics, initial_state, commands, signals.engine, divergence_factor=divergence_factor
+        )
+    return _trajectory(runs, len(commands), signals, divergence_factor)
+
+
+def _trajectory(runs: _core.Runs, steps: int, signals: Signals, divergence_factor: float) -> Trajectory:
+    """The first of the runs."""
     lasted = int(runs.lasted[0])
-    completed = lasted == test.steps
+    completed = lasted == steps
     reason = "" if completed else _why_cut(runs.states[0, lasted], lasted, signals, divergence_factor)
     return Trajectory(
         signals.dt * np.arange(lasted + 1, dtype=np.float64),

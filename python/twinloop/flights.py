@@ -30,7 +30,8 @@ def candidates(
         family: of the controllers.
         genes: gains (K, size), in their units.
         initial_states: where each starts (K, n_x), or where all start (n_x,), SI units, radians.
-        target_states: where each should end (K, n_x), or all (n_x,), the same units.
+        target_states: where each should end (K, n_x), or all (n_x,), the same units; or a row for each state of each
+            flight (K, n + 1, n_x).
         steps: number of commands of each, n.
         excitation: what is added to the commands of each (K, n, n_u), in their units; None: nothing.
         divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
@@ -49,7 +50,7 @@ def candidates(
             family.engine,
             rows,
             _states("Flights, initial states", initial_states, len(rows), n_x),
-            _states("Flights, target states", target_states, len(rows), n_x),
+            _states("Flights, target states", target_states, len(rows), n_x, steps),
             steps,
             excitation=excitation,
             divergence_factor=divergence_factor,
@@ -153,7 +154,9 @@ def disagreements(
         return _core.disagreements(models, flights, sds, cap=cap, workers=workers)
 
 
-def _states(what: str, states: ArrayLike, count: int, n_x: int) -> Floats:
+def _states(what: str, states: ArrayLike, count: int, n_x: int, steps: int | None = None) -> Floats:
+    if np.ndim(states) == 3 and steps is not None:
+        return floats(what, states, (count, steps + 1, n_x))
     if np.ndim(states) == 1:
         return np.tile(floats(what, states, (n_x,)), (count, 1))
     return floats(what, states, (count, n_x))

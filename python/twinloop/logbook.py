@@ -244,7 +244,7 @@ class Logbook(Recorded, kind="logbook"):
         before = judge(_with_run(self._none(known), known, recorded))
         distance = quality = None
         if recorded.ended == "completed" and recorded.steps == known.steps:
-            distance = quality = final_distance(recorded.states[-1], known.target_state, signals)
+            distance = quality = final_distance(recorded.states[-1], known.target(known.steps), signals)
             if self.setup.preset != "paper":
                 quality = self.setup.quality.flown(recorded, known.target_state)
         self._enter(Experiment(known, recorded, before, frozen_error(recorded, signals), distance, quality))

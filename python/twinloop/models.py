@@ -17,7 +17,7 @@ from twinloop.arrays import Floats, floats, number
 from twinloop.elementary import exp
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.exports.export import Source, asked, c_name, exported
-from twinloop.flight import driven, fly
+from twinloop.flight import fly, fly_commands
 from twinloop.law.equations import equations
 from twinloop.law.law import Law
 from twinloop.linear.plant import Linear, linearised, resting, trimmed
@@ -291,19 +291,23 @@ class Twin(Recorded, kind="twin"):
         members = [Law.of(member, self.signals, self.offsets) for member in self.members]
         return equations(self.law, members, digits)
 
-    def simulate(self, test: Test) -> Trajectory:
+    def simulate(self, test: Test, initial_state: ArrayLike | None = None) -> Trajectory:
         """Flies a test on the twin instead of the system.
 
         Args:
             test: any test for the same signals.
+            initial_state: where to start (n_x,), SI units, radians; None: where the test does.
 
         Returns:
             The predicted run, cut where it diverges; with a `band` where a committee stands behind the twin.
 
         Raises:
-            InvalidInput: the test is for other signals.
+            InvalidInput: the test is for other signals, or the start for other states.
         """
         check_signals(test, self.signals)
+        if initial_state is not None:
+            start = floats("Initial state", initial_state, (self.signals.n_x,))
+            test = dataclasses.replace(test, initial_state=start)
         run = fly(self.model, test, divergence_factor=self.divergence_factor)
         spread = self.spread(test)
         if spread is None or self.noise is None:
@@ -429,8 +433,14 @@ class Twin(Recorded, kind="twin"):
         u = floats("Commands", commands, (None, self.signals.n_u))
         if len(u) == 0:
             return Trajectory(np.zeros(1), state[np.newaxis], u)
-        test = driven(self.signals, state, u)
-        return fly(self.model, test, divergence_factor=self.divergence_factor)
+        low, high = np.array([command.bounds for command in self.signals.commands]).T
+        return fly_commands(
+            self.model,
+            state,
+            np.clip(u, low, high),
+            self.signals,
+            divergence_factor=self.divergence_factor,
+        )
 
     def __repr__(self) -> str:
         return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"

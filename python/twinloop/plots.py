@@ -15,6 +15,7 @@ from twinloop.errors import NotAvailable
 from twinloop.objectives import normalised_error
 from twinloop.presets import DefaultOptions
 from twinloop.signals import State
+from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 SUFFIXES = (".svg", ".png")
@@ -209,8 +210,7 @@ def _runs(figure: Any, campaign: Campaign) -> None:
             axes, (factor, unit) = grid[row, column], shown_unit(state.unit)
             flown = factor * run.trajectory.states[:, row]
             if run.test is not None:
-                target = factor * _near(run.test.target_state[row], run.trajectory.states[-1, row], state)
-                axes.axhline(target, color=TARGET, linewidth=0.8, linestyle=":", label="target")
+                _draw_target(axes, run.test, row, factor, run.trajectory)
             if predicted.band is not None:
                 low, high = factor * predicted.band[:, :, row]
                 axes.fill_between(predicted.t, low, high, label="90 % band of the twin", **BAND)
@@ -251,6 +251,20 @@ def _inside_the_band(axes: Any, flown: Trajectory, predicted: Trajectory, first:
     axes.set_ylim(-3.5, 3.5)
     if first:
         axes.set_ylabel("all states,\nin the band")
+
+
+def _draw_target(axes: Any, test: Test, row: int, factor: float, flown: Trajectory) -> None:
+    """The target of a state: a line, or a curve where it varies with time."""
+    signals, style = (
+        test.family.signals,
+        {"color": TARGET, "linewidth": 0.8, "linestyle": ":", "label": "target"},
+    )
+    if test.target_state.ndim == 1:
+        target = _near(test.target_state[row], flown.states[-1, row], signals.states[row])
+        axes.axhline(factor * target, **style)
+    else:
+        curve = signals.continued(test.target_state, flown.states[0])[:, row]
+        axes.plot(signals.dt * np.arange(len(curve)), factor * curve, **style)
 
 
 def _near(value: float, reading: float, state: State) -> float:

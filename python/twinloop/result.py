@@ -61,7 +61,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "dt": campaign.signals.dt,
             "distance": float(
                 np.linalg.norm(
-                    campaign.signals.difference(campaign.setup.target_state, campaign.setup.initial_state)
+                    campaign.signals.difference(campaign.setup.final_target, campaign.setup.initial_state)
                 )
             ),
         },

@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
@@ -25,6 +26,7 @@ from twinloop.presets import AnyOptions, DefaultOptions, Options, options_of
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.search import grammar, settings_of_tests, variation
 from twinloop.signals import Signals
+from twinloop.test import checked_target
 
 MOST_STEPS = 10_000_000
 """Of a test in a record."""
@@ -39,7 +41,8 @@ class Setup(Recorded, kind="setup"):
         controller: the family of controllers as it was described.
         family: the same, bound to the signals.
         initial_state: where every test starts (n_x,), SI units, radians.
-        target_state: where every test should end (n_x,), the same units.
+        target_state: where every test should end (n_x,), the same units; or where it should be at each state of a run
+            (steps + 1, n_x).
         steps: of a test.
         preset: name of the set of options.
         options: the preset's, with those that were changed.
@@ -64,6 +67,11 @@ class Setup(Recorded, kind="setup"):
     def task(self) -> _core.Task:
         """Start, target and length, for the native engine."""
         return _core.Task(self.initial_state, self.target_state, self.steps)
+
+    @property
+    def final_target(self) -> Floats:
+        """Where every test should end (n_x,)."""
+        return self.target_state if self.target_state.ndim == 1 else self.target_state[-1]
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
@@ -125,7 +133,7 @@ def checked(
     signals: object,
     controller: object,
     initial_state: ArrayLike,
-    target_state: ArrayLike,
+    target_state: ArrayLike | Callable[[float], ArrayLike],
     duration: object,
     preset: str,
     options: Mapping[str, object] | None,
@@ -140,7 +148,8 @@ def checked(
         signals: of the system.
         controller: a family of controllers.
         initial_state: (n_x,), SI units, radians.
-        target_state: (n_x,), the same units.
+        target_state: (n_x,), the same units; or a reference that varies with time: a function of it in s, or a row for
+            each period and one for the end.
         duration: of a test, s.
         preset: name of a set of options.
         options: other values for some of them.
@@ -164,13 +173,10 @@ def checked(
             "Campaign, controller: expected a family such as twinloop.controllers.PID, "
             f"found {controller!r}; pass one."
         )
-    if callable(target_state):
-        raise InvalidInput(
-            "Campaign, target_state: expected one constant state, found a function of time; "
-            "this version has no time-varying targets, pass an array."
-        )
+    steps = _steps(number("Campaign, duration (s)", duration, above=0.0), signals.dt)
     start = floats("Campaign, initial_state", initial_state, (signals.n_x,))
-    target = floats("Campaign, target_state", target_state, (signals.n_x,))
+    rows = _sampled(target_state, signals, steps) if callable(target_state) else target_state
+    target = checked_target("Campaign, target_state", rows, signals.n_x, steps)
     if preset == "paper" and not signals.difference(target, start).any():
         raise InvalidInput(
             "Campaign, target_state: expected a target away from the initial state, found both the same; "
@@ -179,7 +185,6 @@ def checked(
     known_seed = whole("Campaign, seed", seed)
     if known_seed >= 2**64:
         raise InvalidInput(f"Campaign, seed: expected less than 2**64, found {seed}; choose a smaller one.")
-    steps = _steps(number("Campaign, duration (s)", duration, above=0.0), signals.dt)
     given = {} if options is None else options
     changes = dict(given) if isinstance(given, Mapping) else given
     if operators is not None and isinstance(changes, dict):
@@ -192,12 +197,19 @@ def checked(
     )
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
-    for what, state in (("initial_state", start), ("target_state", target)):
+    for what, state in (("initial_state", start), *(("target_state", row) for row in np.atleast_2d(target))):
         _check_reachable(f"Campaign, {what}", state, signals, chosen.divergence_factor)
         if isinstance(chosen, DefaultOptions):
             _check_inside(f"Campaign, {what}", state, signals, chosen.margin)
     _check_use(chosen, signals)
     return setup
+
+
+def _sampled(reference: Callable[[float], ArrayLike], signals: Signals, steps: int) -> Floats:
+    """A function of time at the start of every period, and at the end of the last (steps + 1, n_x)."""
+    times = [k * signals.dt for k in range(steps + 1)]
+    rows = [floats(f"Campaign, target_state({t:g} s)", reference(t), (signals.n_x,)) for t in times]
+    return np.array(rows)
 
 
 def _check_use(options: AnyOptions, signals: Signals) -> None:

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
@@ -24,7 +25,8 @@ class Test(Recorded, kind="test", given=("family",)):
         family: what its controller is one of.
         genes: gains of the controller (size,), in their units.
         initial_state: state to start from (n_x,), SI units, radians.
-        target_state: state to lead to (n_x,), the same units.
+        target_state: state to lead to (n_x,), the same units; or a row for each state of the run (n + 1, n_x), a
+            reference that varies with time.
         steps: number of commands, n.
         excitation: what is added to the controller's commands (n, n_u), in their units; the sum is clipped to
             the commands' bounds. None: nothing.
@@ -61,8 +63,9 @@ class Test(Recorded, kind="test", given=("family",)):
         n_x = self.family.signals.n_x
         object.__setattr__(self, "genes", floats("Test.genes", self.genes, (self.family.size,)))
         object.__setattr__(self, "initial_state", floats("Test.initial_state", self.initial_state, (n_x,)))
-        object.__setattr__(self, "target_state", floats("Test.target_state", self.target_state, (n_x,)))
         object.__setattr__(self, "steps", whole("Test.steps", self.steps, least=1))
+        target = checked_target("Test.target_state", self.target_state, n_x, self.steps)
+        object.__setattr__(self, "target_state", target)
         if self.excitation is not None:
             shape = (self.steps, self.family.signals.n_u)
             object.__setattr__(self, "excitation", floats("Test.excitation", self.excitation, shape))
@@ -76,6 +79,14 @@ class Test(Recorded, kind="test", given=("family",)):
     def task(self) -> _core.Task:
         """Start, target and length, for the native engine."""
         return _core.Task(self.initial_state, self.target_state, self.steps)
+
+    def target(self, k: int) -> Floats:
+        """The state to lead to at time k dt (n_x,), k from 0 to n: what a loop passes to its controller.
+
+        Args:
+            k: number of the period.
+        """
+        return self.target_state if self.target_state.ndim == 1 else self.target_state[k]
 
     def controller(self) -> Controller:
         """A fresh controller for one run: `.command(state, target)` once a period, the excitation in it."""
@@ -123,6 +134,21 @@ class Test(Recorded, kind="test", given=("family",)):
     def __repr__(self) -> str:
         gains = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())
         return f"Test({self.number}: {gains})"
+
+
+def checked_target(what: str, values: ArrayLike, n_x: int, steps: int) -> Floats:
+    """A target that is constant, or one that varies with time.
+
+    Args:
+        what: how to call it in an error.
+        values: (n_x,), or a row for each state of a run (steps + 1, n_x), in the units of the states.
+        n_x: number of states.
+        steps: of the run.
+
+    Raises:
+        InvalidInput: another shape, or numbers that are not finite.
+    """
+    return floats(what, values, (n_x,) if np.ndim(values) < 2 else (steps + 1, n_x))
 
 
 def final_distance(last_state: ArrayLike, target_state: ArrayLike, signals: Signals | None = None) -> float:

@@ -357,7 +357,7 @@ class IdentifyAndPlan:
         if not isinstance(family, FeedbackFamily) or not committee.trusted:
             return []
         try:
-            return [family.genes(lqr_gains(committee.members[0], family, self.setup.target_state))]
+            return [family.genes(lqr_gains(committee.members[0], family, self.setup.final_target))]
         except (NotAvailable, InvalidInput):
             return []
 
@@ -376,7 +376,7 @@ class IdentifyAndPlan:
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
-        family, target = self.setup.family, self.setup.target_state
+        family, target = self.setup.family, np.atleast_2d(self.setup.target_state)[0]
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
 

@@ -78,15 +78,16 @@ def candidates(
 
 
 def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> Ends:
-    """Start and target of each candidate (K, n_x); those of the campaign for the first one."""
+    """Start (K, n_x) and target (K, n_x) or (K, n + 1, n_x) of each candidate; the campaign's for the first one."""
     stream = judge.unit.part(number).stream("ends")
     ends = []
     for middle, reach in (
         (judge.task.initial_state, options.initial_range),
         (judge.task.target_state, options.target_range),
     ):
-        states = np.tile(middle, (count, 1))
+        states = np.tile(middle, (count, *(1 for _ in middle.shape)))
         if any(reach):
-            states[1:] += np.array(reach) * (2.0 * stream.uniforms(count - 1, len(middle)) - 1.0)
+            off = np.array(reach) * (2.0 * stream.uniforms(count - 1, middle.shape[-1]) - 1.0)
+            states[1:] += off if middle.ndim == 1 else off[:, np.newaxis]
         ends.append(states)
     return ends[0], ends[1]

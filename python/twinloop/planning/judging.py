@@ -166,6 +166,8 @@ class Judge:
     def flights(self, genes: Floats, excitation: Floats | None, ends: Ends | None) -> _core.Flights:
         """Candidates laid out for the engine; those of the campaign's own task where no ends are given."""
         initial, target = ends or (self.task.initial_state, self.task.target_state)
+        if ends is None and target.ndim == 2:
+            target = np.tile(target, (len(genes), 1, 1))
         return candidates(
             self.family, genes, initial, target, self.task.steps,
             excitation=excitation, divergence_factor=self.divergence_factor,

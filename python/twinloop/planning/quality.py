@@ -44,10 +44,11 @@ class Quality:
 
         Args:
             trajectory: of at least one step.
-            target: state that it should have been led to (n_x,).
+            target: state that it should have been led to (n_x,), or a row for each of its states (n + 1, n_x).
         """
         dt = self.signals.dt
-        errors = self.signals.difference(trajectory.states[1:], target)
+        goal = target if target.ndim == 1 else target[1 : len(trajectory.states)]
+        errors = self.signals.difference(trajectory.states[1:], goal)
         if self.kind == "final_distance":
             value = float(np.sqrt((self.weights * errors[-1] ** 2).sum()))
         else:
