@@ -213,7 +213,7 @@ CAMPAIGNS = {
     "no threads": {"threads": 0},
     "nothing to call": {"progress": 3},
     "a misspelt argument": {"targt_state": [1.0, 0.0]},
-    "an argument of another version": {"store": "hover.db"},
+    "an argument of another version": {"dashboard": True},
 }
 
 
