@@ -80,6 +80,7 @@ def test_values_of_nodes_are_those_of_the_recursion(pool, seed):
     with np.errstate(all="ignore"):
         expected = np.stack([value(pool, n, rows) for n in numbers], axis=1)
         tame = (np.abs(expected) < 1e6).all()
+    assert pool.values([], rows).shape == (len(rows), 0)
     found = pool.values(numbers, rows)
     assert found.shape == expected.shape
     if tame:
