@@ -16,7 +16,8 @@ from strategies import program_text, programs
 from twinloop import _core
 from twinloop.errors import NotAvailable
 from twinloop.exports.c_source import c_source
-from twinloop.exports.checks import c_simulation, python_simulation
+from twinloop.exports.checks import c_controller, c_simulation, python_controller, python_simulation
+from twinloop.exports.controller_source import controller_c, controller_python
 from twinloop.exports.python_source import python_source
 from twinloop.models import Noise, TestErrors
 
@@ -287,3 +288,165 @@ def test_a_file_that_holds_no_twin_is_refused(tmp_path):
     path.write_text(json.dumps({**record, "offsets": [0.1]}))
     with pytest.raises(tl.InvalidInput, match="damaged"):
         tl.load_twin(path)
+
+
+# Controllers
+
+THREE = tl.Signals(
+    states=[
+        tl.State("angle", "rad", 3.0, periodic=True),
+        tl.State("rate", "rad/s", 8.0, derivative_of="angle"),
+        tl.State("level", "m", 1.0),
+    ],
+    commands=[tl.Command("torque", "N m", (-2.0, 2.0)), tl.Command("fan", "V", (0.0, 5.0))],
+    dt=0.05,
+)
+MIX = tl.controllers.Mixer([[1.0, 0.2], [-0.5, 0.7]], offset=[0.1, 2.0], power=0.5)
+BOX = (-9.0, 9.0)
+
+
+def gains_of(*names):
+    return dict.fromkeys(names, BOX)
+
+
+CONTROLLERS = {
+    "pid": tl.controllers.PID(
+        axes=[("angle", "rate"), ("level", None)],
+        gains=gains_of(*(f"{axis}.{term}" for axis in ("angle", "level") for term in ("kp", "ki", "kd"))),
+    ),
+    "pid with all options": tl.controllers.PID(
+        axes=[("angle", None), ("level", None)],
+        gains=gains_of(*(f"{axis}.{term}" for axis in ("angle", "level") for term in ("kp", "ki", "kd"))),
+        output=MIX, anti_windup="clamping", derivative_filter=0.2,
+    ),
+    "cascade": tl.controllers.Cascade(
+        axes=[("angle", "rate")],
+        gains=gains_of("angle.kp", "rate.kp", "rate.ki", "rate.kd"),
+        output=tl.controllers.Mixer([[1.0], [-2.0]], offset=[0.0, 1.0]),
+        rate_limits={"rate": 1.5}, anti_windup="clamping", derivative_filter=0.1,
+    ),
+    "state feedback": tl.controllers.StateFeedback(None, BOX, output=MIX, integral=("angle",)),
+    "state feedback without a mixer": tl.controllers.StateFeedback(("angle", "rate"), BOX),
+}  # fmt: skip
+
+
+def led(described, seed):
+    """A family, gains, and states and a target that bring commands to their bounds and an angle round."""
+    rng = np.random.default_rng(seed)
+    family = described.bind(THREE)
+    genes = rng.uniform(-3.0, 3.0, family.size)
+    states = np.cumsum(0.6 * rng.normal(size=(60, 3)), axis=0)
+    target = rng.normal(size=3)
+    controller = family.controller(genes)
+    return family, genes, states, target, np.array([controller.command(x, target) for x in states])
+
+
+@pytest.mark.parametrize("which", CONTROLLERS)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_controller_in_python_commands_the_same(which, seed):
+    family, genes, states, target, expected = led(CONTROLLERS[which], seed)
+    found = python_controller(controller_python(CONTROLLERS[which], family, genes))(states, target)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    bounds = np.array([command.bounds for command in THREE.commands])
+    assert (expected == bounds[:, 0]).any() or (expected == bounds[:, 1]).any()
+
+
+@needs_cc
+@pytest.mark.parametrize("which", CONTROLLERS)
+def test_a_controller_in_c_commands_the_same(which):
+    family, genes, states, target, expected = led(CONTROLLERS[which], 1)
+    source = controller_c(CONTROLLERS[which], family, genes, "loop")
+    found = c_controller(*source, "loop", 2, "double")(states, target)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    single = controller_c(CONTROLLERS[which], family, genes, "loop", "float")
+    assert "double" not in single[1]
+    c_controller(*single, "loop", 2, "float")(states, target)
+
+
+def test_a_periodic_state_is_taken_away_as_the_model_sees_it():
+    lines = ["r5 = r0 * 0.7", "r5 = r5 * r0", "r6 = r3 + r1", "r5 = r5 - r6", "r6 = r2 * -0.1"]
+    twin = twin_of(lines, signals=THREE, inputs=5)
+    start, commands = np.array([3.0, 4.0, 0.0]), np.zeros((20, 2))
+    expected = twin.simulate_commands(start, commands).states
+    assert expected[-1, 0] > 4.0  # it went round
+    found = python_simulation(python_source(twin.law))(start, commands)
+    np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9)
+    assert "angle is seen within 3.14159 rad of 0" in twin.equations()
+    point = twin.linearise([5.0, 0.3, 0.0], [0.1, 0.2], discrete=True)
+    nudged = [twin.predict([5.0 + sign * 1e-6, 0.3, 0.0], [0.1, 0.2]) for sign in (1.0, -1.0)]
+    np.testing.assert_allclose(point.A[:, 0], (nudged[0] - nudged[1]) / 2e-6, rtol=1e-6, atol=1e-9)
+    if shutil.which("cc"):
+        found = c_simulation(*c_source(twin.law, "rig"), "rig", twin.law, "double")(start, commands)
+        np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9)
+
+
+def test_the_controller_of_a_campaign_is_taken_away(tmp_path, new_campaign, pendulum):
+    campaign = new_campaign()
+    campaign.run(pendulum, experiments=2)
+    (path,) = campaign.export_controller(tmp_path / "loop.py")
+    names = {}
+    exec(path.read_text(), names)
+    gains = campaign.best_test.parameters
+    assert names["GAINS"] == gains
+    with pytest.raises(tl.InvalidInput, match="controller"):
+        campaign.export_controller("latex")
+    with pytest.raises(tl.InvalidInput, match="precision"):
+        campaign.export_controller("c", precision="half")
+
+
+def test_a_controller_of_ones_own_is_not_taken_away():
+    class Nothing:
+        def __init__(self, gain):
+            self.gain = gain
+
+        def reset(self):
+            pass
+
+        def command(self, state, target):
+            return [0.0, 0.0]
+
+    described = tl.controllers.Custom(Nothing, {"gain": (0.0, 1.0)})
+    with pytest.raises(NotAvailable, match="by hand"):
+        controller_python(described, described.bind(THREE), np.array([0.5]))
+
+
+# The command line
+
+
+def run(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "twinloop", "export", *map(str, arguments)], capture_output=True, text=True
+    )
+
+
+def test_a_stored_campaign_is_taken_away_from_the_command_line(tmp_path, new_campaign, pendulum):
+    pytest.importorskip("sqlalchemy")
+    store = tmp_path / "rig.db"
+    campaign = new_campaign(store=store)
+    campaign.run(pendulum, experiments=2)
+    done = run(store, "controller", "--output", tmp_path / "loop.py")
+    assert done.returncode == 0 and done.stdout.startswith("Wrote ")
+    assert "class Controller:" in (tmp_path / "loop.py").read_text()
+    done = run(store, "twin", "--to", "python", "--force")
+    assert done.returncode == 0 and "def simulate(" in done.stdout
+    twin = TWINS["acceleration"]()
+    (path,) = twin.export(tmp_path / "twin.json")
+    done = run(path, "--to", "latex")
+    assert done.returncode == 0 and done.stdout == twin.export("latex")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["nowhere.db", "twin", "--to", "c"], "no file"),
+        (["twin.json", "twin"], "--output FILE"),
+        (["twin.json", "gearbox", "--to", "c"], "thing to export"),
+        (["twin.json", "controller", "--to", "c"], "JSON"),
+        (["twin.json", "twin", "--to", "rust"], "kind of export"),
+    ],
+)
+def test_what_cannot_be_taken_away_is_refused_with_one_sentence(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    TWINS["acceleration"]().export("twin.json")
+    done = run(*arguments)
+    assert done.returncode == 2 and said in done.stderr and done.stderr.count("\n") == 1

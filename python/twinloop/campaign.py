@@ -15,6 +15,7 @@ from twinloop import _core
 from twinloop.arrays import floats, whole
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
+from twinloop.exports.export import asked, delivered, exported_controller
 from twinloop.history import Experiment, Failure, Iteration, Lesson, Progress
 from twinloop.keeping import Keeping, look
 from twinloop.law.law import Law
@@ -578,6 +579,40 @@ class Campaign(Recorded, kind="campaign"):
             names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
         laws = [twin.law, *(Law.of(member, self.signals) for member in twin.members)]
         return margins_of(laws, self.family, genes, self.setup.final_target, mixer, names, broken_at)
+
+    def export_controller(
+        self,
+        to: str | Path,
+        parameters: Mapping[str, float] | ArrayLike | None = None,
+        *,
+        precision: str = "double",
+        force: bool = False,
+    ) -> str | tuple[Path, ...]:
+        """A controller as Python or C99 without dependencies, one call a period; clipped, with all its options.
+
+        It is run on the states of the campaign's flights and compared with the controller itself: differences above
+        1e-9 of a command's scale are refused (1e-3 in single precision).
+
+        Args:
+            to: "python" or "c", or the path of a file that ends in ".py" or ".c".
+            parameters: gains, by name or in order; None: those of `best_test`.
+            precision: of C, "double" or "float".
+            force: without the comparison.
+
+        Returns:
+            The text where a kind was asked for (in C the header, then the source), else the paths that were written.
+
+        Raises:
+            InvalidInput: unknown gains, no such kind, or a path that cannot be written.
+            NotAvailable: a family of one's own, or an export that could not be checked.
+        """
+        kind, path = asked(to, None)
+        genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
+        name = "controller" if path is None else path.stem
+        flights = [] if force else [run.trajectory for run in self.experiments]
+        described, target = self.setup.controller, self.setup.target_state
+        texts = exported_controller(described, self.family, genes, kind, name, precision, flights, target)
+        return delivered(texts, name, path)
 
     @property
     def committee(self) -> tuple[_core.Model, ...]:

@@ -13,6 +13,7 @@ from twinloop.campaign import Campaign
 from twinloop.console import Watch
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
 from twinloop.exam.command import bench
+from twinloop.exporting import export
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
 from twinloop.presets import PRESETS, options_of, parsed
@@ -140,6 +141,7 @@ def run(
 main.add_command(resume)
 main.add_command(show)
 main.add_command(bench)
+main.add_command(export)
 main.add_command(reproduce)
 
 

@@ -16,7 +16,7 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, number
 from twinloop.elementary import exp
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
-from twinloop.exports.export import Source, asked, c_name, exported
+from twinloop.exports.export import Source, asked, delivered, exported
 from twinloop.flight import fly, fly_commands
 from twinloop.law.equations import equations
 from twinloop.law.law import Law
@@ -254,21 +254,8 @@ class Twin(Recorded, kind="twin"):
             record,
             not force,
         )
-        texts = exported(source, chosen, "twin" if path is None else path.stem, precision)
-        if path is None:
-            return "\n".join(reversed(texts.values())).replace('#include "twin.h"\n', "")
-        written = []
-        for suffix, text in texts.items():
-            file = path.with_suffix(suffix)
-            named = text.replace(f'#include "{c_name(path.stem)}.h"', f'#include "{path.stem}.h"')
-            try:
-                file.write_text(named, encoding="utf-8")
-            except OSError as reason:
-                raise InvalidInput(
-                    f"Export: expected to be able to write {str(file)!r}: {reason}."
-                ) from reason
-            written.append(file)
-        return tuple(written)
+        name = "twin" if path is None else path.stem
+        return delivered(exported(source, chosen, name, precision), name, path)
 
     @cached_property
     def law(self) -> Law:

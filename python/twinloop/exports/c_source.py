@@ -117,6 +117,7 @@ def _helpers(name: str, precision: str) -> dict[str, str]:
         "divided": written(
             "divided", "real a, real b", f"fabs{f}(b) > {_number(1e-6, precision)} ? a / b : a"
         ),
+        "wrapped": written("wrapped", "real a, real period", f"a - rint{f}(a / period) * period"),
         "min": written("min", "real a, real b", "a < b ? a : b"),
         "max": written("max", "real a, real b", "a > b ? a : b"),
         "upright": written(
@@ -159,7 +160,7 @@ def _outputs(law: Law, name: str, precision: str) -> str:
         "{",
     ]
     lines += [
-        f"    const real {symbol} = {f'x[{i}]' if i < n_x else f'u[{i - n_x}]'};"
+        f"    const real {symbol} = {_seen(law, name, precision, i)};"
         for i, symbol in enumerate(symbols)
         if i in needed
     ]
@@ -173,6 +174,14 @@ def _outputs(law: Law, name: str, precision: str) -> str:
     ]
     lines += [f"    out[{i}] = {joined(writer.terms(root), between)};" for i, root in enumerate(roots)]
     return "\n".join([*lines, "}"])
+
+
+def _seen(law: Law, name: str, precision: str, place: int) -> str:
+    """An input of the equations, an angle that wraps within half a period of 0."""
+    if place >= law.signals.n_x:
+        return f"u[{place - law.signals.n_x}]"
+    period = law.signals.states[place].period
+    return f"x[{place}]" if period is None else f"{name}_wrapped(x[{place}], {_number(period, precision)})"
 
 
 def _actuation(law: Law, name: str, precision: str) -> list[str]:

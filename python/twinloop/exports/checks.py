@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.controllers import Family
 from twinloop.errors import NotAvailable
 from twinloop.exports.python_source import equation_roots
 from twinloop.law.law import Law
@@ -22,6 +23,10 @@ from twinloop.trajectory import Trajectory
 
 CLOSE = {"double": 1e-9, "float": 1e-3}
 """Largest difference, as a share of a state's scale, or of the state where that is larger."""
+MOST_REMEMBERED = 10_000
+"""Numbers that a controller remembers at most."""
+Commanding = Callable[[Floats, Floats], Floats]
+"""Commands (n, n_u) on states (n, n_x), one period after the other, for a target (n_x,)."""
 Simulation = Callable[[Floats, Floats], Floats]
 """The states (n + 1, n_x) of a free run from a state (n_x,) under commands (n, n_u)."""
 
@@ -79,25 +84,7 @@ def c_simulation(header: str, source: str, name: str, law: Law, precision: str) 
     Raises:
         NotAvailable: no C compiler, or it refuses.
     """
-    compiler = shutil.which("cc")
-    if compiler is None:
-        raise NotAvailable(
-            "Export, C: expected a C compiler to check it with, found no cc; install one, or pass force=True."
-        )
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / f"{name}.h").write_text(header, encoding="utf-8")
-        (Path(folder) / f"{name}.c").write_text(source, encoding="utf-8")
-        strict = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
-        done = subprocess.run(
-            [compiler, *strict, "-shared", "-fPIC", "-o", "twin.so", f"{name}.c", "-lm"],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode != 0:
-            raise NotAvailable(f"Export, C: expected that it compiles, found {done.stderr[:300]!r}.")
-        library = ctypes.CDLL(str(Path(folder) / "twin.so"))
+    library = _compiled(header, source, name)
     real = ctypes.c_double if precision == "double" else ctypes.c_float
     dtype = np.float64 if precision == "double" else np.float32
     n_x = law.signals.n_x
@@ -179,3 +166,108 @@ def _numbers(values: list[float]) -> SimpleNamespace:
         Min=min,
         Max=max,
     )
+
+
+def check_controller(
+    what: str,
+    found: Commanding,
+    own: Commanding,
+    family: Family,
+    flights: Sequence[Trajectory],
+    target: Floats,
+    precision: str,
+) -> None:
+    """Compares commands on the states of all flights.
+
+    Args:
+        what: was exported.
+        found: what it commands, period after period, on states (n, n_x): (n, n_u).
+        own: what the controller itself commands.
+        family: of the controller.
+        flights: to compare on.
+        target: state that it leads to (n_x,).
+        precision: "double" or "float".
+
+    Raises:
+        NotAvailable: they differ.
+    """
+    sizes = np.array([command.size for command in family.signals.commands])
+    for number, flight in enumerate(flights):
+        states = flight.states[: flight.steps]
+        off = np.abs(found(states, target) - own(states, target)) / sizes
+        if not (off <= CLOSE[precision]).all():
+            raise NotAvailable(
+                f"Export, {what}: expected the controller's own commands to {CLOSE[precision]:g}, found a difference of"
+                f" {float(np.max(off)):.3g} of a command's scale on flight {number}; pass force=True to have it all the"
+                " same."
+            )
+
+
+def python_controller(source: str) -> Commanding:
+    """What an exported Python controller commands.
+
+    Args:
+        source: of the module, written by us.
+    """
+    names: dict[str, Any] = {}
+    exec(compile(source, "exported controller", "exec"), names)
+
+    def commands(states: Floats, target: Floats) -> Floats:
+        controller = names["Controller"]()
+        return np.array([controller.command(state, target.tolist()) for state in states.tolist()])
+
+    return commands
+
+
+def c_controller(header: str, source: str, name: str, n_u: int, precision: str) -> Commanding:
+    """What an exported C controller commands, compiled by the C compiler of this machine.
+
+    Args:
+        header: of it.
+        source: of it.
+        name: what its functions begin with.
+        n_u: number of its commands.
+        precision: "double" or "float".
+
+    Raises:
+        NotAvailable: no C compiler, or it refuses.
+    """
+    library = _compiled(header, source, name)
+    real, dtype = (ctypes.c_double, np.float64) if precision == "double" else (ctypes.c_float, np.float32)
+    pointer = ctypes.POINTER(real)
+
+    def commands(states: Floats, target: Floats) -> Floats:
+        memory = ctypes.create_string_buffer(8 * MOST_REMEMBERED)
+        getattr(library, f"{name}_reset")(memory)
+        given, goal = states.astype(dtype), target.astype(dtype)
+        found = np.zeros((len(states), n_u), dtype=dtype)
+        for state, command in zip(given, found, strict=True):
+            getattr(library, f"{name}_command")(
+                memory, *(part.ctypes.data_as(pointer) for part in (state, goal, command))
+            )
+        return found.astype(np.float64)
+
+    return commands
+
+
+def _compiled(header: str, source: str, name: str) -> ctypes.CDLL:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise NotAvailable(
+            "Export, C: expected a C compiler to check it with, found no cc; install one, or pass force=True."
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / f"{name}.h").write_text(header, encoding="utf-8")
+        (Path(folder) / f"{name}.c").write_text(source, encoding="utf-8")
+        strict = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
+        done = subprocess.run(
+            [compiler, *strict, "-shared", "-fPIC", "-o", "twin.so", f"{name}.c", "-lm"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != 0:
+            raise NotAvailable(f"Export, C: expected that it compiles, found {done.stderr[:300]!r}.")
+        library = ctypes.CDLL(str(Path(folder) / "twin.so"))
+    return library

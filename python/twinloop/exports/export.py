@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, unknown
 from twinloop.exports.c_source import c_source
 from twinloop.exports.checks import (
     Simulation,
+    c_controller,
     c_simulation,
+    check_controller,
     check_simulation,
     check_sympy,
+    python_controller,
     python_simulation,
 )
+from twinloop.exports.controller_source import controller_c, controller_python
 from twinloop.exports.python_source import python_source
 from twinloop.exports.symbolic import latex_source, sympy_source
 from twinloop.law.law import Law
@@ -113,6 +121,79 @@ def exported(source: Source, kind: str, name: str, precision: str = "double") ->
         found = c_simulation(header, text, name, law, precision)
         check_simulation("C", found, source.simulate, law, flights, precision)
     return {".c": text, ".h": header}
+
+
+def exported_controller(
+    described: UnboundFamily,
+    family: Family,
+    genes: Floats,
+    kind: str,
+    name: str,
+    precision: str,
+    flights: Sequence[Trajectory],
+    target: Floats,
+) -> dict[str, str]:
+    """Texts of a controller by the suffix of their files, the main one first, checked on flights.
+
+    Args:
+        described: the family as a user wrote it.
+        family: the same, bound.
+        genes: gains (size,).
+        kind: "python" or "c".
+        name: what functions in C begin with.
+        precision: of C, "double" or "float".
+        flights: whose states it is checked on; none: it is not checked.
+        target: state that it leads to then (n_x,).
+
+    Raises:
+        InvalidInput: another kind or precision.
+        NotAvailable: a family that cannot be written down, or an export that differs or cannot be checked.
+    """
+    if kind not in ("python", "c"):
+        raise unknown("kind of export of a controller", kind, ("python", "c"))
+    if precision not in PRECISIONS:
+        raise unknown("precision", precision, PRECISIONS)
+
+    def own(states: Floats, goal: Floats) -> Floats:
+        controller = family.controller(genes)
+        return np.array([controller.command(state, goal) for state in states])
+
+    if kind == "python":
+        text = controller_python(described, family, genes)
+        if flights:
+            check_controller("Python", python_controller(text), own, family, flights, target, "double")
+        return {".py": text}
+    name = c_name(name)
+    header, text = controller_c(described, family, genes, name, precision)
+    if flights:
+        found = c_controller(header, text, name, family.signals.n_u, precision)
+        check_controller("C", found, own, family, flights, target, precision)
+    return {".c": text, ".h": header}
+
+
+def delivered(texts: Mapping[str, str], name: str, path: Path | None) -> str | tuple[Path, ...]:
+    """One text where no path was given, else the files that were written.
+
+    Args:
+        texts: by suffix, the main one first.
+        name: what functions in C begin with.
+        path: of the main file.
+
+    Raises:
+        InvalidInput: a file that cannot be written.
+    """
+    include = f'#include "{c_name(name)}.h"'
+    if path is None:
+        return "\n".join(reversed([*texts.values()])).replace(f"{include}\n", "")
+    written = []
+    for suffix, text in texts.items():
+        file = path.with_suffix(suffix)
+        try:
+            file.write_text(text.replace(include, f'#include "{path.stem}.h"'), encoding="utf-8")
+        except OSError as reason:
+            raise InvalidInput(f"Export: expected to be able to write {str(file)!r}: {reason}.") from reason
+        written.append(file)
+    return tuple(written)
 
 
 def c_name(name: str) -> str:

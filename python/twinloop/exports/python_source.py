@@ -52,6 +52,11 @@ def _exp(a):
         return math.inf
 
 
+def _wrapped(a, period):
+    """An angle within half a period of 0."""
+    return a - round(a / period) * period if math.isfinite(a) else math.nan
+
+
 def _upright(a):
     """A cosine of the pitch, kept from 0."""
     return a if abs(a) >= 1e-3 else math.copysign(1e-3, a)
@@ -241,6 +246,11 @@ def _outputs(law: Law) -> str:
         '    """What the equations give at the state x; u are commands in effect, in units of their scales."""',
         f"    {', '.join(states)}, = x",
         f"    {', '.join(seen)}, = u",
+    ]
+    lines += [
+        f"    {symbol} = _wrapped({symbol}, {state.period!r})"
+        for symbol, state in zip(states, law.signals.states, strict=True)
+        if state.period is not None
     ]
     lines += [
         f"    {name} = ({joined(writer.terms(number, define=True), chr(10) + ' ' * 8)})"

@@ -98,9 +98,8 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
     lagging = [i for i, actuator in enumerate(law.actuation.actuators) if actuator.lag > 0.0]
     size = n_x + len(lagging) + len(hidden)
     factors = 1.0 / np.array([each.size for each in signals.commands])
-    values, slopes = jacobian(
-        law.expressions, law.derivatives(), np.concatenate([state, factors * command, np.zeros(len(hidden))])
-    )
+    point = np.concatenate([state, factors * command, np.zeros(len(hidden))])
+    values, slopes = jacobian(law.expressions, law.derivatives(), _wrapped(law, point))
     by_effect = slopes[:, n_x : n_x + n_u] * factors
     A, B, drift = np.zeros((size, size)), np.zeros((size, n_u)), np.zeros(size)
     A[:n_x, :n_x], A[:n_x, n_x + len(lagging) :], drift[:n_x] = (
@@ -131,6 +130,15 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         None,
         delays,
     )
+
+
+def _wrapped(law: Law, inputs: Floats) -> Floats:
+    """Inputs of the equations, angles that wrap within half a period of 0."""
+    seen = inputs.copy()
+    for place, state in enumerate(law.signals.states):
+        if state.period is not None:
+            seen[place] -= np.rint(seen[place] / state.period) * state.period
+    return seen
 
 
 def _level(commands: Sequence[int], squared: bool, scaled: Floats, factors: Floats) -> tuple[float, Floats]:
@@ -239,7 +247,7 @@ def _stepped(law: Law, x: _Dual, inputs: Sequence[_Dual]) -> _Dual:
 
     def of(roots: Sequence[int], point: _Dual, stage: int) -> _Dual:
         whole = _Dual.stacked([point, inputs[stage]])
-        values, slopes = jacobian(law.expressions, roots, whole.values)
+        values, slopes = jacobian(law.expressions, roots, _wrapped(law, whole.values))
         return _Dual(values, slopes @ whole.slopes)
 
     dt = law.signals.dt
