@@ -87,6 +87,12 @@ def test_values_of_nodes_are_those_of_the_recursion(pool, seed):
         np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
 
 
+def test_no_nodes_have_no_values():
+    pool = Pool(INPUTS)
+    assert pool.values([], np.zeros((4, INPUTS))).shape == (4, 0)
+    assert pool.values([pool.one, 1], np.full((4, INPUTS), 2.0)).tolist() == [[1.0, 2.0]] * 4
+
+
 def test_equal_expressions_are_one_node():
     pool = Pool(INPUTS)
     assert pool.product(0, 1) == pool.product(1, 0) and pool.add("+", 2, 1) == pool.add("+", 1, 2)

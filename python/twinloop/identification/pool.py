@@ -196,11 +196,12 @@ class Pool(Expressions, Recorded, kind="pool"):
         computed = [number for number in dict.fromkeys(numbers) if self[number].operation != INPUT]
         results = self.program(computed, rows.shape[1]).run(rows) if computed else rows
         place = {number: i for i, number in enumerate(computed)}
-        columns = [
-            results[:, place[number]] if number in place else rows[:, int(self[number].value)]
-            for number in numbers
-        ]
-        return np.ascontiguousarray(np.stack(columns, axis=1))
+        values = np.empty((len(rows), len(numbers)))
+        for column, number in enumerate(numbers):
+            values[:, column] = (
+                results[:, place[number]] if number in place else rows[:, int(self[number].value)]
+            )
+        return values
 
     def program_of_sums(self, outputs: Sequence[Mapping[int, float]], hidden: int = 0) -> _core.Program:
         """A program of which each output is a weighted sum of nodes.
