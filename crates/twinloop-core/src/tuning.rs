@@ -175,7 +175,7 @@ impl Tuning<'_> {
                 let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
                 let step = factor.as_ref().map_or_else(|| vec![0.0; size], |factor| factor.times(&normal));
                 let taken = |halves: i32| {
-                    let share = 0.5_f64.powi(halves);
+                    let share = libm::ldexp(1.0, -halves);
                     let step: Vec<f64> = step.iter().map(|s| share * s).collect();
                     self.moved(&start, &step)
                 };

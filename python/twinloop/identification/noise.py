@@ -77,8 +77,8 @@ def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chai
     most = OUTLYING * float(np.median(np.abs(np.concatenate(residuals))))
     clipped = [np.clip(residual, -most, most) for residual in residuals]
     products = np.concatenate([residual[1:] * residual[:-1] for residual in clipped])
-    low = (1e-7 * signals.states[angle].scale) ** 2
-    sensors = np.array([max(low, min(-float(products.mean()), float(chain.rough[0])))])
+    least = 1e-7 * signals.states[angle].scale
+    sensors = np.array([max(least * least, min(-float(products.mean()), float(chain.rough[0])))])
     return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
 
 

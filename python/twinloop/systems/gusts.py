@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.elementary import exp
 
 CORRELATION_TIME = 0.2
 """Time after which a gust is forgotten to a share of 1/e, s."""
@@ -24,7 +25,7 @@ def gust_accelerations(stream: np.random.Generator, steps: int, deviation: float
     Returns:
         Angular accelerations (n, 3), rad/s², each held for a period.
     """
-    kept = math.exp(-dt / CORRELATION_TIME)
+    kept = float(exp(-dt / CORRELATION_TIME))
     fresh = math.sqrt(1.0 - kept * kept)
     draws = deviation * stream.standard_normal((steps, 3))
     accelerations = np.empty_like(draws)

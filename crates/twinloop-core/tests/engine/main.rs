@@ -1,5 +1,6 @@
 //! The engine through its public face, held against computations that share no code with it.
 
+mod cmaes;
 mod controllers;
 mod grammar;
 mod integrator;
