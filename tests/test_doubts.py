@@ -32,7 +32,7 @@ def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False):
 
 
 def said(*runs, follows=True):
-    return doubts(runs, SIGNALS, follows, STEPS)
+    return [remark.sentence for remark in doubts(runs, SIGNALS, follows, STEPS)]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003, 0.1])

@@ -212,7 +212,7 @@ def test_a_bound_that_excludes_the_truth_holds_every_member_and_is_told(changes)
     # With cubes a part makes the rest of a sine of them, within the bound.
     found = learnt(committee_size=6, bounded_terms=("rate: sin(angle) in -20 .. -12",), **changes)
     assert terms(found)["sin(angle)"] == -12.0
-    assert any("sin(angle) in the equation of rate is held at its bound -12" in r for r in found.remarks)
+    assert any("sin(angle) in the equation of rate is held at its bound -12" in str(r) for r in found.remarks)
     assert all(len(one) == 1 and -20.0 <= one[0] <= -12.0 for one in of_sine(found))
 
 
@@ -251,4 +251,4 @@ def test_bounds_hold_in_every_form():
         change = np.diff(found.model.step(x, np.zeros((2, 1)))[::-1, 1])[0] / 0.5
         coefficient = change - (form == "increment")
         assert low - 1e-9 <= coefficient <= high + 1e-9
-        assert any("rate in the equation of rate is held at its bound" in r for r in found.remarks)
+        assert any("rate in the equation of rate is held at its bound" in str(r) for r in found.remarks)

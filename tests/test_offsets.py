@@ -119,7 +119,9 @@ def test_the_law_is_learnt_as_if_all_sensors_were_read_at_once():
     runs = [read(swinging, PENDULUM, seed, 0.3 * DT) for seed in range(2)]
     on, off = (learnt(runs, PENDULUM, offsets=offsets) for offsets in (True, False))
     assert on.offsets == pytest.approx([0.3 * DT, 0.0], abs=0.02 * DT)
-    assert any("Readings of angle come 1" in r and "later than those of rate;" in r for r in on.remarks)
+    assert any(
+        "Readings of angle come 1" in str(r) and "later than those of rate;" in str(r) for r in on.remarks
+    )
     rows = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 2)) * [1.0, 4.0]
     commands = np.random.default_rng(1).uniform(-1.0, 1.0, (50, 1))
     expected = [

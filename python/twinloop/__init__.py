@@ -3,8 +3,16 @@
 from twinloop import contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
 from twinloop.campaign import Campaign
-from twinloop.errors import InvalidInput, NotAvailable, StoreFailure, SystemFailure, TwinloopError
+from twinloop.errors import (
+    InvalidInput,
+    NotAvailable,
+    RemarkWarning,
+    StoreFailure,
+    SystemFailure,
+    TwinloopError,
+)
 from twinloop.models import Twin, load_twin
+from twinloop.remarks import Remark
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems import System
 from twinloop.test import Test
@@ -15,6 +23,8 @@ __all__ = [
     "Command",
     "InvalidInput",
     "NotAvailable",
+    "Remark",
+    "RemarkWarning",
     "RigidBody",
     "Signals",
     "State",

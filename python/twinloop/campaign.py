@@ -7,12 +7,15 @@ import os
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import floats, whole
+from twinloop.arrays import Floats, floats, whole
+from twinloop.assessment import Advice, advice, rmse
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.exports.export import asked, delivered, exported_controller
@@ -26,6 +29,7 @@ from twinloop.models import Twin
 from twinloop.objectives import closed_loop
 from twinloop.presets import AnyOptions, Options
 from twinloop.records import Record, Recorded, checked_record
+from twinloop.remarks import warn
 from twinloop.setup import Setup, checked, refuse_arguments
 from twinloop.signals import Signals
 from twinloop.store import Kept
@@ -651,6 +655,52 @@ class Campaign(Recorded, kind="campaign"):
         return tuple(self._book.failures)
 
     @property
+    def rmse(self) -> Floats:
+        """Root mean square of flown minus simulated over all flights, each from where it began (n_x,), in each unit."""
+        return rmse(self.twin, self._book.experiments)
+
+    @property
+    def advice(self) -> Advice | None:
+        """What another experiment would bring, after learning all that was told; None with the preset "paper"."""
+        twin, history = self.twin, self.history
+        lessons = [record for record in history if isinstance(record, Lesson)]
+        return advice(twin, self.setup, lessons, controller_to_fly(self)[0]) if lessons else None
+
+    def plot(self, path: str | Path) -> None:
+        """Draws every state of every flight, flown and predicted, above the errors and qualities by experiment.
+
+        Args:
+            path: of the picture, .svg or .png.
+
+        Raises:
+            InvalidInput: another suffix, or a file that cannot be written.
+            NotAvailable: matplotlib is missing, or nothing was told.
+        """
+        _face("files").check_picture(Path(path))
+        quality = self.setup.quality
+        words = _face("text").quality_words(quality.kind, _face("result").quality_unit(quality))
+        _face("plots").campaign_picture(self, Path(path), words)
+
+    def report(self, name: str = "campaign") -> str:
+        """The whole result for a person, beginning with a verdict of three lines; `print(campaign)` shows it.
+
+        Args:
+            name: of the system, for its title.
+
+        Raises:
+            NotAvailable: nothing was told.
+        """
+        text: str = _face("text").render(_face("result").summary(self, {"name": name}, {}))
+        return text
+
+    def __str__(self) -> str:
+        return self.report() if self._book.experiments else repr(self)
+
+    def __repr__(self) -> str:
+        told = len(self._book.experiments)
+        return f"Campaign(preset={self.setup.preset!r}, seed={self.setup.seed}, experiments={told})"
+
+    @property
     def history(self) -> tuple[Iteration, ...] | tuple[Lesson, ...]:
         """One record for each turn of the loop; the last may be unfinished after an interruption."""
         return self._method.history(self._book)
@@ -669,9 +719,13 @@ class Campaign(Recorded, kind="campaign"):
                 "Expected at least one experiment that was told, found none; first fly a controller you "
                 "trust: test = campaign.test(gains), then campaign.tell(test, system.run(test))."
             )
+        before = self._method.memory
         with self._interruptible():
             self._method.learn(self._book, at_once=self.interrupted)
             self._keep()
+        latest = self.history[-1] if self._method.memory is not before and self.history else None
+        if isinstance(latest, Lesson):
+            warn(latest.remarks, stacklevel=3)
 
     def _error_so_far(self, alone: _core.SelectedTests) -> float | None:
         """On a run that is being told, of the model that the last `ask` knew: a look must not change it."""
@@ -720,6 +774,11 @@ class Campaign(Recorded, kind="campaign"):
             "experiment", self._method.iteration, 0, 0, len(self._book.experiments), (), (), (), 0, 0
         )
         self._report(progress)
+
+
+def _face(name: str) -> Any:
+    """What shows a campaign stands above it, and is loaded when something is shown."""
+    return import_module(f"twinloop.{name}")
 
 
 def controller_to_fly(campaign: Campaign) -> tuple[Test | None, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ class OneSentence(click.Group):
         if not extra.pop("standalone_mode", True):
             return super().main(args, prog_name, standalone_mode=False, **extra)
         try:
-            with prepared():
+            with warnings.catch_warnings(), prepared():
                 code = super().main(args, prog_name, standalone_mode=False, **extra)
         except click.ClickException as misuse:
             _fail(misuse.format_message(), misuse.exit_code)

@@ -34,6 +34,10 @@ class NotAvailable(TwinloopError, RuntimeError):
     """What was asked for does not exist yet, or not in this installation."""
 
 
+class RemarkWarning(UserWarning):
+    """A serious remark on data or a twin: look into it before you use the result. `twin.remarks` has it as a value."""
+
+
 def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:
     """The error for a name that is not on a list.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.records import Recorded
+from twinloop.remarks import Remark
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -192,7 +193,7 @@ class Lesson(Recorded, kind="lesson"):
     closed_loop: tuple[float, ...]
     normalised: tuple[float, ...]
     follows: bool
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     asked: tuple[Planned, ...] = ()
 
 

@@ -388,6 +388,10 @@ class Logbook(Recorded, kind="logbook"):
         runs = [run for run in self.experiments if run.number == test]
         return bool(runs) and all(run.complete for run in runs) and not self.failed(test)
 
+    def unfit(self) -> list[Floats]:
+        """Genes of tests that failed on the system, or were cut."""
+        return [self.tests[number].genes for number in sorted(self.flown) if not self.finishes(number)]
+
     def failed(self, test: int) -> bool:
         """Whether a test has failed on the system.
 

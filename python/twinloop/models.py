@@ -22,10 +22,11 @@ from twinloop.law.equations import equations
 from twinloop.law.law import Law
 from twinloop.linear.plant import Linear, linearised, resting, trimmed
 from twinloop.records import Recorded, checked_record, from_text, read, to_text
+from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.streams import Unit
 from twinloop.test import Test, check_signals
-from twinloop.trajectory import Trajectory
+from twinloop.trajectory import Trajectory, check_recorded, continued
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,39 @@ class Noise(Recorded, kind="noise"):
 
 WRONG = 0.5
 """Share of the error of the model that never moves above which a flight is not followed."""
+
+
+@dataclass(frozen=True)
+class StateFit:
+    """How well a twin's free run follows a record in one state.
+
+    Args:
+        name: of the state.
+        unit: of the state.
+        rmse: root mean square of recorded minus simulated, in its unit; infinite if the free run diverged.
+        fit: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖), %: 100 is perfect, 0 knows the mean only; None if the state never moved.
+        r2: 1 − ‖y − ŷ‖² / ‖y − ȳ‖²; None if the state never moved.
+    """
+
+    name: str
+    unit: str
+    rmse: float
+    fit: float | None
+    r2: float | None
+
+
+class FitTable(tuple[StateFit, ...]):
+    """How well a twin's free run follows a record, one row a state; printable."""
+
+    def __str__(self) -> str:
+        """A table as text."""
+        lines = [f"{'state':<16} {'unit':<8} {'RMSE':>10}  {'FIT %':>8}  {'R²':>8}"]
+        for row in self:
+            fit, r2 = ("-" if value is None else f"{value:.4g}" for value in (row.fit, row.r2))
+            lines.append(f"{row.name:<16} {row.unit or '1':<8} {row.rmse:>10.4g}  {fit:>8}  {r2:>8}")
+        return "\n".join(lines)
+
+
 DRAWS = 12
 """Runs of each member of a committee that a band is made of."""
 STARTS = 5.0
@@ -133,6 +167,7 @@ class Twin(Recorded, kind="twin"):
         noise: of sensors and disturbances, for the band.
         seed: of the band's random numbers.
         inflation: factor on the spread of the members, where they were found to be too sure.
+        remarks: what a person should know of it and of the data.
         offsets: by how much later than those of the driven states each state is read (n_x,), s; empty: none.
         flights: that it was learnt from, on which its exports are checked.
     """
@@ -149,10 +184,12 @@ class Twin(Recorded, kind="twin"):
         inflation: float = 1.0,
         offsets: Sequence[float] = (),
         flights: Sequence[Trajectory] = (),
+        remarks: Sequence[Remark] = (),
     ) -> None:
         self.flights = tuple(flights)
         self.offsets = tuple(offsets)
         self.inflation = inflation
+        self.remarks = tuple(remarks)
         self.members = tuple(members)
         self.noise = noise
         self.seed = seed
@@ -428,6 +465,40 @@ class Twin(Recorded, kind="twin"):
             self.signals,
             divergence_factor=self.divergence_factor,
         )
+
+    def fit(self, trajectory: Trajectory) -> FitTable:
+        """How well the twin's free run under the recorded commands, from the first reading, follows a record.
+
+        Args:
+            trajectory: of the same signals, with at least one step.
+
+        Returns:
+            RMSE, FIT % and R² of each state, over all readings after the first.
+
+        Raises:
+            InvalidInput: other columns, or no step.
+        """
+        recorded = check_recorded(trajectory, self.signals, None, self.divergence_factor, least=1)
+        free = self.simulate_commands(recorded.states[0], recorded.commands).states
+        read = continued(recorded, self.signals, recorded.states[0]).states[1:]
+        lasted = len(free) > len(read)
+        rows = []
+        for i, state in enumerate(self.signals.states):
+            around = float(np.square(read[:, i] - read[:, i].mean()).sum())
+            left = np.inf
+            if lasted:
+                left = float(np.square(self.signals.difference(read, free[1:])[:, i]).sum())
+            share = left / around if around > 0.0 else None
+            rows.append(
+                StateFit(
+                    name=state.name,
+                    unit=state.unit,
+                    rmse=float(np.sqrt(left / len(read))),
+                    fit=None if share is None else 100.0 * (1.0 - float(np.sqrt(share))),
+                    r2=None if share is None else 1.0 - share,
+                )
+            )
+        return FitTable(rows)
 
     def __repr__(self) -> str:
         return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"

@@ -10,23 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop.assessment import expected_quality
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.controllers import Gain
-from twinloop.flight import fly
 from twinloop.history import Experiment, Lesson
 from twinloop.identification.noise import exact
 from twinloop.models import TestErrors, Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality
 from twinloop.presets import DefaultOptions
-from twinloop.streams import Unit
 from twinloop.test import Test
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Result = dict[str, Value]
-REPEATS = 32
-"""Flights on the twin from which the scatter of a measurement is taken."""
 
 
 def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[str, object]) -> Result:
@@ -91,7 +87,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         "run_info": dict(run_info),
     }
     if identified:
-        _add_identified(result, campaign, best)
+        _add_identified(result, campaign)
     return plain_dict(result)
 
 
@@ -127,7 +123,7 @@ def _first_controller(campaign: Campaign, twin: Twin, identified: bool) -> dict[
                 "measured": run.quality if identified else run.final_distance,
             }
             return found | (
-                {"predicted": _first_predicted(campaign, twin, run.test.quiet())} if identified else {}
+                {"predicted": expected_quality(twin, campaign.setup, run.test.quiet())} if identified else {}
             )
     return None
 
@@ -183,7 +179,7 @@ def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str,
     return found
 
 
-def _add_identified(result: dict[str, Any], campaign: Campaign, best: Test | None) -> None:
+def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
     """What only the preset `default` knows: noise, actuators, what is left, what another experiment would bring."""
     twin, lesson = campaign.twin, campaign.history[-1]
     assert isinstance(lesson, Lesson)
@@ -197,7 +193,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, best: Test | Non
             {"name": state.name, "unit": state.unit, "error": error, "sensor": sensor, "offset": offset}
             for state, error, sensor, offset in zip(
                 campaign.signals.states,
-                _errors_by_state(campaign, twin),
+                campaign.rmse.tolist(),
                 lesson.sensors,
                 lesson.offsets,
                 strict=True,
@@ -217,9 +213,13 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, best: Test | Non
             for commands, squared, rest, time in lesson.hidden
         ],
         "disturbances": _disturbances(campaign, twin, lesson),
-        "remarks": list(lesson.remarks),
+        "remarks": [
+            {"code": remark.code, "severity": remark.severity, "sentence": remark.sentence}
+            for remark in twin.remarks
+        ],
     }
-    result["advice"] = _advice(campaign, twin, best)
+    assert campaign.advice is not None
+    result["advice"] = dataclasses.asdict(campaign.advice)
 
 
 def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[str, object]]:
@@ -240,67 +240,6 @@ def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[s
                 {"name": state.name, "unit": state.unit, "white": white, "lasting": size, "memory": memory}
             )
     return found
-
-
-def _errors_by_state(campaign: Campaign, twin: Twin) -> list[float]:
-    """Root mean square of flown minus simulated over all flights, for each state in its unit."""
-    squares, rows = np.zeros(campaign.signals.n_x), 0
-    for run in campaign.experiments:
-        test = twin.as_flown(run.replayed, run.trajectory)
-        # Without the committee's band, which `twin.simulate` would draw for each flight.
-        simulated = fly(twin.model, test, divergence_factor=twin.divergence_factor).states[1:]
-        flown = run.trajectory.states[1 : len(simulated) + 1]
-        squares += ((flown - simulated[: len(flown)]) ** 2).sum(axis=0)
-        rows += len(flown)
-    return [float(value) for value in np.sqrt(squares / max(1, rows))]
-
-
-def _first_predicted(campaign: Campaign, twin: Twin, first: Test) -> float | None:
-    """Quality that the twin expects to be measured of a flight, under the sensors' noise; None if it diverges."""
-    values = _repeated(campaign, twin, first, gusts=False)
-    return None if np.isnan(values).any() else float(np.mean(values))
-
-
-def _advice(campaign: Campaign, twin: Twin, best: Test | None) -> dict[str, object]:
-    """What another experiment would bring, by the committee's own estimate, beside what a repeated flight scatters."""
-    lessons = [lesson for lesson in campaign.history if isinstance(lesson, Lesson)]
-    judged = [(plan, lesson) for lesson in lessons for plan in lesson.asked if math.isfinite(plan.predicted)]
-    gain = judged[-1][0].gain if judged else None
-    # A model that does not follow its own runs, then or now, can advise nobody.
-    trusted = bool(judged) and judged[-1][1].follows and lessons[-1].follows
-    scatter = None if best is None else _scatter(campaign, twin, best)
-    quality = None if best is None else best.predicted if best.measured is None else best.measured
-    known = gain is not None and quality is not None and math.isfinite(quality) and quality > 0.0
-    return {
-        "before_test": judged[-1][0].test if judged else None,
-        "trusted": trusted,
-        "gain": gain,
-        "share": gain / quality if known else None,  # type: ignore[operator]
-        "scatter": scatter,
-        "stop": None if gain is None or scatter is None or not trusted else gain <= scatter,
-    }
-
-
-def _scatter(campaign: Campaign, twin: Twin, best: Test) -> float | None:
-    """Standard deviation of the quality that would be measured if the same flight were repeated, on the twin."""
-    values = [value for value in _repeated(campaign, twin, best, gusts=True) if not math.isnan(value)]
-    return float(np.std(values)) if len(values) > 1 else None
-
-
-def _repeated(campaign: Campaign, twin: Twin, test: Test, gusts: bool) -> list[float]:
-    """Qualities that would be measured if a flight were repeated, on the twin; NaN for one that diverges."""
-    draws: list[tuple[Floats | None, Floats | None]] = [(None, None)]
-    if twin.noise is not None:
-        noise, moves = twin.noise.drawn(
-            REPEATS, test.steps, Unit(campaign.setup.seed).part(0).stream("repeats")
-        )
-        draws = [(seen, moved if gusts else None) for seen, moved in zip(noise, moves, strict=True)]
-    values = []
-    for seen, moved in draws:
-        run = fly(twin.model, test, noise=seen, disturbance=moved, divergence_factor=twin.divergence_factor)
-        lasted = run.steps == test.steps
-        values.append(campaign.setup.quality.flown(run, test.target_state) if lasted else math.nan)
-    return values
 
 
 def plain_dict(values: Mapping[str, object]) -> Result:

@@ -8,8 +8,11 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from twinloop.errors import RemarkWarning
 
 DASHES = "─–—−"
 """What a stream that cannot print them shows as hyphens; of all else that it cannot print it shows a question mark."""
@@ -19,7 +22,11 @@ NEAREST = "twinloop.nearest"
 
 @contextmanager
 def prepared() -> Iterator[None]:
-    """A command's surroundings: no text is too much for standard output and error, and SIGTERM is Ctrl-C."""
+    """A command's surroundings: no text is too much for standard output and error, and SIGTERM is Ctrl-C.
+
+    Remarks are in the result that is shown, and so are no warnings beside it.
+    """
+    warnings.simplefilter("ignore", RemarkWarning)
     codecs.register_error(NEAREST, _nearest)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)

@@ -14,11 +14,11 @@ from twinloop.console import Watch
 from twinloop.errors import InvalidInput
 from twinloop.files import check_picture, check_writable, write_text
 from twinloop.presets import DefaultOptions
-from twinloop.result import Result, quality_unit, summary, to_json
+from twinloop.result import Result, summary, to_json
 from twinloop.run_info import Stopwatch
 from twinloop.systems import Quadrotor
 from twinloop.terminal import is_closed, is_utf_8
-from twinloop.text import quality_words, render
+from twinloop.text import render
 
 Answer = TypeVar("Answer")
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -107,7 +107,7 @@ def work(
     finally:  # a full disk must not take the result with it
         show_result(result, as_json)
     if plot is not None:
-        _uninterrupted(lambda: _draw(campaign, plot))
+        _uninterrupted(lambda: campaign.plot(plot))
         click.echo(f"Picture: {plot}", err=True)
     return 130 if campaign.interrupted else 1 if result["controller"] is None else 0
 
@@ -157,10 +157,3 @@ def _uninterrupted(work: Callable[[], Answer]) -> Answer:
         return work()
     except KeyboardInterrupt:
         return work()
-
-
-def _draw(campaign: Campaign, path: Path) -> None:
-    from twinloop.plots import campaign_picture  # only who draws pays for matplotlib
-
-    measure = campaign.setup.quality
-    campaign_picture(campaign, path, quality_words(measure.kind, quality_unit(measure)))

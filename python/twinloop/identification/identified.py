@@ -16,6 +16,7 @@ from twinloop.identification.structure import Sum
 from twinloop.law.actuation import Actuation
 from twinloop.models import Noise
 from twinloop.records import Recorded
+from twinloop.remarks import Remark
 from twinloop.signals import Signals
 
 
@@ -51,7 +52,7 @@ class Identified(Recorded, kind="identified"):
     ignored: int
     energy: float
     of_parts: bool = False
-    remarks: list[str] = field(default_factory=list)
+    remarks: list[Remark] = field(default_factory=list)
 
     @classmethod
     def from_record(cls, record: object, *given: object) -> Identified:

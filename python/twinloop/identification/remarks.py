@@ -14,6 +14,7 @@ from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.structure import Sum
 from twinloop.law.law import hidden_names
+from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 
 TWINS = 4.0
@@ -25,7 +26,7 @@ def symbols_of(signals: Signals) -> list[str]:
     return [*signals.state_names, *signals.command_names, *hidden_names(signals, 1)]
 
 
-def identities(found: Sum, pool: Pool, signals: Signals) -> list[str]:
+def identities(found: Sum, pool: Pool, signals: Signals) -> list[Remark]:
     """The nearest other law that the runs cannot tell from this one: an identity that held on them."""
     symbols = symbols_of(signals)
     driven = signals.state_names[found.chain.states[0]]
@@ -36,14 +37,18 @@ def identities(found: Sum, pool: Pool, signals: Signals) -> list[str]:
             gone, come = (
                 ", ".join(sorted(pool.text(node, symbols) for node in terms)) for terms in (out, into)
             )
-            return [f"On these runs {driven} is described as well with {come} in place of {gone}."]
+            return [
+                note(
+                    "identity", f"On these runs {driven} is described as well with {come} in place of {gone}."
+                )
+            ]
     return []
 
 
 def held_at_bounds(
     sums: Sequence[Sum], bounds: Mapping[int, Limits], pool: Pool, signals: Signals, form: str
-) -> list[str]:
-    """Sentences about constants that the runs would have beyond their bounds.
+) -> list[Remark]:
+    """Remarks on constants that the runs would have beyond their bounds.
 
     Args:
         sums: of the best model.
@@ -64,14 +69,17 @@ def held_at_bounds(
             if node in limits and weight in limits[node]:
                 value = weight + (form == "absolute" and node == state)
                 said.append(
-                    f"The constant of {pool.text(node, symbols)} in the equation of {symbols[state]} is held at its"
-                    f" bound {value:g}: the runs alone would put it beyond; check that bound."
+                    note(
+                        "at-bound",
+                        f"The constant of {pool.text(node, symbols)} in the equation of {symbols[state]} is held at its"
+                        f" bound {value:g}: the runs alone would put it beyond; check that bound.",
+                    )
                 )
     return said
 
 
-def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> list[str]:
-    """Sentences about sensors that are late or early.
+def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> list[Remark]:
+    """Remarks on sensors that are late or early.
 
     Args:
         offsets: of each state's readings (n_x,), s.
@@ -84,14 +92,18 @@ def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> li
     names = np.array(signals.state_names)
     others = ", ".join(names[list(driven)])
     return [
-        f"Readings of {', '.join(names[offsets == offset])} come {1e3 * abs(offset):.3g} ms"
-        f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is learnt with that taken out."
+        note(
+            "sensor-offset",
+            f"Readings of {', '.join(names[offsets == offset])} come {1e3 * abs(offset):.3g} ms"
+            f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is learnt with that taken"
+            " out.",
+        )
         for offset in dict.fromkeys(offsets[offsets != 0.0].tolist())
     ]
 
 
-def other_noise(observer: Sequence[Chain], signals: Signals) -> list[str]:
-    """Sentences about sensors whose noise is far from what was declared.
+def other_noise(observer: Sequence[Chain], signals: Signals) -> list[Remark]:
+    """Remarks on sensors whose noise is far from what was declared.
 
     Args:
         observer: all chains, with their noise as it was estimated.
@@ -112,16 +124,19 @@ def other_noise(observer: Sequence[Chain], signals: Signals) -> list[str]:
                 continue
             if not 0.5 <= found / state.noise <= 2.0:
                 said.append(
-                    f"The noise of the sensor of {state.name} was declared as {state.noise:.3g} {state.unit} and found"
-                    f" to be {found:.3g}; check the sensor and its unit, or remove the declaration."
+                    note(
+                        "declared-noise",
+                        f"The noise of the sensor of {state.name} was declared as {state.noise:.3g} {state.unit} and"
+                        f" found to be {found:.3g}; check the sensor and its unit, or remove the declaration.",
+                    )
                 )
     return said
 
 
 def remarks(
     runs: Sequence[Run], pool: Pool, signals: Signals, sums: Sequence[Sum], left: float, readings: int
-) -> list[str]:
-    """Sentences about what was learnt.
+) -> list[Remark]:
+    """Remarks on what was learnt.
 
     Args:
         runs: as they were learnt from.
@@ -138,22 +153,37 @@ def remarks(
     said = []
     if not np.isfinite(left):
         said.append(
-            "The model diverges on the runs that it was learnt from; fly another test before you trust it."
+            serious(
+                "diverges",
+                "The model diverges on the runs that it was learnt from; fly another test before you trust it.",
+            )
         )
     elif left > 2.0 * readings:
         said.append(
-            f"What is left is {left / readings:.3g} times the noise: something acts that no term describes."
+            serious(
+                "misfit",
+                f"What is left is {left / readings:.3g} times the noise: something acts that no term describes.",
+            )
         )
     elif exact(left / max(1, readings)):
-        said.append("The readings are as good as exact: their noise is taken to be what the model leaves.")
+        said.append(
+            note(
+                "exact",
+                "The readings are as good as exact: their noise is taken to be what the model leaves.",
+            )
+        )
     still = [
         signals.state_names[i]
         for i in range(signals.n_x)
         if max(float(np.ptp(run.states[:, i])) for run in runs) <= 1e-9 * signals.states[i].scale
     ]
     if still:
-        said.append(f"{', '.join(still)} never moved: nothing could be learnt of what drives it.")
-    said += [sentence for found in sums for sentence in identities(found, pool, signals)]
+        said.append(
+            note("never-moved", f"{', '.join(still)} never moved: nothing could be learnt of what drives it.")
+        )
+    said += [remark for found in sums for remark in identities(found, pool, signals)]
     if ignored:
-        said.append(f"{ignored} reading{'s' if ignored > 1 else ''} taken for outliers and ignored.")
+        said.append(
+            note("outliers", f"{ignored} reading{'s' if ignored > 1 else ''} taken for outliers and ignored.")
+        )
     return said

@@ -86,9 +86,8 @@ class Choice:
         """Why tuned gains cannot be answered for; nothing if they can."""
         if not self.committee.trusted:
             return "the twin does not follow the runs that it was learnt from"
-        failed = [failure.test.genes for failure in self.book.failures]
-        if nearby(self.planner.family, tuned[np.newaxis], failed)[0]:
-            return "gains close to those that the twin prefers have failed"
+        if nearby(self.planner.family, tuned[np.newaxis], self.book.unfit())[0]:
+            return "a flight with gains close to those that the twin prefers failed or was cut"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if max(float(flights.usages[:, :, 0].max()) for flights in (judged, elsewhere)) > 1.0:

@@ -9,6 +9,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.history import Experiment
 from twinloop.identification.records import Run, guessed_noise
+from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 
 MOVED = 20.0
@@ -31,7 +32,7 @@ def distinct(experiments: Sequence[Experiment]) -> list[Experiment]:
     return list(first.values())
 
 
-def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, steps: int) -> list[str]:
+def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, steps: int) -> list[Remark]:
     """What speaks against the data or the twin.
 
     Args:
@@ -41,28 +42,39 @@ def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, s
         steps: of a whole run.
 
     Returns:
-        Sentences, none where nothing does.
+        Remarks, none where nothing does.
     """
     said = list(_against_derivatives(experiments, signals))
     if not follows:
         said.append(
-            "Flown by itself the twin does not follow the runs that it was learnt from: check the signs, units and"
-            " order of states and commands, and that the recorded controller is the one that the test names."
+            serious(
+                "does-not-follow",
+                "Flown by itself the twin does not follow the runs that it was learnt from: check the signs, units and"
+                " order of states and commands, and that the recorded controller is the one that the test names.",
+            )
         )
     copies = len(experiments) - len(distinct(experiments))
     if copies:
         said.append(
-            f"{copies} of {len(experiments)} records equal an earlier one to the last bit: they were learnt from once."
+            note(
+                "copies",
+                f"{copies} of {len(experiments)} records equal an earlier one to the last bit: they were learnt from"
+                " once.",
+            )
         )
     if not any(run.complete for run in experiments):
         longest = max(run.trajectory.steps for run in experiments)
         said.append(
-            f"No run was complete, the longest had {longest} of {steps} steps: what comes after them nobody has seen."
+            serious(
+                "none-complete",
+                f"No run was complete, the longest had {longest} of {steps} steps: what comes after them nobody has"
+                " seen.",
+            )
         )
     return said
 
 
-def _against_derivatives(experiments: Sequence[Experiment], signals: Signals) -> Iterator[str]:
+def _against_derivatives(experiments: Sequence[Experiment], signals: Signals) -> Iterator[Remark]:
     """States that do not change as their declared derivatives say."""
     runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in experiments]
     noise = guessed_noise(runs, np.array([state.scale for state in signals.states]))
@@ -83,9 +95,10 @@ def _against_derivatives(experiments: Sequence[Experiment], signals: Signals) ->
         elif not AS_FAST[0] * told < both < AS_FAST[1] * told:
             how = f"changes {both / told:.3g} times as fast as"
         if how:
-            yield (
+            yield serious(
+                "derivative",
                 f"{rate.derivative_of} {how} {rate.name}, its declared derivative, says: check their units and signs,"
-                " the order of the columns, and what is declared."
+                " the order of the columns, and what is declared.",
             )
 
 

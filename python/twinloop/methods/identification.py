@@ -207,7 +207,7 @@ class IdentifyAndPlan:
                 best is not None and book.flies(best.number),
                 [run.usage for run in book.experiments],
                 self._first_quality(book),
-                [failure.test.genes for failure in book.failures],
+                book.unfit(),
             ),
             self.setup.goal,
             number,
@@ -274,6 +274,7 @@ class IdentifyAndPlan:
             seed=self.setup.seed,
             inflation=inflation,
             offsets=found.offsets.tolist(),
+            remarks=known.lessons[-1].remarks,
             flights=[run.trajectory for run in book.experiments],
         )
 

@@ -39,7 +39,7 @@ class Flown:
         usages: largest usage of the envelope in each flight.
         first_quality: of the first controller, as flown or predicted; infinite where it left the envelope: a flight
             that keeps it may then be worse.
-        failed: genes of tests that failed on the system.
+        failed: genes of tests that failed on the system, or were cut.
     """
 
     best: Floats
