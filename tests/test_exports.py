@@ -60,6 +60,17 @@ def twin_of(lines, form="acceleration", signals=SIGNALS, inputs=4, offsets=(), e
     return tl.Twin(model, signals, errors, offsets=offsets, flights=[flown(bare, seed=i) for i in range(2)])
 
 
+WRAPPING = tl.Signals(
+    states=[
+        tl.State("angle", "rad", 3.0, periodic=True),
+        tl.State("rate", "rad/s", 8.0, derivative_of="angle"),
+    ],
+    commands=SIGNALS.commands,
+    dt=0.05,
+)
+TURNING = ["r4 = r0 * -0.5", "r5 = r2 * 2.0", "r4 = r4 + r5", "r4 = r4 + 6.0"]
+"""It goes round, and the raw angle pulls."""
+
 TWINS = {
     "acceleration": lambda: twin_of(PENDULUM),
     "increment": lambda: twin_of(
@@ -74,6 +85,10 @@ TWINS = {
     ),
     "a lag at rest": lambda: twin_of(
         FILLED, inputs=5, actuators=[(0.03, 0, 0.5), (0.2, 0, None)], hidden=[((1,), False, 0.25, 2.0)],
+    ),
+    "an angle that wraps": lambda: twin_of(TURNING, signals=WRAPPING),
+    "an angle that wraps, step by step": lambda: twin_of(
+        ["r4 = r1 * 0.05", "r5 = r0 * -0.02", "r5 = r5 + 0.3"], "increment", WRAPPING,
     ),
     "kinematics": lambda: twin_of(
         ["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], signals=BODY, inputs=7,

@@ -225,6 +225,11 @@ def test_a_campaign_asks_alike_however_the_readings_were_wrapped(preset):
         assert same_bits(one.genes, other.genes) and one.predicted == other.predicted
 
 
+def test_the_equations_say_between_what_they_see_an_angle():
+    twin = tl.models.Twin(model(rig(periodic=True), "r3 = r0 * -2.5"), rig(periodic=True))
+    assert "# angle wraps: the equations see it from -3.14159 to 3.14159 rad" in twin.equations().splitlines()
+
+
 def test_a_target_a_whole_turn_away_is_no_task(new_campaign):
     with pytest.raises(tl.InvalidInput, match="away from the initial state"):
         new_campaign(signals=SIGNALS, controller=LAWS["a PID"], target_state=[PERIOD, 0.0])

@@ -191,8 +191,6 @@ class Pool(Expressions, Recorded, kind="pool"):
         Returns:
             Values (rows, p); not finite where an operation overflows.
         """
-        if not numbers:
-            return np.empty((len(rows), 0))
         computed = [number for number in dict.fromkeys(numbers) if self[number].operation != INPUT]
         results = self.program(computed, rows.shape[1]).run(rows) if computed else rows
         place = {number: i for i, number in enumerate(computed)}

@@ -88,6 +88,12 @@ class _Page:
         units = ", ".join(f"{state.name} in {state.unit or 'units'}" for state in signals.states)
         lines = [f"Form {self.law.form!r}: {kinds[self.law.form]}; {units}."]
         lines += [
+            f"{state.name} wraps: the equations see it from {-0.5 * state.period:g} to {0.5 * state.period:g}"
+            f" {state.unit}".rstrip()
+            for state in signals.states
+            if state.period is not None
+        ]
+        lines += [
             f"{symbol} = {command.name} / {self.writer.number(command.size)}, {command.name} in"
             f" {command.unit or '1'}"
             for symbol, command in zip(self.law.command_symbols, signals.commands, strict=True)
