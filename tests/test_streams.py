@@ -7,6 +7,8 @@ import pytest
 
 import twinloop as tl
 from twinloop import _core, streams
+from twinloop.exam.campaigns import random_gains
+from twinloop.exam.systems import Draw, subject
 from twinloop.streams import Purpose, Unit
 from twinloop.systems.sensors import run_stream
 
@@ -68,6 +70,14 @@ def test_the_noise_of_a_system_is_none_of_a_campaigns_draws():
     }
     assert len(set(noise.values())) == 100
     assert campaigns.isdisjoint(noise.values())
+
+
+def test_random_gains_of_an_exam_are_drawn_apart_from_the_noise_of_its_system(drawn):
+    """They were drawn from the bits of the second run's noise."""
+    list(random_gains(subject("quadrotor"), 3, 2))
+    assert drawn == [(3, "exam", (Draw.RANDOM_GAINS,))]
+    gains = Unit(3).part(Draw.RANDOM_GAINS).stream("exam").uniforms(9)
+    assert np.intersect1d(gains, np.concatenate([run_stream(3, run).random(9) for run in range(3)])).size == 0
 
 
 def test_python_and_the_engine_know_the_same_purposes():
