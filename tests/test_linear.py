@@ -153,6 +153,22 @@ def test_frequency_responses_are_those_of_python_control():
     np.testing.assert_allclose(near, found.response(frequencies[:5])[:, :2] * 1.0, rtol=0.2, atol=1e-3)
 
 
+def test_it_is_a_system_of_python_control():
+    found = twin(FILLED, **ACTUATED).linearise([6.875, 0.0], [0.5, 2.0], discrete=True)
+    system = found.to_control()
+    assert system.dt == 0.05 and system.state_labels == list(found.states)
+    assert system.input_labels == ["torque", "fan"]
+    model = twin(FILLED, **ACTUATED)
+    small = 1e-6 * np.ones((30, 2)) * (np.arange(30)[:, np.newaxis] > 0)
+    run = control.forced_response(system, 0.05 * np.arange(30), small.T)
+    command = np.array([0.5, 2.0])
+    pair = [model.simulate_commands([6.875, 0.0], command + s * small).states[:30] for s in (1.0, -1.0)]
+    np.testing.assert_allclose(run.states[:2].T, (pair[0] - pair[1]) / 2.0, atol=1e-11)
+    with pytest.raises(NotAvailable, match="discrete=True"):
+        twin(FILLED, **ACTUATED).linearise([6.875, 0.0], [0.5, 2.0]).to_control()
+    assert twin(PENDULUM).linearise([0.4, 0.0], [0.5, 2.0]).to_control().isctime()
+
+
 def test_without_a_command_the_state_is_held():
     model = twin(PENDULUM)
     found = model.linearise([0.6, 0.0])

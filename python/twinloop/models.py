@@ -20,7 +20,8 @@ from twinloop.exports.export import Source, asked, delivered, exported
 from twinloop.flight import fly, fly_commands
 from twinloop.law.equations import equations
 from twinloop.law.law import Law
-from twinloop.linear.plant import Linear, linearised, resting, trimmed
+from twinloop.linear.plant import linearised, resting, trimmed
+from twinloop.linear.state_space import Linear
 from twinloop.records import Recorded, checked_record, from_text, read, to_text
 from twinloop.remarks import Remark
 from twinloop.signals import Signals

@@ -12,7 +12,8 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family, Mixer
 from twinloop.law.law import Law
 from twinloop.linear.controller import LinearController, linear_controller
-from twinloop.linear.plant import Linear, linearised, trimmed
+from twinloop.linear.plant import linearised, trimmed
+from twinloop.linear.state_space import Linear
 
 FREQUENCIES = 4000
 """Frequencies at which a loop is looked at, in equal ratios."""

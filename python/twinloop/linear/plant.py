@@ -12,55 +12,10 @@ from twinloop.errors import NotAvailable
 from twinloop.law.actuation import Actuation, Actuator
 from twinloop.law.law import Law
 from twinloop.linear.jacobian import jacobian
+from twinloop.linear.state_space import Linear
 
 HALVINGS = 30
 """Times that a step to a command that holds a state is halved at most."""
-
-
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """dx/dt = A x + B u, or x[k+1] = A x[k] + B u[k], for departures x and u from a point.
-
-    Behind the states of the signals stand those that actuators and hidden states bring: the effect of a command that
-    lags, a hidden state and, where time is discrete, commands on their way.
-
-    Args:
-        A: (n, n), in the units of the states and s.
-        B: (n, n_u).
-        states: names of the n states.
-        commands: names of the n_u commands.
-        state: the point (n,).
-        command: of the point (n_u,).
-        drift: where the law leads from the point: the derivative there, or what a period adds (n,); 0 at an
-            equilibrium.
-        dt: period, s; None where time is continuous.
-        delays: of each command, s, that A and B do not hold (n_u,); where time is discrete they hold all, and it is 0.
-    """
-
-    A: Floats
-    B: Floats
-    states: tuple[str, ...]
-    commands: tuple[str, ...]
-    state: Floats
-    command: Floats
-    drift: Floats
-    dt: float | None
-    delays: Floats
-
-    def response(self, frequencies: Floats) -> np.ndarray:
-        """From commands to states.
-
-        Args:
-            frequencies: (f,), rad/s.
-
-        Returns:
-            Complex gains (f, n, n_u), the delays among them.
-        """
-        s = 1j * frequencies
-        points = s if self.dt is None else np.exp(s * self.dt)
-        inner = points[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
-        lost = np.exp(-s[:, np.newaxis] * self.delays)
-        return np.asarray(np.linalg.solve(inner, self.B.astype(complex)) * lost[:, np.newaxis, :])
 
 
 def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Linear:
@@ -169,77 +124,105 @@ class _Dual:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class _Begun:
+    """What a period begins with, each with its derivatives: all of it together is the state of the linear model.
+
+    Args:
+        names: of the states of the linear model.
+        x: the states of the signals.
+        held: effect of each command that lags, by its place.
+        hidden: the hidden states.
+        queues: commands on their way, the oldest first, for each command.
+        sent: the commands of the period.
+    """
+
+    names: list[str]
+    x: _Dual
+    held: dict[int, _Dual]
+    hidden: _Dual
+    queues: list[list[_Dual]]
+    sent: _Dual
+
+    @staticmethod
+    def of(law: Law, state: Floats, command: Floats) -> _Begun:
+        signals, actuators = law.signals, law.actuation.actuators
+        sent = list(zip(signals.command_names, actuators, strict=True))
+        names = [*signals.state_names, *(f"{name}_effect" for name, a in sent if a.lag > 0.0)]
+        names += law.hidden_symbols
+        names += [f"{name}_{back}_before" for name, a in sent for back in range(a.delay, 0, -1)]
+        identity, rows = np.eye(len(names) + signals.n_u), iter(range(len(names)))
+
+        def taken(values: Floats) -> _Dual:
+            return _Dual(values, identity[[next(rows) for _ in values]])
+
+        x = taken(state)
+        held = {i: taken(command[[i]]) for i, actuator in enumerate(actuators) if actuator.lag > 0.0}
+        hidden = taken(np.zeros(len(law.actuation.hidden)))
+        queues = [[taken(command[[i]]) for _ in range(a.delay)] for i, a in enumerate(actuators)]
+        return _Begun(names, x, held, hidden, queues, _Dual(command, identity[len(names) :]))
+
+    def whole(self) -> _Dual:
+        """All of it, in the order of the names."""
+        waiting = [part for queue in self.queues for part in queue]
+        return _Dual.stacked([self.x, *self.held.values(), self.hidden, *waiting])
+
+
 def _period(law: Law, state: Floats, command: Floats) -> Linear:
     """One period, with what is on its way as states: x, effects that lag, hidden states, commands before."""
-    signals, actuators, hidden = law.signals, law.actuation.actuators, law.actuation.hidden
-    names = list(signals.state_names)
-    names += [f"{n}_effect" for n, a in zip(signals.command_names, actuators, strict=True) if a.lag > 0.0]
-    names += law.hidden_symbols
-    names += [
-        f"{name}_{back}_before"
-        for name, actuator in zip(signals.command_names, actuators, strict=True)
-        for back in range(actuator.delay, 0, -1)
+    begun = _Begun.of(law, state, command)
+    effects, held, waiting = _effects(law, begun)
+    filled = _filled(law, begun)
+    inputs = [
+        _Dual.stacked([of_commands, hidden]) for of_commands, hidden in zip(effects, filled, strict=True)
     ]
-    size, n_u = len(names), signals.n_u
-    identity = np.eye(size + n_u)
-    rows = iter(range(size))
+    ended = _Dual.stacked([_stepped(law, begun.x, inputs), *held, filled[2], *waiting])
+    before, size = begun.whole(), len(begun.names)
+    return Linear(
+        ended.slopes[:, :size],
+        ended.slopes[:, size:],
+        tuple(begun.names),
+        law.signals.command_names,
+        before.values,
+        command,
+        ended.values - before.values,
+        law.signals.dt,
+        np.zeros(law.signals.n_u),
+    )
 
-    def taken(values: Floats) -> _Dual:
-        return _Dual(values, identity[[next(rows) for _ in values]])
 
-    x = taken(state)
-    memories = {i: taken(command[i : i + 1]) for i, a in enumerate(actuators) if a.lag > 0.0}
-    now = taken(np.zeros(len(hidden)))
-    sent = _Dual(command, identity[size:])
-    one = {i: _Dual(command[i : i + 1], identity[size + i : size + i + 1]) for i in range(n_u)}
-    queues = {
-        i: [*(taken(command[i : i + 1]) for _ in range(a.delay)), one[i]] for i, a in enumerate(actuators)
-    }
-
+def _effects(law: Law, begun: _Begun) -> tuple[list[_Dual], list[_Dual], list[_Dual]]:
+    """Scaled effects of commands at start, middle and end of a period; what lags hold; commands still on their way."""
     stages: list[list[_Dual]] = [[], [], []]
-    after: list[_Dual] = []
-    for i, actuator in enumerate(actuators):
-        arrived = queues[i][0]
-        half = np.exp(-0.5 * signals.dt / actuator.lag) if actuator.lag > 0.0 else 0.0
-        start = memories.get(i, arrived)
+    held, waiting = [], []
+    for i, actuator in enumerate(law.actuation.actuators):
+        arrived, *later = [*begun.queues[i], _Dual(begun.sent.values[[i]], begun.sent.slopes[[i]])]
+        half = float(np.exp(-0.5 * law.signals.dt / actuator.lag)) if actuator.lag > 0.0 else 0.0
+        start = begun.held.get(i, arrived)
         middle = arrived * (1.0 - half) + start * half
         end = arrived * (1.0 - half) + middle * half
         for stage, effect in zip(stages, (start, middle, end), strict=True):
             stage.append(effect)
-        after += [end] if i in memories else []
-    factors = 1.0 / np.array([each.size for each in signals.commands])
-    seen = [_Dual.stacked(stage) * factors for stage in stages]
-    fillings: list[list[_Dual]] = [[], [], []]
-    for j, h in enumerate(hidden):
-        kept = float(np.exp(-0.5 * signals.dt / h.time))
-        level, slope = _level(h.commands, h.squared, factors * command, factors)
+        held += [end] if i in begun.held else []
+        waiting += later
+    factors = 1.0 / np.array([each.size for each in law.signals.commands])
+    return [_Dual.stacked(stage) * factors for stage in stages], held, waiting
+
+
+def _filled(law: Law, begun: _Begun) -> list[_Dual]:
+    """Hidden states at the start, the middle and the end of a period."""
+    factors = 1.0 / np.array([each.size for each in law.signals.commands])
+    stages: list[list[_Dual]] = [[], [], []]
+    for j, h in enumerate(law.actuation.hidden):
+        kept = float(np.exp(-0.5 * law.signals.dt / h.time))
+        level, slope = _level(h.commands, h.squared, factors * begun.sent.values, factors)
         over = 0.0 if h.rest is None else level - h.rest
-        added = _Dual(np.array([over]), slope[np.newaxis] @ sent.slopes) * (h.time * (1.0 - kept))
-        start = _Dual(now.values[j : j + 1], now.slopes[j : j + 1])
+        added = _Dual(np.array([over]), slope[np.newaxis] @ begun.sent.slopes) * (h.time * (1.0 - kept))
+        start = _Dual(begun.hidden.values[[j]], begun.hidden.slopes[[j]])
         middle = start * kept + added
-        fillings[0].append(start)
-        fillings[1].append(middle)
-        fillings[2].append(middle * kept + added)
-    after += fillings[2]
-    inputs = [_Dual.stacked([effects, *filled]) for effects, filled in zip(seen, fillings, strict=True)]
-    after = [_stepped(law, x, inputs), *after]
-    for i in range(n_u):
-        after += queues[i][1:]
-    begun = _Dual.stacked(
-        [x, *memories.values(), now, *(part for queue in queues.values() for part in queue[:-1])]
-    )
-    ended = _Dual.stacked(after)
-    return Linear(
-        ended.slopes[:, :size],
-        ended.slopes[:, size:],
-        tuple(names),
-        signals.command_names,
-        begun.values,
-        command,
-        ended.values - begun.values,
-        signals.dt,
-        np.zeros(n_u),
-    )
+        for stage, value in zip(stages, (start, middle, middle * kept + added), strict=True):
+            stage.append(value)
+    return [_Dual.stacked(stage) if stage else begun.hidden for stage in stages]
 
 
 def _stepped(law: Law, x: _Dual, inputs: Sequence[_Dual]) -> _Dual:

@@ -1,0 +1,86 @@
+"""A linear model with the names of what its matrices stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.errors import NotAvailable
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """dx/dt = A x + B u, or x[k+1] = A x[k] + B u[k], for departures x and u from a point.
+
+    Behind the states of the signals stand those that actuators and hidden states bring: the effect of a command that
+    lags, a hidden state and, where time is discrete, commands on their way.
+
+    Args:
+        A: (n, n), in the units of the states and s.
+        B: (n, n_u).
+        states: names of the n states.
+        commands: names of the n_u commands.
+        state: the point (n,).
+        command: of the point (n_u,).
+        drift: where the law leads from the point: the derivative there, or what a period adds (n,); 0 at an
+            equilibrium.
+        dt: period, s; None where time is continuous.
+        delays: of each command, s, that A and B do not hold (n_u,); where time is discrete they hold all, and it is 0.
+    """
+
+    A: Floats
+    B: Floats
+    states: tuple[str, ...]
+    commands: tuple[str, ...]
+    state: Floats
+    command: Floats
+    drift: Floats
+    dt: float | None
+    delays: Floats
+
+    def to_control(self) -> Any:
+        """The same as a state space of python-control, whose outputs are all states.
+
+        Returns:
+            A `control.StateSpace` with the names of the states and commands.
+
+        Raises:
+            NotAvailable: python-control is missing, or time is continuous and a command is delayed.
+        """
+        try:
+            import control
+        except ImportError as missing:
+            raise NotAvailable(
+                "python-control: expected the package `control`, found none; install it with `pip install control`."
+            ) from missing
+        if self.delays.any():
+            raise NotAvailable(
+                "python-control: expected no delays in continuous time, for it has none, found"
+                f" {self.delays.tolist()} s; linearise with discrete=True, where they are states."
+            )
+        dt = 0 if self.dt is None else self.dt
+        names = list(self.states)
+        return control.ss(
+            *(self.A, self.B, np.eye(len(names)), np.zeros(self.B.shape), dt),
+            states=names,
+            inputs=list(self.commands),
+            outputs=[f"{name}_out" for name in names],
+        )
+
+    def response(self, frequencies: Floats) -> np.ndarray:
+        """From commands to states.
+
+        Args:
+            frequencies: (f,), rad/s.
+
+        Returns:
+            Complex gains (f, n, n_u), the delays among them.
+        """
+        s = 1j * frequencies
+        points = s if self.dt is None else np.exp(s * self.dt)
+        inner = points[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
+        lost = np.exp(-s[:, np.newaxis] * self.delays)
+        return np.asarray(np.linalg.solve(inner, self.B.astype(complex)) * lost[:, np.newaxis, :])
