@@ -11,6 +11,7 @@ from twinloop.errors import (
     SystemFailure,
     TwinloopError,
 )
+from twinloop.logs import load
 from twinloop.models import Twin, load_twin
 from twinloop.remarks import Remark
 from twinloop.signals import Command, RigidBody, Signals, State
@@ -39,6 +40,7 @@ __all__ = [
     "contracts",
     "controllers",
     "errors",
+    "load",
     "load_twin",
     "objectives",
     "pareto",

@@ -645,6 +645,11 @@ class Campaign(Recorded, kind="campaign"):
         return tuple(self._book.experiments)
 
     @property
+    def tests(self) -> tuple[Test, ...]:
+        """All that were made, by their numbers."""
+        return tuple(self._book.tests)
+
+    @property
     def waiting(self) -> tuple[Test, ...]:
         """Tests that were asked for, and neither told nor abandoned, in their order."""
         return tuple(self._book.waiting())

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from twinloop import __version__
+from twinloop.by_hand import abandon, ask, attach, new, tell
 from twinloop.campaign import Campaign
 from twinloop.console import Watch
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
@@ -139,6 +140,8 @@ def run(
     context.exit(work(campaign, rig, watch, experiments, output, plot, as_json))
 
 
+for command in (new, ask, tell, attach, abandon):
+    main.add_command(command)
 main.add_command(resume)
 main.add_command(show)
 main.add_command(bench)

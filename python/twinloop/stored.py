@@ -105,7 +105,7 @@ def _named(held: Kept) -> dict[str, object]:
     try:
         system = _system(held)
     except (NotAvailable, InvalidInput):
-        return {"name": "unknown"}
+        return {"name": "a system of your own"}
     return described("quadrotor", system)
 
 

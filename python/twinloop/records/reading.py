@@ -109,7 +109,7 @@ def keys(value: object, names: tuple[str, ...], where: str) -> Mapping[str, Any]
         raise InvalidInput(f"Record {where}: expected a dict, found {shown(value)}.")
     for key in value:
         if key not in names:
-            raise unknown(f"key in the record {where}", shown(key), names)
+            raise unknown(f"key in the record {where}", str(key)[:60], names)
     missing = [key for key in names if key not in value]
     if missing:
         raise InvalidInput(f"Record {where}: expected {', '.join(missing)}, found none; add them.")

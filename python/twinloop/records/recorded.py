@@ -136,7 +136,7 @@ def checked_record(
     rest = {key: value for key, value in record.items() if key not in ("kind", "version")}
     for key in rest:
         if key not in keys:
-            raise unknown(f"key in the record {where}", shown(key), keys)
+            raise unknown(f"key in the record {where}", str(key)[:60], keys)
     missing = [key for key in keys if key not in rest and key not in optional]
     if missing:
         raise InvalidInput(f"Record {where}: expected {', '.join(missing)}, found none; add them.")
@@ -305,7 +305,7 @@ def _read_protocol(hint: Any, value: object, where: str, given: tuple[object, ..
     found = value.get("kind") if isinstance(value, Mapping) else None
     possible = [kind for kind, cls in KINDS.items() if _keeps(cls, hint)]
     if found not in possible:
-        raise unknown(f"kind in the record {where}", shown(found), possible)
+        raise unknown(f"kind in the record {where}", str(found)[:60], possible)
     return KINDS[str(found)]._read(value, where, given)
 
 
