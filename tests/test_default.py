@@ -9,7 +9,7 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
 from oracles import rk4, same_bits
 from twinloop.logbook import _check_first_reading
-from twinloop.models import Noise
+from twinloop.noise import Noise
 from twinloop.result import summary
 
 SMALL = {

@@ -14,12 +14,13 @@ import twinloop as tl
 from oracles import registers_of
 from strategies import program_text, programs
 from twinloop import _core
+from twinloop.accuracy import TestErrors
 from twinloop.errors import NotAvailable
 from twinloop.exports.c_source import c_source
 from twinloop.exports.checks import c_controller, c_simulation, python_controller, python_simulation
 from twinloop.exports.controller_source import controller_c, controller_python
 from twinloop.exports.python_source import python_source
-from twinloop.models import Noise, TestErrors
+from twinloop.noise import Noise
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 
@@ -386,7 +387,7 @@ def test_a_periodic_state_is_taken_away_as_the_model_sees_it():
     assert expected[-1, 0] > 4.0  # it went round
     found = python_simulation(python_source(twin.law))(start, commands)
     np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9)
-    assert "angle is seen within 3.14159 rad of 0" in twin.equations()
+    assert "angle wraps: the equations see it from -3.14159 to 3.14159 rad" in twin.equations()
     point = twin.linearise([5.0, 0.3, 0.0], [0.1, 0.2], discrete=True)
     nudged = [twin.predict([5.0 + sign * 1e-6, 0.3, 0.0], [0.1, 0.2]) for sign in (1.0, -1.0)]
     np.testing.assert_allclose(point.A[:, 0], (nudged[0] - nudged[1]) / 2e-6, rtol=1e-6, atol=1e-9)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -13,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
+from twinloop.accuracy import ErrorTable, FitTable, StateFit, TestErrors
 from twinloop.arrays import Floats, floats, number
-from twinloop.elementary import exp
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.exports.export import Source, asked, delivered, exported
 from twinloop.flight import fly, fly_commands
@@ -22,6 +21,7 @@ from twinloop.law.equations import equations
 from twinloop.law.law import Law
 from twinloop.linear.plant import linearised, resting, trimmed
 from twinloop.linear.state_space import Linear
+from twinloop.noise import Noise
 from twinloop.records import Recorded, checked_record, from_text, read, to_text
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -29,125 +29,8 @@ from twinloop.streams import Unit
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory, check_recorded, continued
 
-
-@dataclass(frozen=True)
-class TestErrors(Recorded, kind="test_errors"):
-    """How well a twin follows one selected test.
-
-    Args:
-        test: number of the test, None for a run that nobody asked for; a replicate has a row of its own.
-        open_loop: mean squared error one step ahead, over steps and components, SI units squared.
-        closed_loop: mean squared error of the free run under the test's own controller, or, for a run that nobody asked
-            for, under its recorded commands; the same units.
-        normalised: closed_loop over that of the model that never moves; 1 means useless.
-        before: closed-loop error of the twin that the last `ask` before it knew; None if nothing was asked yet.
-        after: closed-loop error now.
-    """
-
-    __test__ = False
-
-    test: int | None
-    open_loop: float
-    closed_loop: float
-    normalised: float
-    before: float | None
-    after: float
-
-
-class ErrorTable(tuple[TestErrors, ...]):
-    """Errors of a twin, one row for each selected test in the order they were told; printable."""
-
-    def __str__(self) -> str:
-        """A table as text."""
-        head = (
-            f"{'test':>4}  {'open loop':>10}  {'closed loop':>11}  {'normalised':>10}  {'before':>10} "
-            f" {'after':>10}"
-        )
-        lines = [head]
-        for row in self:
-            before = "-" if row.before is None else f"{row.before:.4g}"
-            test = "-" if row.test is None else row.test
-            lines.append(
-                f"{test:>4}  {row.open_loop:>10.4g}  {row.closed_loop:>11.4g}  {row.normalised:>10.4g}  "
-                f"{before:>10}  {row.after:>10.4g}"
-            )
-        return "\n".join(lines)
-
-
-@dataclass(frozen=True, eq=False)
-class Noise(Recorded, kind="noise"):
-    """What a twin does not predict.
-
-    Args:
-        sensors: standard deviation of each state's sensor (n_x,), in its unit.
-        moves: standard deviation of what a white disturbance adds to each state in a period (n_x,), in its unit.
-        gusts: lasting disturbances: the states that each drives, whether as a derivative, its standard deviation, and
-            the time in s after which it is forgotten to 1/e.
-        dt: period, s.
-    """
-
-    sensors: Floats
-    moves: Floats
-    gusts: tuple[tuple[tuple[int, ...], bool, float, float], ...] = ()
-    dt: float = 1.0
-
-    def drawn(self, draws: int, steps: int, stream: _core.Stream) -> tuple[Floats, Floats]:
-        """What sensors add to readings (draws, steps + 1, n_x), and disturbances to states (draws, steps, n_x)."""
-        noise = self.sensors * stream.normals(draws, steps + 1, len(self.sensors))
-        return noise, self.disturbance(draws, steps, stream)
-
-    def disturbance(self, draws: int, steps: int, stream: _core.Stream) -> Floats:
-        """Draws of what disturbances add to the states (draws, steps, n_x)."""
-        added = self.moves * stream.normals(draws, steps, len(self.moves))
-        for states, integrated, size, memory in self.gusts:
-            kept = float(exp(-self.dt / memory))
-            fresh = stream.normals(draws, steps)
-            gust = np.empty((draws, steps))
-            gust[:, 0] = fresh[:, 0]
-            for k in range(1, steps):
-                gust[:, k] = kept * gust[:, k - 1] + np.sqrt(1.0 - kept * kept) * fresh[:, k]
-            reach = 1.0
-            for i, state in enumerate(states if integrated else states[:1]):
-                reach *= self.dt / (i + 1) if integrated else 1.0
-                added[:, :, state] += reach * size * gust
-        return added
-
-
 WRONG = 0.5
 """Share of the error of the model that never moves above which a flight is not followed."""
-
-
-@dataclass(frozen=True)
-class StateFit:
-    """How well a twin's free run follows a record in one state.
-
-    Args:
-        name: of the state.
-        unit: of the state.
-        rmse: root mean square of recorded minus simulated, in its unit; infinite if the free run diverged.
-        fit: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖), %: 100 is perfect, 0 knows the mean only; None if the state never moved.
-        r2: 1 − ‖y − ŷ‖² / ‖y − ȳ‖²; None if the state never moved.
-    """
-
-    name: str
-    unit: str
-    rmse: float
-    fit: float | None
-    r2: float | None
-
-
-class FitTable(tuple[StateFit, ...]):
-    """How well a twin's free run follows a record, one row a state; printable."""
-
-    def __str__(self) -> str:
-        """A table as text."""
-        lines = [f"{'state':<16} {'unit':<8} {'RMSE':>10}  {'FIT %':>8}  {'R²':>8}"]
-        for row in self:
-            fit, r2 = ("-" if value is None else f"{value:.4g}" for value in (row.fit, row.r2))
-            lines.append(f"{row.name:<16} {row.unit or '1':<8} {row.rmse:>10.4g}  {fit:>8}  {r2:>8}")
-        return "\n".join(lines)
-
-
 DRAWS = 12
 """Runs of each member of a committee that a band is made of."""
 STARTS = 5.0

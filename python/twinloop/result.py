@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from twinloop.accuracy import TestErrors
 from twinloop.assessment import expected_quality
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.controllers import Gain
 from twinloop.history import Experiment, Lesson
 from twinloop.identification.noise import exact
-from twinloop.models import TestErrors, Twin
+from twinloop.models import Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality
 from twinloop.presets import DefaultOptions

@@ -14,7 +14,7 @@ from twinloop.identification.noise import exact
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum
 from twinloop.law.actuation import Actuation
-from twinloop.models import Noise
+from twinloop.noise import Noise
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals

@@ -106,11 +106,6 @@ class _Page:
                 f"±: standard deviation of a constant over the {len(self.members)} models of the committee, or"
                 " over as many of them as have the term, where a number of them is given"
             )
-        lines += [
-            f"{state.name} is seen within {0.5 * state.period:.6g} {state.unit} of 0".strip()
-            for state in signals.states
-            if state.period is not None
-        ]
         lines += self._actuators() + self._offsets()
         return [part for line in lines for part in _comment(line)]
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from twinloop import _core
+from twinloop.accuracy import TestErrors
 from twinloop.arrays import Floats
 from twinloop.logbook import Logbook
-from twinloop.models import TestErrors
 from twinloop.objectives import closed_loop, normalised_error, open_loop
 
 Objective = Callable[[Sequence[_core.Model], _core.SelectedTests, _core.Workers], Floats]

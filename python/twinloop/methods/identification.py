@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinloop import _core
+from twinloop.accuracy import TestErrors
 from twinloop.arrays import Floats
 from twinloop.controllers import lqr_gains
 from twinloop.controllers.state_feedback import FeedbackFamily
@@ -22,7 +23,7 @@ from twinloop.methods.calibration import OF_PARTS, factor, left_of_flights, need
 from twinloop.methods.choice import Choice
 from twinloop.methods.doubts import distinct, doubts
 from twinloop.methods.errors import errors, free_runs
-from twinloop.models import TestErrors, Twin
+from twinloop.models import Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner

@@ -1,0 +1,82 @@
+"""How well a twin follows what was flown: errors test by test, and its fit state by state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twinloop.records import Recorded
+
+
+@dataclass(frozen=True)
+class TestErrors(Recorded, kind="test_errors"):
+    """How well a twin follows one selected test.
+
+    Args:
+        test: number of the test, None for a run that nobody asked for; a replicate has a row of its own.
+        open_loop: mean squared error one step ahead, over steps and components, SI units squared.
+        closed_loop: mean squared error of the free run under the test's own controller, or, for a run that nobody asked
+            for, under its recorded commands; the same units.
+        normalised: closed_loop over that of the model that never moves; 1 means useless.
+        before: closed-loop error of the twin that the last `ask` before it knew; None if nothing was asked yet.
+        after: closed-loop error now.
+    """
+
+    __test__ = False
+
+    test: int | None
+    open_loop: float
+    closed_loop: float
+    normalised: float
+    before: float | None
+    after: float
+
+
+class ErrorTable(tuple[TestErrors, ...]):
+    """Errors of a twin, one row for each selected test in the order they were told; printable."""
+
+    def __str__(self) -> str:
+        """A table as text."""
+        head = (
+            f"{'test':>4}  {'open loop':>10}  {'closed loop':>11}  {'normalised':>10}  {'before':>10} "
+            f" {'after':>10}"
+        )
+        lines = [head]
+        for row in self:
+            before = "-" if row.before is None else f"{row.before:.4g}"
+            test = "-" if row.test is None else row.test
+            lines.append(
+                f"{test:>4}  {row.open_loop:>10.4g}  {row.closed_loop:>11.4g}  {row.normalised:>10.4g}  "
+                f"{before:>10}  {row.after:>10.4g}"
+            )
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class StateFit:
+    """How well a twin's free run follows a record in one state.
+
+    Args:
+        name: of the state.
+        unit: of the state.
+        rmse: root mean square of recorded minus simulated, in its unit; infinite if the free run diverged.
+        fit: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖), %: 100 is perfect, 0 knows the mean only; None if the state never moved.
+        r2: 1 − ‖y − ŷ‖² / ‖y − ȳ‖²; None if the state never moved.
+    """
+
+    name: str
+    unit: str
+    rmse: float
+    fit: float | None
+    r2: float | None
+
+
+class FitTable(tuple[StateFit, ...]):
+    """How well a twin's free run follows a record, one row a state; printable."""
+
+    def __str__(self) -> str:
+        """A table as text."""
+        lines = [f"{'state':<16} {'unit':<8} {'RMSE':>10}  {'FIT %':>8}  {'R²':>8}"]
+        for row in self:
+            fit, r2 = ("-" if value is None else f"{value:.4g}" for value in (row.fit, row.r2))
+            lines.append(f"{row.name:<16} {row.unit or '1':<8} {row.rmse:>10.4g}  {fit:>8}  {r2:>8}")
+        return "\n".join(lines)
