@@ -97,6 +97,17 @@ def test_a_remark_has_a_severity_and_comes_back_from_its_record():
 # Advice, report, picture
 
 
+def test_the_result_holds_flights_and_predictions_as_series():
+    campaign = begun()
+    campaign.attach(by_hand(30))
+    result = json.loads(to_json(summary(campaign, {}, {})))
+    for run, entry in zip(campaign.experiments, result["experiments"], strict=True):
+        series, predicted = entry["series"], campaign.twin.simulate(run.replayed)
+        assert series["t"] == run.trajectory.t.tolist() and series["states"] == run.trajectory.states.tolist()
+        assert series["commands"] == run.trajectory.commands.tolist()
+        assert series["simulated"] == predicted.states.tolist() and series["band"] == predicted.band.tolist()
+
+
 def test_advice_is_a_value_of_the_campaign():
     campaign = begun()
     assert (

@@ -67,7 +67,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "commands": [dataclasses.asdict(command) for command in campaign.signals.commands],
         },
         "experiments": [
-            _experiment(run, row, identified)
+            {**_experiment(run, row, identified), "series": _series(run, twin)}
             for run, row in zip(campaign.experiments, twin.errors, strict=True)
         ],
         "iterations": [dataclasses.asdict(iteration) for iteration in campaign.history],
@@ -178,6 +178,18 @@ def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str,
             "normalised_before": None if row.before is None else normalised_error(row.before, run.frozen),
         }
     return found
+
+
+def _series(run: Experiment, twin: Twin) -> dict[str, object]:
+    """A flight and what the twin makes of it: times, states, commands; a band where a committee stands behind it."""
+    predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
+    return {
+        "t": run.trajectory.t,
+        "states": run.trajectory.states,
+        "commands": run.trajectory.commands,
+        "simulated": predicted.states,
+        "band": predicted.band,
+    }
 
 
 def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
