@@ -65,6 +65,7 @@ __all__ = [
     "final_distances",
     "ideal_point",
     "instability",
+    "k_step",
     "log",
     "most_likely_noises",
     "open_loop",
@@ -212,7 +213,8 @@ class Grammar:
     ) -> Grammar: ...
     def random(self, seed: int, count: int = 1) -> list[Program]: ...
     def mutate(self, program: Program, seed: int) -> Program: ...
-    def crossover(self, first: Program, second: Program, seed: int) -> tuple[Program, Program]: ...
+    def crossover(self, first: Program, second: Program, seed: int) -> tuple[Program, Program]:
+        """Both with one page exchanged; one that would have more instructions than a program may stays as it is."""
 
 @final
 class Signals:
@@ -263,8 +265,17 @@ class Model:
     def with_constants(self, constants: Sequence[float], lags: Sequence[float] | None) -> Model:
         """The same model without introns, with other constants, and, unless None, other lags and times of
         hidden states."""
-    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats:
-        """Next states (rows, n_x) of states (rows, n_x) and commands (rows, n_u)."""
+    def step(
+        self,
+        states: ArrayLike,
+        commands: ArrayLike,
+        workers: Workers | None = None,
+        past: ArrayLike | None = None,
+    ) -> _Floats:
+        """Next states (rows, n_x) of states (rows, n_x) and commands (rows, n_u).
+
+        past (rows, p, n_u): what was commanded since each row's run began, the oldest first; None: it begins now.
+        """
 
 @final
 class Quadrotor:
@@ -286,8 +297,14 @@ class Quadrotor:
     ) -> Quadrotor: ...
     def derivative(self, state: ArrayLike, command: ArrayLike) -> _Floats:
         """Rates and accelerations (6,) of a state (6,), with the rotors turning as commanded (4,)."""
-    def step(self, states: ArrayLike, commands: ArrayLike, workers: Workers | None = None) -> _Floats:
-        """States (rows, 6) after the first period of a run; lagging rotors start at hover speed."""
+    def step(
+        self,
+        states: ArrayLike,
+        commands: ArrayLike,
+        workers: Workers | None = None,
+        past: ArrayLike | None = None,
+    ) -> _Floats:
+        """States (rows, 6) a period later; lagging rotors start at hover speed and have followed `past` (rows, p, 4)."""
 
 @final
 class Family:
@@ -417,10 +434,18 @@ class SelectedTests:
     def __len__(self) -> int: ...
 
 def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:
-    """One-step-ahead error of each model on each test (models, tests)."""
+    """One-step-ahead error of each model on each test (models, tests); infinite where it is not finite."""
 
-def closed_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:
-    """Free-run error with the controller in the loop (models, tests)."""
+def k_step(
+    models: Sequence[Model], selected: SelectedTests, steps: int, workers: Workers | None = None
+) -> _Floats:
+    """Error of free runs of some steps from every recorded state, under the recorded commands (models, tests)."""
+
+def closed_loop(
+    models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None
+) -> tuple[_Floats, _Integers]:
+    """Free-run error with the controller in the loop, infinite where the run diverged, and the steps that it lasted,
+    both (models, tests)."""
 
 def final_distances(
     models: Sequence[Model],
@@ -662,7 +687,8 @@ class ModelSearch:
         """The search that these were read off."""
     def learn(self, selected: SelectedTests, workers: Workers) -> ModelSearch:
         """The same population and non-dominated set, judged on more tests: a new iteration, generation 0."""
-    def advance(self, selected: SelectedTests, generations: int, workers: Workers) -> ModelSearch: ...
+    def advance(self, selected: SelectedTests, generations: int, workers: Workers) -> ModelSearch:
+        """Some generations later, on the tests that it was last judged on."""
     @property
     def counters(self) -> _Counters: ...
     @property

@@ -62,12 +62,12 @@ def engine_input() -> Iterator[None]:
     """Turns the engine's refusals into `InvalidInput`, with the engine's own sentence.
 
     Raises:
-        InvalidInput: where the engine raised a ValueError.
+        InvalidInput: where the engine raised a ValueError, or an OverflowError for a count below 0.
     """
     try:
         yield
     except TwinloopError:
         raise
-    except ValueError as refusal:
+    except (ValueError, OverflowError) as refusal:
         sentence = str(refusal)
         raise InvalidInput(sentence if sentence.endswith((".", "?")) else f"{sentence}.") from refusal

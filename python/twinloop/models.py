@@ -279,12 +279,17 @@ class Twin(Recorded, kind="twin"):
         variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
         return origin + middle, variance
 
-    def predict(self, states: ArrayLike, commands: ArrayLike) -> Floats:
+    def predict(self, states: ArrayLike, commands: ArrayLike, past: ArrayLike | None = None) -> Floats:
         """One step.
+
+        Lags, delays and hidden states make what comes next depend on what was commanded before. Without a `past` each
+        row is the first period of a run.
 
         Args:
             states: (n_x,) or (rows, n_x), SI units, radians.
             commands: (n_u,) or (rows, n_u), in their units.
+            past: what was commanded since the run began, (p, n_u) or, a run each, (rows, p, n_u), the oldest first, in
+                the commands' units; None: nothing yet.
 
         Returns:
             The states one period later, in the shape of `states`; not finite where the model is not.
@@ -295,8 +300,12 @@ class Twin(Recorded, kind="twin"):
         single = np.ndim(states) == 1
         x = floats("States", np.atleast_2d(states), (None, self.signals.n_x))
         u = floats("Commands", np.atleast_2d(commands), (len(x), self.signals.n_u))
+        before = None
+        if past is not None:
+            rows = np.asarray(past)[np.newaxis] if np.ndim(past) == 2 and single else past
+            before = floats("Past commands", rows, (len(x), None, self.signals.n_u))
         with engine_input():
-            following = self.model.step(x, u)
+            following = self.model.step(x, u, past=before)
         return following[0] if single else following
 
     def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:

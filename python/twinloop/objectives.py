@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, number
+from twinloop.arrays import Floats, Integers, floats, number
 from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.signals import Signals
@@ -53,13 +53,16 @@ def open_loop(
 ) -> Floats:
     """One-step-ahead error: mean squared error of M(ω_t, η_t) against η_{t+1} (paper, section IV.B).
 
+    A model with lags, delays or hidden states is told the recorded commands of each test from its beginning, in the
+    order of time, and predicts from each recorded state with the memory that these leave.
+
     Args:
         models: m of them.
         selected: N tests with their trajectories.
         workers: how the work is carried out; one thread by default.
 
     Returns:
-        Errors (m, N), SI units squared, mean over steps and components.
+        Errors (m, N), SI units squared, mean over steps and components; infinite where a prediction is not finite.
 
     Raises:
         InvalidInput: models for other signals.
@@ -79,14 +82,62 @@ def closed_loop(
         workers: how the work is carried out; one thread by default.
 
     Returns:
-        Errors (m, N), SI units squared, mean over the n predicted states and all components;
-        1e6 (2 − t/n) for a run that diverged at step t.
+        Errors (m, N), SI units squared, mean over the n predicted states and all components; infinite for a run that
+        diverged, which `lasted` tells more of. Only the ranking of the paper's model loop puts a number in its place.
 
     Raises:
         InvalidInput: models for other signals.
     """
     with engine_input():
-        return _core.closed_loop(models, selected, workers)
+        return _core.closed_loop(models, selected, workers)[0]
+
+
+def lasted(
+    models: Sequence[_core.Model], selected: _core.SelectedTests, workers: _core.Workers | None = None
+) -> Integers:
+    """Steps that free runs with the controller in the loop last before they diverge.
+
+    Args:
+        models: m of them.
+        selected: N tests with their trajectories.
+        workers: how the work is carried out; one thread by default.
+
+    Returns:
+        Steps (m, N); as many as were recorded of the test where the run does not diverge.
+
+    Raises:
+        InvalidInput: models for other signals.
+    """
+    with engine_input():
+        return _core.closed_loop(models, selected, workers)[1]
+
+
+def k_step(
+    models: Sequence[_core.Model],
+    selected: _core.SelectedTests,
+    steps: int,
+    workers: _core.Workers | None = None,
+) -> Floats:
+    """Error k steps ahead: of free runs of k steps from every recorded state, under the recorded commands.
+
+    Between the one-step error, which hardly sees what builds up, and the free run, which after a while sees nothing
+    else. Lags, delays and hidden states begin each run with the memory of what was commanded before it.
+
+    Args:
+        models: m of them.
+        selected: N tests with their trajectories.
+        steps: k, from 1, which gives `open_loop`, to the steps of the shortest test.
+        workers: how the work is carried out; one thread by default.
+
+    Returns:
+        Errors (m, N), SI units squared, mean over the n + 1 − k predictions and all components; infinite where a
+        prediction is not finite.
+
+    Raises:
+        InvalidInput: models for other signals, or a test that is shorter.
+    """
+    with engine_input():
+        return _core.k_step(models, selected, steps, workers)
 
 
 def frozen_error(trajectory: Trajectory, signals: Signals | None = None) -> float:
@@ -117,7 +168,7 @@ def normalised_error(closed_loop_error: float, frozen: float) -> float:
         frozen: `frozen_error` of the test's trajectory.
 
     Returns:
-        The ratio; infinite if the system never moved and the model did.
+        The ratio; infinite if the run diverged, or if the system never moved and the model did.
     """
     if frozen > 0.0:
         return closed_loop_error / frozen

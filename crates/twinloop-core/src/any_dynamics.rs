@@ -34,6 +34,17 @@ impl<'a> Dynamics for AnyDynamics<'a> {
     }
 
     #[inline(always)]
+    fn remember<V: Vector>(&self, workspace: &mut AnyWorkspace<'a, V>, command: &[V]) {
+        match (self, workspace) {
+            (Self::Model(model), AnyWorkspace::Model(workspace)) => model.remember(workspace, command),
+            (Self::Quadrotor(plant), AnyWorkspace::Quadrotor(workspace)) => {
+                plant.remember(workspace, command);
+            }
+            _ => unreachable!("a workspace belongs to the dynamics that made it"),
+        }
+    }
+
+    #[inline(always)]
     fn step<V: Vector>(&self, workspace: &mut AnyWorkspace<'a, V>, state: &mut [V], command: &[V]) {
         match (self, workspace) {
             (Self::Model(model), AnyWorkspace::Model(workspace)) => model.step(workspace, state, command),

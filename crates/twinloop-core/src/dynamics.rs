@@ -10,6 +10,10 @@ pub trait Dynamics {
     /// A workspace as it is at the start of a run.
     fn workspace<V: Vector>(&self) -> Self::Workspace<V>;
 
+    /// Moves what is remembered of commands on by a period of one (n_u lanes), whatever the states were. To be told all
+    /// that was sent since a run began puts a workspace where the run is.
+    fn remember<V: Vector>(&self, workspace: &mut Self::Workspace<V>, command: &[V]);
+
     /// Replaces the state (n_x lanes) by the one a period later, under the command (n_u lanes) held for that period.
     fn step<V: Vector>(&self, workspace: &mut Self::Workspace<V>, state: &mut [V], command: &[V]);
 }

@@ -64,13 +64,17 @@ pub struct Variation {
 }
 
 impl Variation {
+    /// More individuals than this are refused.
+    pub const MOST_INDIVIDUALS: usize = 10_000_000;
+
     /// Refuses what makes no generation.
     pub fn validated(self) -> Result<Self> {
         let Self { population, mutation_share, crossover_share, elite_share, .. } = self;
         let shares = [mutation_share, crossover_share, elite_share];
-        if population < 2 || self.archive_cap == 0 {
+        if !(2..=Self::MOST_INDIVIDUALS).contains(&population) || self.archive_cap == 0 {
             return invalid(format!(
-                "variation: expected a population of 2 or more and an archive of 1 or more, found {population} and {}",
+                "variation: expected a population of 2 to {} and an archive of 1 or more, found {population} and {}",
+                Self::MOST_INDIVIDUALS,
                 self.archive_cap
             ));
         }

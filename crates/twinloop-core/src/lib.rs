@@ -45,12 +45,14 @@ pub use flights::{
 };
 pub use hidden::Hidden;
 pub use integrator::{Field, Stages, rk4};
-pub use lanes::{Apart, Isa, Kernel, Piece, Scalar, Vector, Wide, Width, dispatch};
+pub use lanes::{Apart, Isa, Kernel, Scalar, Vector, Width, dispatch};
 pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};
 pub use linear_algebra::{Cholesky, Eigen};
 pub use model::{Form, Frame, Model};
 pub use model_loop::{Learnt, ModelSearch};
-pub use objective::{closed_loops, discrimination, final_distances, instability, of_model, open_loops};
+pub use objective::{
+    Outcome, closed_loops, discrimination, final_distances, instability, k_steps, of_model, open_loops,
+};
 pub use plants::{Gyroscopic, Quadrotor};
 pub use regression::{
     Annealing, Chain, Choices, Found, Gram, Noise, Record, Solution, likelihood, most_likely_noise, search,

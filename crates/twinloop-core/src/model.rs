@@ -190,6 +190,34 @@ impl<'a> Model<'a> {
         Cow::Owned(state)
     }
 
+    /// Moves the states of a run on by the period whose command is remembered already.
+    #[inline(always)]
+    pub(crate) fn advance<V: Vector>(
+        &self,
+        workspace: &mut ModelWorkspace<V>,
+        state: &mut [V],
+        command: &[V],
+    ) {
+        let ModelWorkspace { bank, stages, line } = workspace;
+        let effects = match line {
+            None => [command; 3],
+            Some(line) => [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]],
+        };
+        match self.frame.form {
+            Form::Absolute => state.copy_from_slice(self.outputs(bank, state, effects[1])),
+            Form::Increment => {
+                let increments = self.outputs(bank, state, effects[1]);
+                for (state, increment) in state.iter_mut().zip(increments) {
+                    *state = *state + *increment;
+                }
+            }
+            Form::Acceleration => {
+                let held = Held { model: self, bank, effects, stage: 0 };
+                rk4(state, self.frame.dt, stages, held);
+            }
+        }
+    }
+
     /// The code's outputs at a state, under a command.
     #[inline(always)]
     fn outputs<'b, V: Vector>(&self, bank: &'b mut Bank<V>, state: &[V], command: &[V]) -> &'b [V] {
@@ -278,28 +306,16 @@ impl Dynamics for Model<'_> {
     }
 
     #[inline(always)]
-    fn step<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &mut [V], command: &[V]) {
-        let ModelWorkspace { bank, stages, line } = workspace;
-        let effects = match line {
-            None => [command; 3],
-            Some(line) => {
-                line.pass(command);
-                [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]]
-            }
-        };
-        match self.frame.form {
-            Form::Absolute => state.copy_from_slice(self.outputs(bank, state, effects[1])),
-            Form::Increment => {
-                let increments = self.outputs(bank, state, effects[1]);
-                for (state, increment) in state.iter_mut().zip(increments) {
-                    *state = *state + *increment;
-                }
-            }
-            Form::Acceleration => {
-                let held = Held { model: self, bank, effects, stage: 0 };
-                rk4(state, self.frame.dt, stages, held);
-            }
+    fn remember<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, command: &[V]) {
+        if let Some(line) = &mut workspace.line {
+            line.pass(command);
         }
+    }
+
+    #[inline(always)]
+    fn step<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &mut [V], command: &[V]) {
+        self.remember(workspace, command);
+        self.advance(workspace, state, command);
     }
 }
 

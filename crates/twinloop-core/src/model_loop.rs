@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::Result;
+use crate::error::{Result, invalid};
 use crate::evolution::{Problem, Search, Snapshot, Variation};
 use crate::lgp::{Code, Grammar, Program};
 use crate::model::{Form, Frame, Model};
@@ -110,9 +110,7 @@ impl ModelSearch {
         let programs = snapshot.population.iter().chain(&snapshot.members);
         programs.map(|learnt| &learnt.program).try_for_each(|program| grammar.check(program))?;
         if !snapshot.objectives.columns().is_multiple_of(2) {
-            return crate::error::invalid(
-                "model search: expected two objectives a test, found an odd number",
-            );
+            return invalid("model search: expected two objectives a test, found an odd number");
         }
         let search = Search::restored(snapshot, &variation, workers)?;
         Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), variation })
@@ -122,6 +120,12 @@ impl ModelSearch {
     pub fn learn(self, selected: &SelectedTests, workers: &Workers) -> Result<Self> {
         some_test(selected)?;
         let Self { search, grammar, frame, variation } = self;
+        if !frame.fits(selected.signals()) {
+            return invalid(
+                "model search: expected tests with the states, commands and period of its models, found others; start a \
+                 search for them",
+            );
+        }
         let problem = Models { grammar: &grammar, frame: &frame, selected };
         let search = search.judged_again(&problem, &variation, workers);
         Ok(Self { search, grammar, frame, variation })
@@ -129,17 +133,26 @@ impl ModelSearch {
 
     /// The search some generations later.
     pub fn advance(self, selected: &SelectedTests, generations: u64, workers: &Workers) -> Result<Self> {
-        let Self { search, grammar, frame, variation } = self;
-        let problem = Models { grammar: &grammar, frame: &frame, selected };
-        if search.objectives().columns() != problem.objectives() {
-            return crate::error::invalid(format!(
-                "model search: expected the {} tests that it was last judged on, found {}; call learn first",
-                search.objectives().columns() / 2,
+        if !self.was_judged_on(selected, workers) {
+            return invalid(format!(
+                "model search: expected the {} tests that it was last judged on, found {}, or others; call learn first",
+                self.search.objectives().columns() / 2,
                 selected.len()
             ));
         }
+        let Self { search, grammar, frame, variation } = self;
+        let problem = Models { grammar: &grammar, frame: &frame, selected };
         let search = search.advance(&problem, &variation, generations, workers);
         Ok(Self { search, grammar, frame, variation })
+    }
+
+    /// Whether the best member gets the row of objectives on these tests that it has.
+    fn was_judged_on(&self, selected: &SelectedTests, workers: &Workers) -> bool {
+        let (best, archive) = (self.best(), self.search.archive());
+        let model = Model { code: &archive.members()[best].code, frame: &self.frame };
+        self.search.objectives().columns() == 2 * selected.len()
+            && self.frame.fits(selected.signals())
+            && of_model(model, selected, workers.width()) == archive.objectives_of(best)
     }
 
     /// Population, archive and counters.
@@ -183,9 +196,7 @@ fn frame(grammar: &Grammar, form: Form, signals: &Signals) -> Result<Frame> {
 
 fn some_test(selected: &SelectedTests) -> Result<()> {
     if selected.is_empty() {
-        return crate::error::invalid(
-            "model search: expected at least one selected test, found none; tell one first",
-        );
+        return invalid("model search: expected at least one selected test, found none; tell one first");
     }
     Ok(())
 }

@@ -32,20 +32,23 @@ impl Kernel for Run<'_> {
     }
 }
 
-/// Next states (rows × n_x) of each row of states under its row of commands; each row is the first step of a run.
+/// Next states (rows × n_x) of each row of states under its row of commands. Each row is a run of its own, that began
+/// with the commands of its row of the past (p × n_u, the oldest first), or begins now where there are none.
 pub fn step_rows<D: Dynamics>(
     dynamics: &D,
     states: &[&[f64]],
     commands: &[&[f64]],
+    past: &[&[f64]],
     width: Width,
 ) -> Vec<f64> {
-    dispatch(width, Step { dynamics, states, commands })
+    dispatch(width, Step { dynamics, states, commands, past })
 }
 
 struct Step<'a, D> {
     dynamics: &'a D,
     states: &'a [&'a [f64]],
     commands: &'a [&'a [f64]],
+    past: &'a [&'a [f64]],
 }
 
 impl<D: Dynamics> Kernel for Step<'_, D> {
@@ -54,12 +57,19 @@ impl<D: Dynamics> Kernel for Step<'_, D> {
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<f64> {
         let mut rows = Vec::new();
-        let chunks = self.states.chunks(W::Of32::LANES).zip(self.commands.chunks(W::Of32::LANES));
-        for (states, commands) in chunks {
+        let lanes = W::Of32::LANES;
+        for (i, states) in self.states.chunks(lanes).enumerate() {
+            let of_chunk = |all: &'_ [&'_ [f64]]| -> Vec<W::Of32> {
+                if all.is_empty() { vec![] } else { pack(&all[i * lanes..][..states.len()]) }
+            };
+            let command = of_chunk(self.commands);
             // A fresh one: dynamics may remember, and a row knows nothing of the rows before it.
             let mut workspace = self.dynamics.workspace::<W::Of32>();
+            for earlier in of_chunk(self.past).chunks_exact(command.len()) {
+                self.dynamics.remember(&mut workspace, earlier);
+            }
             let mut state: Vec<W::Of32> = pack(states);
-            step_apart(self.dynamics, &mut workspace, &mut state, &pack::<W::Of32, _>(commands));
+            step_apart(self.dynamics, &mut workspace, &mut state, &command);
             for l in 0..states.len() {
                 rows.extend(state.iter().map(|state| state.lane(l)));
             }

@@ -73,13 +73,8 @@ pub struct SelectedTests {
 impl SelectedTests {
     /// No test yet. A run that leaves `divergence_factor` times the scale of a state counts as diverged.
     pub fn new(signals: Arc<Signals>, family: Arc<Family>, divergence_factor: f64) -> Result<Self> {
-        if !(divergence_factor.is_finite() && divergence_factor > 0.0) {
-            return invalid(format!(
-                "divergence factor: expected a number above 0, found {divergence_factor}"
-            ));
-        }
         family.check(&signals)?;
-        let limits = signals.limits(divergence_factor);
+        let limits = signals.limits(divergence_factor)?;
         let (experiments, blocks, rows, loops) = Default::default();
         Ok(Self { signals, family, experiments, limits, blocks, rows, loops })
     }
@@ -116,6 +111,15 @@ impl SelectedTests {
     /// The family of the controllers.
     pub fn family(&self) -> &Family {
         &self.family
+    }
+
+    pub(crate) fn experiments(&self) -> impl Iterator<Item = &Experiment> {
+        self.experiments.iter().map(|experiment| &**experiment)
+    }
+
+    /// Recorded steps of each test.
+    pub fn steps(&self) -> impl Iterator<Item = usize> {
+        self.experiments.iter().map(|experiment| experiment.commands.len() / self.signals.commands())
     }
 
     pub(crate) fn limits(&self) -> &[f64] {

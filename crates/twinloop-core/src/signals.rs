@@ -88,13 +88,16 @@ impl Signals {
         self.command_bounds.len()
     }
 
-    /// Magnitude of each state beyond which a run counts as diverged: `factor` times its scale; a periodic state may turn
-    /// as often as it likes.
-    pub fn limits(&self, factor: f64) -> Vec<f64> {
+    /// Magnitude of each state beyond which a run counts as diverged: `factor`, above 0, times its scale; a periodic state
+    /// may turn as often as it likes.
+    pub fn limits(&self, factor: f64) -> Result<Vec<f64>> {
+        if !(factor.is_finite() && factor > 0.0) {
+            return invalid(format!("divergence factor: expected a number above 0, found {factor}"));
+        }
         let limit = |(state, scale): (usize, &f64)| match self.periods.of(state) {
             None => scale * factor,
             Some(_) => f64::INFINITY,
         };
-        self.state_scales.iter().enumerate().map(limit).collect()
+        Ok(self.state_scales.iter().enumerate().map(limit).collect())
     }
 }

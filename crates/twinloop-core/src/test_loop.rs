@@ -31,13 +31,20 @@ pub struct TestSettings {
 }
 
 impl TestSettings {
-    fn check(&self) -> Result<()> {
+    /// More mutants than this are refused.
+    pub const MOST_MUTANTS: usize = 1_000_000;
+
+    /// Refuses what no test can be judged with.
+    pub fn validated(self) -> Result<Self> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let numbers = [self.distance_cap, self.mutant_step, self.mutation_step, self.divergence_factor];
-        if self.mutants == 0 || !numbers.into_iter().all(positive) {
-            return invalid(format!("test settings: expected numbers above 0, found {self:?}"));
+        if !(1..=Self::MOST_MUTANTS).contains(&self.mutants) || !numbers.into_iter().all(positive) {
+            return invalid(format!(
+                "test settings: expected numbers above 0 and at most {} mutants, found {self:?}",
+                Self::MOST_MUTANTS
+            ));
         }
-        Ok(())
+        Ok(self)
     }
 }
 
@@ -65,7 +72,7 @@ impl Tests {
         seed: u64,
         iteration: u64,
     ) -> Result<Self> {
-        settings.check()?;
+        let settings = settings.validated()?;
         if committee.is_empty() {
             return invalid("test search: expected a committee of one model or more, found none");
         }
@@ -74,12 +81,14 @@ impl Tests {
             let (expected, found) = (family.states(), task.initial.len());
             return invalid(format!("test search: expected a task of {expected} states, found {found}"));
         }
-        if task.distance(&signals.periods) == 0.0 {
-            return invalid(
-                "test search: expected a target away from the initial state, found both the same",
-            );
+        let distance = task.distance(&signals.periods);
+        let cap = settings.distance_cap * distance;
+        if distance == 0.0 || !(cap * cap * TestSettings::MOST_MUTANTS as f64).is_finite() {
+            return invalid(format!(
+                "test search: expected a target away from the initial state, at a finite distance, found one of {distance}"
+            ));
         }
-        let limits = signals.limits(settings.divergence_factor);
+        let limits = signals.limits(settings.divergence_factor)?;
         Ok(Self { committee, frame, family, task, limits, settings, seed, iteration })
     }
 

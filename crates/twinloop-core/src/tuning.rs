@@ -85,7 +85,7 @@ const DAMPINGS: [f64; 8] = [1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e6];
 /// Variants that run side by side.
 const LANES: usize = 32;
 /// How often a draw is taken back by half, and one more.
-const HALVES: i32 = 16;
+const HALVES: usize = 16;
 
 impl Tuning<'_> {
     /// Refuses parts that do not fit each other.
@@ -101,7 +101,9 @@ impl Tuning<'_> {
                     && observed.noise.sensors.len() == observed.chain.states
             })
             && self.free.iter().all(|&c| c < self.code.constants().len())
+            && self.lags.iter().all(|group| !group.is_empty())
             && self.lags.iter().flatten().all(|&place| place < self.frame.actuation().times().len())
+            && !self.records.is_empty()
             && self.records.iter().all(|record| {
                 let steps = record.commands.len() / commands;
                 record.commands.len() == steps * commands
@@ -111,7 +113,10 @@ impl Tuning<'_> {
         if fits {
             Ok(())
         } else {
-            invalid("tuning: expected chains, records and constants that fit the model")
+            invalid(
+                "tuning: expected at least one record, and chains, records, constants and groups of lags that fit the \
+                 model",
+            )
         }
     }
 
@@ -174,12 +179,12 @@ impl Tuning<'_> {
             .flat_map(|mut stream| {
                 let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
                 let step = factor.as_ref().map_or_else(|| vec![0.0; size], |factor| factor.times(&normal));
-                let taken = |halves: i32| {
-                    let share = libm::ldexp(1.0, -halves);
+                let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVES);
+                let taken = |share: f64| {
                     let step: Vec<f64> = step.iter().map(|s| share * s).collect();
                     self.moved(&start, &step)
                 };
-                (0..HALVES).map(taken).collect::<Vec<_>>()
+                shares.map(taken).collect::<Vec<_>>()
             })
             .collect();
         if tries.is_empty() {
@@ -193,8 +198,7 @@ impl Tuning<'_> {
             let one = found.map_or(&start, |(one, _)| one);
             (one.constants.clone(), one.lags.clone())
         };
-        let halves = HALVES as usize;
-        tries.chunks_exact(halves).zip(costs.chunks_exact(halves)).map(borne).collect()
+        tries.chunks_exact(HALVES).zip(costs.chunks_exact(HALVES)).map(borne).collect()
     }
 
     /// Whitened prediction errors of the model as it is, (n + 1) × n_x for each record, and its states once each
@@ -287,7 +291,9 @@ impl Tuning<'_> {
         let mut variants = Vec::with_capacity(size);
         for (p, value) in self.values(at).into_iter().enumerate() {
             let mut step = vec![0.0; size];
-            step[p] = STEP * value.abs().max(1e-6);
+            // A constant of 0 has no size; what is linear in it has the same slope for any step.
+            let size = value.abs();
+            step[p] = STEP * if size > f64::MIN_POSITIVE.sqrt() { size } else { STEP };
             steps.push(step[p]);
             variants.push(self.moved(at, &step));
         }

@@ -98,8 +98,16 @@ pub fn to_vector<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_,
 
 /// A matrix for Python from values in C order.
 pub fn to_matrix(py: Python<'_>, columns: usize, values: Vec<f64>) -> Bound<'_, PyArray2<f64>> {
-    let rows = values.len() / columns.max(1);
-    Array2::from_shape_vec((rows, columns), values).expect("whole rows").into_pyarray(py)
+    to_rows(py, [values.len() / columns.max(1), columns], values)
+}
+
+/// A matrix for Python from values in C order, of which there may be none.
+pub fn to_rows<T: numpy::Element>(
+    py: Python<'_>,
+    shape: [usize; 2],
+    values: Vec<T>,
+) -> Bound<'_, PyArray2<T>> {
+    Array2::from_shape_vec(shape, values).expect("whole rows").into_pyarray(py)
 }
 
 /// An array of three axes for Python from values in C order.

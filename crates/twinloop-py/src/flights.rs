@@ -15,6 +15,7 @@ use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
 use crate::law::flown;
 use crate::model::{PyModel, PySignals};
+use crate::objective::fitting;
 use crate::plant::PyQuadrotor;
 use crate::workers::{PyWorkers, or_default};
 
@@ -127,7 +128,12 @@ pub fn qualities<'py>(
     let workers = or_default(workers)?;
     let (flights, quality, envelope) = (&flights.0, &quality.0, Envelope::new(&envelope)?);
     let n_x = flights.signals().states();
-    let draws = noise.as_ref().map_or(0, |noise| noise.as_array().shape()[0]);
+    let draws = noise.as_ref().map_or(1, |noise| noise.as_array().shape()[0]);
+    if draws == 0 || offsets.as_ref().is_some_and(|offsets| offsets.as_array().nrows() == 0) {
+        return Err(misuse(
+            "draws: expected at least one of noise and of offsets, or None, found none".into(),
+        ));
+    }
     let noise = optional_blocks("noise", noise, [draws, flights.steps() + 1, n_x])?;
     let offsets = optional_rows("offsets", offsets, n_x)?;
     let (noise, offsets) = (views(&noise), views(&offsets));
@@ -135,16 +141,12 @@ pub fn qualities<'py>(
     let (members, judged) = match dynamics {
         Members::Plant(plant) => {
             let plant = plant.get();
-            if (n_x, flights.signals().commands()) != (6, 4) || flights.signals().dt != plant.0.dt {
-                return Err(misuse(
-                    "expected flights with the states, commands and period of the plant".into(),
-                ));
-            }
+            plant.0.check(flights.signals())?;
             let plant = [AnyDynamics::Quadrotor(&plant.0)];
             (1, flown(py, || core_qualities(&plant, flights, quality, &envelope, draws, &workers))??)
         }
         Members::Models(models) => {
-            let models: Vec<_> = fitting(&models, flights)?.into_iter().map(AnyDynamics::Model).collect();
+            let models: Vec<_> = members(&models, flights)?.into_iter().map(AnyDynamics::Model).collect();
             let judged =
                 flown(py, || core_qualities(&models, flights, quality, &envelope, draws, &workers))??;
             (models.len(), judged)
@@ -168,20 +170,17 @@ pub fn disagreements<'py>(
     workers: Option<&PyWorkers>,
 ) -> Result<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<i64>>)> {
     let (workers, flights, sds) = (or_default(workers)?, &flights.0, vector(&sds));
-    let models = fitting(&models, flights)?;
+    let models = members(&models, flights)?;
     let found = flown(py, || core_disagreements(&models, flights, &sds, cap, &workers))??;
     let place = |d: &Disagreement| [d.step, d.state, d.highest, d.lowest];
     let values = found.iter().map(|disagreement| disagreement.value).collect();
     Ok((to_vector(py, values), to_integer_rows(py, found.iter().map(place).collect())))
 }
 
-/// The engine's view of models that are for the signals of the flights.
-fn fitting<'a>(models: &'a [Bound<'_, PyModel>], flights: &Flights) -> Result<Vec<Model<'a>>> {
-    let models: Vec<_> = models.iter().map(|model| model.get().core()).collect();
-    if models.is_empty() || models.iter().any(|model| !model.frame.fits(flights.signals())) {
-        return Err(misuse(
-            "expected at least one model, all with the states and commands of the flights".into(),
-        ));
+/// The engine's view of one model or more that are for the signals of the flights.
+fn members<'a>(models: &'a [Bound<'_, PyModel>], flights: &Flights) -> Result<Vec<Model<'a>>> {
+    if models.is_empty() {
+        return Err(misuse("committee: expected at least one model, found none".into()));
     }
-    Ok(models)
+    fitting(models, flights.signals())
 }

@@ -39,7 +39,7 @@ mod _core {
     #[pymodule_export]
     use crate::model::{PyModel, PySignals, command_effects};
     #[pymodule_export]
-    use crate::objective::{closed_loop, discrimination, final_distances, instability, open_loop};
+    use crate::objective::{closed_loop, discrimination, final_distances, instability, k_step, open_loop};
     #[pymodule_export]
     use crate::pareto::{PyArchive, best_tradeoff, crowding_distances, ideal_point, ranks, select};
     #[pymodule_export]

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Signals, effects, step_rows,
+    Actuation, Actuator, Dynamics, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Signals, Width,
+    effects, step_rows,
 };
 
-use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector, views};
+use crate::arrays::{Cube, Matrix, Vector, optional_blocks, rows, to_matrix, to_vector, vector, views};
 use crate::error::{Result, misuse};
 use crate::program::PyProgram;
 use crate::workers::{PyWorkers, or_default};
@@ -74,6 +75,18 @@ impl PyModel {
     /// What it is a model of.
     pub fn signals(&self) -> &Arc<Signals> {
         &self.signals
+    }
+
+    /// Refuses signals of other states or commands, another period or other derivatives.
+    pub fn fits(&self, signals: &Signals) -> Result<()> {
+        if self.frame.fits(signals) {
+            return Ok(());
+        }
+        Err(misuse(
+            "model: expected one with the states, commands and period of the signals, found another; make or learn it \
+             for them"
+                .into(),
+        ))
     }
 
     /// The engine's view of it.
@@ -143,19 +156,19 @@ impl PyModel {
         self.frame.form().name()
     }
 
-    #[pyo3(signature = (states, commands, workers = None))]
+    #[pyo3(signature = (states, commands, workers = None, past = None))]
     fn step<'py>(
         &self,
         py: Python<'py>,
         states: Matrix<'py>,
         commands: Matrix<'py>,
         workers: Option<&PyWorkers>,
+        past: Option<Cube<'py>>,
     ) -> Result<Bound<'py, PyArray2<f64>>> {
         let (n_x, n_u) = (self.signals.states(), self.signals.commands());
-        let (states, commands) = (rows("states", &states, n_x)?, rows("commands", &commands, n_u)?);
-        same_length(&states, &commands)?;
+        let rows = Rows::new(&states, &commands, past, n_x, n_u)?;
         let width = or_default(workers)?.width();
-        let next = py.detach(|| step_rows(&self.core(), &views(&states), &views(&commands), width));
+        let next = py.detach(|| rows.step(&self.core(), width));
         Ok(to_matrix(py, n_x, next))
     }
 }
@@ -186,11 +199,16 @@ pub fn command_effects<'py>(
     commands: Matrix<'py>,
 ) -> Result<[Bound<'py, PyArray2<f64>>; 3]> {
     let n_u = actuators.len();
-    let commands = rows("commands", &commands, n_u)?.concat();
-    let factors: Vec<f64> = vector(&scales).iter().map(|scale| 1.0 / scale).collect();
-    if factors.len() != n_u {
-        return Err(misuse(format!("scales: expected {n_u}, found {}", factors.len())));
+    if n_u == 0 {
+        return Err(misuse("actuators: expected one for each command, found none".into()));
     }
+    let commands = rows("commands", &commands, n_u)?.concat();
+    let scales = vector(&scales);
+    let positive = |x: f64| x.is_finite() && x > 0.0;
+    if scales.len() != n_u || !scales.iter().chain([&dt]).all(|&x| positive(x)) {
+        return Err(misuse(format!("expected {n_u} scales and a period above 0, found {scales:?} and {dt}")));
+    }
+    let factors: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
     let asked = actuation(actuators, hidden);
     let all = asked.actuators.clone();
     // Actuators that all act at once are kept: here they only pass commands on.
@@ -199,10 +217,34 @@ pub fn command_effects<'py>(
     Ok(effects(&checked, &factors, dt, &commands).map(|values| to_matrix(py, columns, values)))
 }
 
-/// Refuses states and commands of different numbers of rows.
-pub fn same_length(states: &[Vec<f64>], commands: &[Vec<f64>]) -> Result<()> {
-    if states.len() == commands.len() {
-        return Ok(());
+/// States (rows, n_x), commands (rows, n_u), and what was commanded before (rows, p, n_u), if anything was.
+pub struct Rows {
+    states: Vec<Vec<f64>>,
+    commands: Vec<Vec<f64>>,
+    past: Vec<Vec<f64>>,
+}
+
+impl Rows {
+    /// Refuses different numbers of rows, and columns that are not those of the dynamics.
+    pub fn new(
+        states: &Matrix<'_>,
+        commands: &Matrix<'_>,
+        past: Option<Cube<'_>>,
+        n_x: usize,
+        n_u: usize,
+    ) -> Result<Self> {
+        let (states, commands) = (rows("states", states, n_x)?, rows("commands", commands, n_u)?);
+        if states.len() != commands.len() {
+            let (x, u) = (states.len(), commands.len());
+            return Err(misuse(format!("expected as many states as commands, found {x} and {u}")));
+        }
+        let periods = past.as_ref().map_or(0, |past| past.as_array().shape()[1]);
+        let past = optional_blocks("past", past, [states.len(), periods, n_u])?;
+        Ok(Self { states, commands, past })
     }
-    Err(misuse(format!("expected as many states as commands, found {} and {}", states.len(), commands.len())))
+
+    /// The next states.
+    pub fn step<D: Dynamics>(&self, dynamics: &D, width: Width) -> Vec<f64> {
+        step_rows(dynamics, &views(&self.states), &views(&self.commands), &views(&self.past), width)
+    }
 }

@@ -2,38 +2,21 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Model, SelectedTests, Workers};
+use twinloop_core::{Model, Signals};
 
-use crate::arrays::{Matrix, rows, to_matrix, to_vector, views};
+use crate::arrays::{Matrix, rows, to_rows, to_vector, views};
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
 use crate::law::flown;
 use crate::model::{PyModel, PySignals};
-use crate::rollout::PyTask;
+use crate::rollout::{PyTask, fits};
 use crate::selected::PySelectedTests;
 use crate::workers::{PyWorkers, or_default};
 
 /// The models that a list of Python objects holds.
 type Models<'py> = Vec<Bound<'py, PyModel>>;
 
-/// One of the two errors of each model on each test, a row for each model.
-fn errors<'py>(
-    py: Python<'py>,
-    models: &Models<'py>,
-    selected: &PySelectedTests,
-    workers: Option<&PyWorkers>,
-    objective: fn(&[Model<'_>], &SelectedTests, &Workers) -> Vec<Vec<f64>>,
-) -> Result<Bound<'py, PyArray2<f64>>> {
-    let (workers, selected) = (or_default(workers)?, &selected.0);
-    let models: Vec<_> = models.iter().map(|model| model.get().core()).collect();
-    if models.iter().any(|model| !model.frame.fits(selected.signals())) {
-        return Err(misuse("expected models with the states and commands of the selected tests".into()));
-    }
-    let rows = flown(py, || objective(&models, selected, &workers))?;
-    Ok(to_matrix(py, selected.len(), rows.concat()))
-}
-
-/// One-step-ahead error of each model on each test.
+/// One-step-ahead error of each model on each test; infinite where a prediction is not finite.
 #[pyfunction]
 #[pyo3(signature = (models, selected, workers = None))]
 pub fn open_loop<'py>(
@@ -42,19 +25,49 @@ pub fn open_loop<'py>(
     selected: &PySelectedTests,
     workers: Option<&PyWorkers>,
 ) -> Result<Bound<'py, PyArray2<f64>>> {
-    errors(py, &models, selected, workers, twinloop_core::open_loops)
+    let (workers, selected) = (or_default(workers)?, &selected.0);
+    let models = fitting(&models, selected.signals())?;
+    let rows = py.detach(|| twinloop_core::open_loops(&models, selected, &workers));
+    Ok(to_rows(py, [models.len(), selected.len()], rows.concat()))
 }
 
-/// Free-run error of each model on each test, with the controller in the loop.
+/// Error of each model on each test of free runs of some steps from every recorded state.
+#[pyfunction]
+#[pyo3(signature = (models, selected, steps, workers = None))]
+pub fn k_step<'py>(
+    py: Python<'py>,
+    models: Models<'py>,
+    selected: &PySelectedTests,
+    steps: usize,
+    workers: Option<&PyWorkers>,
+) -> Result<Bound<'py, PyArray2<f64>>> {
+    let (workers, selected) = (or_default(workers)?, &selected.0);
+    let models = fitting(&models, selected.signals())?;
+    let rows = py.detach(|| twinloop_core::k_steps(&models, selected, steps, &workers))?;
+    Ok(to_rows(py, [models.len(), selected.len()], rows.concat()))
+}
+
+/// Free-run error of each model on each test, with the controller in the loop, infinite where the run diverged; and the
+/// steps that it lasted.
 #[pyfunction]
 #[pyo3(signature = (models, selected, workers = None))]
+#[expect(clippy::type_complexity, reason = "two arrays")]
 pub fn closed_loop<'py>(
     py: Python<'py>,
     models: Models<'py>,
     selected: &PySelectedTests,
     workers: Option<&PyWorkers>,
-) -> Result<Bound<'py, PyArray2<f64>>> {
-    errors(py, &models, selected, workers, twinloop_core::closed_loops)
+) -> Result<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>)> {
+    let (workers, selected) = (or_default(workers)?, &selected.0);
+    let models = fitting(&models, selected.signals())?;
+    let outcomes = flown(py, || twinloop_core::closed_loops(&models, selected, &workers))?;
+    let shape = [models.len(), selected.len()];
+    let errors = outcomes.iter().flatten().map(|outcome| outcome.error()).collect();
+    let lasted = outcomes
+        .iter()
+        .flat_map(|row| row.iter().zip(selected.steps()))
+        .map(|(outcome, steps)| outcome.lasted(steps) as i64);
+    Ok((to_rows(py, shape, errors), to_rows(py, shape, lasted.collect())))
 }
 
 /// Distance of the last state to the target, a row for each model; infinite where the run diverged.
@@ -73,33 +86,53 @@ pub fn final_distances<'py>(
 ) -> Result<Bound<'py, PyArray2<f64>>> {
     let workers = or_default(workers)?;
     let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
-    let models: Vec<_> = models.iter().map(|model| model.get().core()).collect();
-    if models.iter().any(|model| !model.frame.fits(&signals.0)) || task.0.initial.len() != signals.0.states()
-    {
-        return Err(misuse("expected models and a task with the states and commands of the signals".into()));
+    let models = fitting(&models, &signals.0)?;
+    fits(family, task, signals)?;
+    if !parameters.iter().flatten().all(|x| x.is_finite()) {
+        return Err(misuse("parameters: expected finite numbers, found NaN or an infinite one".into()));
     }
-    let limits = signals.0.limits(divergence_factor);
+    let limits = signals.0.limits(divergence_factor)?;
     let distances = flown(py, || {
         twinloop_core::final_distances(&models, &family.0, &views(&parameters), &task.0, &limits, &workers)
     })?;
-    Ok(to_matrix(py, parameters.len(), distances.concat()))
+    Ok(to_rows(py, [models.len(), parameters.len()], distances.concat()))
+}
+
+/// The engine's view of models that are for the signals.
+pub fn fitting<'a>(models: &'a [Bound<'_, PyModel>], signals: &Signals) -> Result<Vec<Model<'a>>> {
+    models.iter().map(|model| model.get().fits(signals).map(|()| model.get().core())).collect()
+}
+
+/// A column of distances for each test, none of them NaN, and at least one row.
+fn columns(distances: &Matrix<'_>, cap: f64) -> Result<Vec<Vec<f64>>> {
+    let distances = distances.as_array();
+    if distances.nrows() == 0 || distances.iter().any(|x| x.is_nan()) || !(cap.is_finite() && cap > 0.0) {
+        return Err(misuse(format!(
+            "distances: expected at least one row of numbers and a cap above 0, found the shape {:?} and {cap}",
+            distances.shape()
+        )));
+    }
+    Ok(distances.columns().into_iter().map(|column| column.to_vec()).collect())
 }
 
 /// 1 / variance over models of each test's final distances, each capped.
 #[pyfunction]
-pub fn discrimination<'py>(py: Python<'py>, distances: Matrix<'py>, cap: f64) -> Bound<'py, PyArray1<f64>> {
-    let columns = distances.as_array();
-    let of_test = |column: numpy::ndarray::ArrayView1<'_, f64>| {
-        twinloop_core::discrimination(column.iter().copied(), cap)
-    };
-    to_vector(py, columns.columns().into_iter().map(of_test).collect())
+pub fn discrimination<'py>(
+    py: Python<'py>,
+    distances: Matrix<'py>,
+    cap: f64,
+) -> Result<Bound<'py, PyArray1<f64>>> {
+    let of_test = |column: Vec<f64>| twinloop_core::discrimination(column.into_iter(), cap);
+    Ok(to_vector(py, columns(&distances, cap)?.into_iter().map(of_test).collect()))
 }
 
 /// Variance over mutants of each test's final distances; one at the cap counts as cap squared.
 #[pyfunction]
-pub fn instability<'py>(py: Python<'py>, distances: Matrix<'py>, cap: f64) -> Bound<'py, PyArray1<f64>> {
-    let columns = distances.as_array();
-    let of_test =
-        |column: numpy::ndarray::ArrayView1<'_, f64>| twinloop_core::instability(column.iter().copied(), cap);
-    to_vector(py, columns.columns().into_iter().map(of_test).collect())
+pub fn instability<'py>(
+    py: Python<'py>,
+    distances: Matrix<'py>,
+    cap: f64,
+) -> Result<Bound<'py, PyArray1<f64>>> {
+    let of_test = |column: Vec<f64>| twinloop_core::instability(column.into_iter(), cap);
+    Ok(to_vector(py, columns(&distances, cap)?.into_iter().map(of_test).collect()))
 }

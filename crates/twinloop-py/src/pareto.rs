@@ -74,6 +74,9 @@ pub fn distance(normalised: bool) -> Distance {
     if normalised { Distance::Normalised } else { Distance::Raw }
 }
 
+/// More objectives than this are refused.
+const MOST_COLUMNS: usize = 1_000_000;
+
 /// Non-dominated set of rows, each with the number under which it was offered.
 #[pyclass(frozen, name = "Archive", module = "twinloop._core")]
 pub struct PyArchive(Mutex<Numbered>);
@@ -89,8 +92,8 @@ impl PyArchive {
     #[new]
     #[pyo3(signature = (columns, width = "auto"))]
     fn new(columns: usize, width: &str) -> Result<Self> {
-        if columns == 0 {
-            return Err(misuse("archive: expected at least one column, found 0".into()));
+        if !(1..=MOST_COLUMNS).contains(&columns) {
+            return Err(misuse(format!("archive: expected 1 to {MOST_COLUMNS} columns, found {columns}")));
         }
         let archive = Archive::new(columns, width.parse()?);
         Ok(Self(Mutex::new(Numbered { archive, columns, offered: 0 })))

@@ -2,11 +2,11 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Quadrotor, Scalar, Vector as _, step_rows};
+use twinloop_core::{Quadrotor, Scalar, Vector as _};
 
-use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector, views};
+use crate::arrays::{Cube, Matrix, Vector, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
-use crate::model::same_length;
+use crate::model::Rows;
 use crate::workers::{PyWorkers, or_default};
 
 /// Attitude dynamics of a quadrotor under four rotor speeds, one Runge–Kutta step a period.
@@ -67,18 +67,18 @@ impl PyQuadrotor {
         Ok(to_vector(py, slope.iter().map(|lane| lane.lane(0)).collect()))
     }
 
-    #[pyo3(signature = (states, commands, workers = None))]
+    #[pyo3(signature = (states, commands, workers = None, past = None))]
     fn step<'py>(
         &self,
         py: Python<'py>,
         states: Matrix<'py>,
         commands: Matrix<'py>,
         workers: Option<&PyWorkers>,
+        past: Option<Cube<'py>>,
     ) -> Result<Bound<'py, PyArray2<f64>>> {
-        let (states, commands) = (rows("states", &states, 6)?, rows("commands", &commands, 4)?);
-        same_length(&states, &commands)?;
+        let rows = Rows::new(&states, &commands, past, 6, 4)?;
         let width = or_default(workers)?.width();
-        let next = py.detach(|| step_rows(&self.0, &views(&states), &views(&commands), width));
+        let next = py.detach(|| rows.step(&self.0, width));
         Ok(to_matrix(py, 6, next))
     }
 }

@@ -7,7 +7,8 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyFloat, PyTuple};
 use twinloop_core::{
-    Grammar, Instruction, Learnt, Operand, Operation, Page, Program, Purpose, Shape, Stream, run_rows,
+    Grammar, Instruction, Learnt, Operand, Operation, Page, Program, Purpose, Shape, Stream, Variation,
+    run_rows,
 };
 
 use crate::arrays::{Matrix, rows, to_matrix, views};
@@ -193,8 +194,12 @@ impl PyGrammar {
     }
 
     #[pyo3(signature = (seed, count = 1))]
-    fn random(&self, seed: u64, count: u64) -> Vec<PyProgram> {
-        (0..count).map(|unit| self.0.random(&mut single(seed, unit)).into()).collect()
+    fn random(&self, seed: u64, count: usize) -> Result<Vec<PyProgram>> {
+        let most = Variation::MOST_INDIVIDUALS;
+        if count > most {
+            return Err(misuse(format!("grammar: expected at most {most} programs, found {count}")));
+        }
+        Ok((0..count).map(|unit| self.0.random(&mut single(seed, unit as u64)).into()).collect())
     }
 
     fn mutate(&self, program: &PyProgram, seed: u64) -> Result<PyProgram> {

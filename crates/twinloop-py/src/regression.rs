@@ -31,12 +31,7 @@ pub struct PyRegression {
 impl PyRegression {
     #[new]
     fn new(states: usize, dt: f64, integrated: bool, records: Vec<RecordArrays<'_>>) -> Result<Self> {
-        if !((1..=4).contains(&states) && dt.is_finite() && dt > 0.0) {
-            return Err(misuse(format!(
-                "chain: expected 1 to 4 states and a period above 0, found {states} and {dt}"
-            )));
-        }
-        let chain = Chain { states, dt, integrated };
+        let chain = Chain { states, dt, integrated }.validated()?;
         let mut features = None;
         let mut built = Vec::with_capacity(records.len());
         for (measured, weights, start, middle, end) in &records {
@@ -59,7 +54,8 @@ impl PyRegression {
                 &flat(middle, p)?,
                 &flat(end, p)?,
             );
-            if !record.increments.iter().chain(&record.measured).all(|x| x.is_finite()) {
+            let numbers = record.increments.iter().chain(&record.measured).chain(&record.weights);
+            if !numbers.copied().all(f64::is_finite) {
                 return Err(misuse("record: expected finite numbers, found NaN or an infinite one".into()));
             }
             built.push(record);
@@ -104,11 +100,10 @@ impl PyRegression {
 impl PyRegression {
     fn coefficients(&self, coefficients: &Vector<'_>) -> Result<Vec<f64>> {
         let coefficients = vector(coefficients);
-        if coefficients.len() != self.features {
+        if coefficients.len() != self.features || !coefficients.iter().all(|c| c.is_finite()) {
             return Err(misuse(format!(
-                "expected {} coefficients, found {}",
-                self.features,
-                coefficients.len()
+                "expected {} finite coefficients, found {coefficients:?}",
+                self.features
             )));
         }
         Ok(coefficients)
@@ -120,17 +115,7 @@ impl PyRegression {
     }
 
     fn noise(&self, sensors: &Vector<'_>, (process, gust, memory): Motion) -> Result<Noise> {
-        let sensors = vector(sensors);
-        let positive = sensors.iter().all(|x| x.is_finite() && *x > 0.0);
-        let motion = [process, gust, memory].iter().all(|x| x.is_finite() && *x >= 0.0) && memory > 0.0;
-        if sensors.len() != self.chain.states || !positive || !motion {
-            return Err(misuse(format!(
-                "noise: expected {} sensor variances above 0 and (process variance, gust variance, memory), found \
-                 {sensors:?} and {process}, {gust}, {memory}",
-                self.chain.states
-            )));
-        }
-        Ok(Noise { sensors, process, gust, memory })
+        Ok(Noise { sensors: vector(sensors), process, gust, memory }.validated(self.chain.states)?)
     }
 }
 
@@ -205,8 +190,11 @@ impl PyGram {
         subset: Vec<usize>,
         ridge: f64,
     ) -> Result<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64)>> {
-        if subset.iter().any(|&j| j >= self.0.features) {
-            return Err(misuse(format!("subset: expected features below {}", self.0.features)));
+        if subset.iter().any(|&j| j >= self.0.features) || !(ridge.is_finite() && ridge >= 0.0) {
+            return Err(misuse(format!(
+                "subset: expected features below {} and a ridge of at least 0, found {subset:?} and {ridge}",
+                self.0.features
+            )));
         }
         let k = subset.len();
         Ok(self.0.solve(&subset, ridge).map(|solution| {
@@ -214,6 +202,9 @@ impl PyGram {
         }))
     }
 }
+
+/// More walks of a problem than this are refused.
+const MOST_STARTS: usize = 1_000_000;
 
 /// For each of the problems, subsets with their energies, best first: annealed `starts` times from different streams.
 #[pyfunction]
@@ -232,14 +223,23 @@ pub fn search_subsets(
 ) -> Result<Vec<Walked>> {
     let workers = or_default(workers)?;
     let grams: Vec<_> = grams.iter().map(|gram| gram.get().0.clone()).collect();
-    if prices.len() != grams.len() || starts == 0 {
-        return Err(misuse("search_subsets: expected prices for each problem and at least 1 start".into()));
+    if prices.len() != grams.len() || !(1..=MOST_STARTS).contains(&starts) {
+        return Err(misuse(format!(
+            "search_subsets: expected prices for each problem and 1 to {MOST_STARTS} starts, found {} for {} and {starts}",
+            prices.len(),
+            grams.len()
+        )));
     }
     let prices: Vec<_> = prices.iter().map(vector).collect();
-    if prices.iter().zip(&grams).any(|(prices, gram)| prices.len() != gram.features) {
-        return Err(misuse("search_subsets: expected a price for each feature".into()));
+    let fits = |(prices, gram): (&Vec<f64>, &Arc<Gram>)| {
+        prices.len() == gram.features && !prices.iter().any(|price| price.is_nan())
+    };
+    if !prices.iter().zip(&grams).all(fits) {
+        return Err(misuse(
+            "search_subsets: expected a price for each feature, infinite if it may not be used".into(),
+        ));
     }
-    let annealing = Annealing { moves, largest, coldest };
+    let annealing = Annealing { moves, largest, coldest }.validated()?;
     let unit = unit.unit()?;
     let walks = py.detach(|| {
         let choices = workers.map(grams.len(), |i| Choices::new(&grams[i], &prices[i]));

@@ -5,14 +5,14 @@ use std::cell::RefCell;
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
 use twinloop_core::{
-    AnyDynamics, Dynamics, Influences, Task, Trajectory, Vector as Lanes, record, record_one,
+    AnyDynamics, Dynamics, Influences, Signals, Task, Trajectory, Vector as Lanes, record, record_one,
 };
 
 use crate::arrays::{
     Cube, Matrix, Vector, VectorOrRows, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
 };
 use crate::controller::PyFamily;
-use crate::error::{Result, misuse};
+use crate::error::{CoreError, Result, misuse};
 use crate::law::{flown, raised};
 use crate::model::{PyModel, PySignals};
 use crate::plant::PyQuadrotor;
@@ -104,19 +104,21 @@ pub fn rollout(
     let workers = or_default(workers)?;
     let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
     let (steps, states, commands) = (task.0.steps, signals.0.states(), signals.0.commands());
-    if task.0.initial.len() != states {
-        return Err(misuse(format!("task: expected {states} states, found {}", task.0.initial.len())).into());
-    }
+    fits(family, task, signals)?;
     let count = parameters.len();
     let noise = optional_blocks("noise", noise, [count, steps + 1, states])?;
     let excitation = optional_blocks("excitation", excitation, [count, steps, commands])?;
     let disturbance = optional_blocks("disturbance", disturbance, [count, steps, states])?;
-    let limits = signals.0.limits(divergence_factor);
+    let limits = signals.0.limits(divergence_factor).map_err(CoreError::from)?;
+    let numbers = [&parameters, &noise, &excitation, &disturbance];
+    if !numbers.into_iter().flatten().flatten().all(|x| x.is_finite()) {
+        return Err(misuse("rollout: expected finite numbers, found NaN or an infinite one".into()).into());
+    }
     let (parameters, noise) = (views(&parameters), views(&noise));
     let (excitation, disturbance) = (views(&excitation), views(&disturbance));
     let influences = Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
     let (family, task, width) = (&*family.0, &task.0, workers.width());
-    let runs = if let Some(known) = known(dynamics) {
+    let runs = if let Some(known) = known(dynamics, &signals.0)? {
         flown(py, || record(&known, family, &parameters, task, &limits, influences, width))?
     } else {
         let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
@@ -149,22 +151,40 @@ pub fn replay(
     let (states, width) = (signals.states(), signals.commands());
     let (initial, commands) = (vector(&initial), rows("commands", &commands, width)?);
     let steps = commands.len();
-    let Some(dynamics) = known(dynamics).filter(|_| initial.len() == states && steps > 0) else {
+    let known = known(dynamics, signals)?;
+    let numbers = initial.iter().chain(commands.iter().flatten());
+    let fits = initial.len() == states && steps > 0 && numbers.copied().all(f64::is_finite);
+    let Some(dynamics) = known.filter(|_| fits) else {
         return Err(misuse(format!(
-            "replay: expected a model or plant, {states} states and at least one row of commands, found {} states and \
-             {steps} rows",
+            "replay: expected a model or plant, {states} states and at least one row of commands, all finite, found {} \
+             states and {steps} rows",
             initial.len()
         )));
     };
-    let (commands, limits) = (commands.concat(), signals.limits(divergence_factor));
+    let (commands, limits) = (commands.concat(), signals.limits(divergence_factor)?);
     let run = py.detach(|| twinloop_core::replay(&dynamics, &initial, &commands, steps, &limits));
     Ok(PyRuns { runs: vec![run], steps, states, commands: width })
 }
 
-/// Dynamics that the engine has; none for a function.
-fn known<'a>(dynamics: &'a Bound<'_, PyAny>) -> Option<AnyDynamics<'a>> {
-    let model = dynamics.cast::<PyModel>().map(|model| AnyDynamics::Model(model.get().core()));
-    model.or_else(|_| dynamics.cast::<PyQuadrotor>().map(|plant| AnyDynamics::Quadrotor(&plant.get().0))).ok()
+/// Dynamics that the engine has, for these signals; none for a function.
+fn known<'a>(dynamics: &'a Bound<'_, PyAny>, signals: &Signals) -> Result<Option<AnyDynamics<'a>>> {
+    if let Ok(model) = dynamics.cast::<PyModel>() {
+        model.get().fits(signals)?;
+        return Ok(Some(AnyDynamics::Model(model.get().core())));
+    }
+    let Ok(plant) = dynamics.cast::<PyQuadrotor>() else { return Ok(None) };
+    plant.get().0.check(signals)?;
+    Ok(Some(AnyDynamics::Quadrotor(&plant.get().0)))
+}
+
+/// Refuses controllers or a task that are not for the signals.
+pub fn fits(family: &PyFamily, task: &PyTask, signals: &PySignals) -> Result<()> {
+    family.0.check(&signals.0)?;
+    let (expected, found) = (signals.0.states(), task.0.initial.len());
+    if found == expected {
+        return Ok(());
+    }
+    Err(misuse(format!("task: expected {expected} states, found {found}; make it for these signals")))
 }
 
 /// A step function in Python, called on the thread that asked for the roll-out.
@@ -194,6 +214,8 @@ impl Dynamics for StepFunction<'_, '_> {
     type Workspace<V: Lanes> = ();
 
     fn workspace<V: Lanes>(&self) {}
+
+    fn remember<V: Lanes>(&self, _workspace: &mut (), _command: &[V]) {}
 
     fn step<V: Lanes>(&self, _workspace: &mut (), state: &mut [V], command: &[V]) {
         let lane = |values: &[V], l: usize| values.iter().map(|value| value.lane(l)).collect::<Vec<_>>();

@@ -43,7 +43,8 @@ impl PyVariation {
         normalised_tradeoff: bool,
     ) -> Result<Self> {
         let sum = mutation_share + crossover_share + reproduction_share;
-        if (sum - 1.0).abs() > 1e-9 {
+        // Written so that NaN is refused.
+        if !((sum - 1.0).abs() <= 1e-9) {
             return Err(misuse(format!(
                 "variation: expected shares of the operators that sum to 1, found {sum}"
             )));
@@ -272,7 +273,7 @@ impl PyTestSettings {
         mutant_step: f64,
         mutation_step: f64,
         divergence_factor: f64,
-    ) -> Self {
+    ) -> Result<Self> {
         let settings = TestSettings {
             control_quality,
             distance_cap,
@@ -281,7 +282,7 @@ impl PyTestSettings {
             mutation_step,
             divergence_factor,
         };
-        Self(settings)
+        Ok(Self(settings.validated()?))
     }
 }
 
@@ -425,9 +426,7 @@ fn to_genes<'py>(py: Python<'py>, tests: &[Arc<Vec<f64>>]) -> Bound<'py, PyArray
 /// The committee of a test search, with the frame that its models share.
 fn judges(committee: &[Bound<'_, PyModel>], signals: &PySignals) -> Result<(Vec<Arc<Learnt>>, Arc<Frame>)> {
     let frame = one_frame(committee)?;
-    if !frame.fits(&signals.0) {
-        return Err(misuse("committee: expected models with the states and commands of the signals".into()));
-    }
+    committee.iter().try_for_each(|model| model.get().fits(&signals.0))?;
     Ok((committee.iter().map(|model| model.get().learnt.clone()).collect(), frame))
 }
 

@@ -23,16 +23,9 @@ fn observer(chains: Chains, dt: f64) -> Result<Vec<Observed>> {
         (f64, f64, f64),
         bool,
     )| {
-        if !(1..=4).contains(&states.len())
-            || sensors.iter().any(|s| !(s.is_finite() && *s > 0.0))
-            || !(process >= 0.0 && gust >= 0.0 && memory > 0.0)
-        {
-            return Err(misuse(
-                "chain: expected 1 to 4 states, sensor variances above 0 and a process variance".into(),
-            ));
-        }
-        let chain = Chain { states: states.len(), dt, integrated };
-        Ok(Observed { states, chain, noise: Noise { sensors, process, gust, memory } })
+        let chain = Chain { states: states.len(), dt, integrated }.validated()?;
+        let noise = Noise { sensors, process, gust, memory }.validated(states.len())?;
+        Ok(Observed { states, chain, noise })
     };
     chains.into_iter().map(of_chain).collect()
 }
@@ -41,14 +34,19 @@ fn recorded(records: &Records<'_>, n_x: usize, n_u: usize) -> Result<Vec<Recorde
     records
         .iter()
         .map(|(states, weights, commands)| {
-            Ok(Recorded {
-                states: rows("states", states, n_x)?.concat(),
-                weights: rows("weights", weights, n_x)?.concat(),
-                commands: rows("commands", commands, n_u)?.concat(),
-            })
+            let states = rows("states", states, n_x)?.concat();
+            let weights = rows("weights", weights, n_x)?.concat();
+            let commands = rows("commands", commands, n_u)?.concat();
+            if ![&states, &weights, &commands].into_iter().flatten().all(|x| x.is_finite()) {
+                return Err(misuse("record: expected finite numbers, found NaN or an infinite one".into()));
+            }
+            Ok(Recorded { states, weights, commands })
         })
         .collect()
 }
+
+/// More members than this are refused.
+const MOST_DRAWS: usize = 1_000_000;
 
 /// The model with constants, and lags of its actuators, that leave the least; what is left, readings, covariance of the
 /// free values, and members drawn from it.
@@ -82,11 +80,14 @@ pub fn tune<'py>(
         frame: &model.frame,
         observer: &observer,
         records: &records,
-        limits: &signals.limits(divergence_factor),
+        limits: &signals.limits(divergence_factor)?,
         free: &free,
         lags: &lags,
     };
     tuning.check()?;
+    if draws > MOST_DRAWS {
+        return Err(misuse(format!("tune: expected at most {MOST_DRAWS} draws, found {draws}")));
+    }
     let tuned = py.detach(|| tuning.tune(iterations, &workers));
     let size = free.len() + lags.len();
     let covariance = to_matrix(py, size, tuned.covariance.clone());
@@ -126,7 +127,7 @@ pub fn predictions<'py>(
     let observer = observer(chains, signals.dt)?;
     let n_x = signals.states();
     let records = recorded(&records, n_x, signals.commands())?;
-    let limits = signals.limits(divergence_factor);
+    let limits = signals.limits(divergence_factor)?;
     let core = model.core();
     let tuning = Tuning {
         code: core.code,

@@ -174,8 +174,9 @@ impl Family {
         }
     }
 
-    /// Refuses signals of another number of states or commands, or with other periods.
-    pub(crate) fn check(&self, signals: &Signals) -> Result<()> {
+    /// Refuses signals of another number of states, other bounds of the commands or another period of theirs, or with
+    /// other periods of the states.
+    pub fn check(&self, signals: &Signals) -> Result<()> {
         if (self.states, self.commands()) != (signals.states(), signals.commands()) {
             return invalid(format!(
                 "controllers: expected controllers of {} states and {} commands, found {} and {}; make the family for \
@@ -184,6 +185,17 @@ impl Family {
                 signals.commands(),
                 self.states,
                 self.commands()
+            ));
+        }
+        let dt = match &self.law {
+            Source::Engine(law) => law.dt(),
+            Source::Foreign(_) => signals.dt,
+        };
+        if self.bounds != signals.command_bounds || dt != signals.dt {
+            return invalid(format!(
+                "controllers: expected a period of {} s and commands within {:?}, found {dt} s and {:?}; make the family \
+                 for these signals",
+                signals.dt, signals.command_bounds, self.bounds
             ));
         }
         if self.periods != signals.periods {

@@ -67,6 +67,13 @@ macro_rules! laws {
             }
         )+
 
+        impl AnyLaw {
+            /// Period of the commands, s.
+            fn dt(&self) -> f64 {
+                match self { $(Self::$law(law) => law.dt,)+ }
+            }
+        }
+
         impl Law for AnyLaw {
             fn gains(&self) -> usize {
                 match self { $(Self::$law(law) => law.gains(),)+ }

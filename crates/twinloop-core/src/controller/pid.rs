@@ -38,7 +38,7 @@ impl Axis {
 pub struct Pid {
     axes: Vec<Axis>,
     output: Mixer,
-    dt: f64,
+    pub(super) dt: f64,
     /// Weight of a new rate in the filtered one; 1: no filter.
     share: f64,
     anti_windup: bool,

@@ -34,11 +34,27 @@ pub struct Snapshot<G> {
 }
 
 impl<G> Search<G> {
+    /// A counter beyond this is none of a search that ever ran.
+    const MOST_COUNTED: u64 = 1 << 62;
+
     /// The search that a snapshot was taken of.
     ///
     /// # Errors
     /// When the numbers of rows do not fit, or when a member is dominated by another.
     pub fn restored(snapshot: Snapshot<G>, variation: &Variation, workers: &Workers) -> Result<Self> {
+        let counters = [
+            snapshot.iteration,
+            snapshot.generation,
+            snapshot.evaluations,
+            snapshot.spared,
+            snapshot.capped_generations,
+        ];
+        if counters.into_iter().any(|counter| counter > Self::MOST_COUNTED) {
+            return invalid(format!(
+                "search: expected counters of at most {}, found {counters:?}",
+                Self::MOST_COUNTED
+            ));
+        }
         let Snapshot { population, objectives, members, points, .. } = snapshot;
         let sizes = [population.len(), objectives.len(), members.len(), points.len()];
         let expected = [variation.population, variation.population, sizes[3].max(1), sizes[2].max(1)];

@@ -61,11 +61,7 @@ impl Flights {
                 candidates.len()
             ));
         }
-        if !(divergence_factor.is_finite() && divergence_factor > 0.0) {
-            return invalid(format!(
-                "divergence factor: expected a number above 0, found {divergence_factor}"
-            ));
-        }
+        let limits = signals.limits(divergence_factor)?;
         let excitation = if candidates[0].excitation.is_empty() { 0 } else { steps * signals.commands() };
         let target = candidates[0].target.len();
         if !is_target(target, signals.states(), steps) {
@@ -87,7 +83,6 @@ impl Flights {
                 ));
             }
         }
-        let limits = signals.limits(divergence_factor);
         let groups =
             groups(candidates.len()).into_iter().map(|group| Group::new(&candidates[group])).collect();
         Ok(Self { signals, family, steps, limits, groups })

@@ -106,7 +106,8 @@ impl Grammar {
         child
     }
 
-    /// Both programs with one page exchanged.
+    /// Both programs with one page exchanged; one that would have more than [`Program::MOST_INSTRUCTIONS`] stays as it
+    /// is.
     ///
     /// # Panics
     /// When one of the programs is not one that [`check`](Self::check) accepts.
@@ -114,16 +115,19 @@ impl Grammar {
         for program in [first, second] {
             self.check(program).expect("a program of the grammar's registers");
         }
-        let (mut first, mut second) = (first.clone(), second.clone());
         let (m, n) = (first.pages().len(), second.pages().len());
         if m == 0 || n == 0 {
-            return (first, second);
+            return (first.clone(), second.clone());
         }
         let aligned = stream.chance(self.aligned_pages);
         let i = stream.below(if aligned { m.min(n) } else { m });
         let j = if aligned { i } else { stream.below(n) };
-        std::mem::swap(&mut first.pages_mut()[i], &mut second.pages_mut()[j]);
-        (first, second)
+        let child = |parent: &Program, place: usize, page: &Page| {
+            let mut child = parent.clone();
+            child.pages_mut()[place] = page.clone();
+            if child.len() > Program::MOST_INSTRUCTIONS { parent.clone() } else { child }
+        };
+        (child(first, i, &second.pages()[j]), child(second, j, &first.pages()[i]))
     }
 
     fn instruction(&self, stream: &mut Stream) -> Instruction {

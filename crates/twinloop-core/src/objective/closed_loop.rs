@@ -1,34 +1,34 @@
 //! Closed loop: the free-run simulation error with the controller in the loop (paper, section IV.B).
 
-use super::divergence_penalty;
+use super::Outcome;
 use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, vectors, with_test_lanes};
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
 use crate::selected::{Loops, SelectedTests};
 
-/// Mean squared error of each test's run over its recorded steps and components (N).
+/// Outcome of each test's run beside its record (N).
 pub(super) struct ClosedLoop<'a, D> {
     pub dynamics: D,
     pub selected: &'a SelectedTests,
 }
 
 impl<D: Dynamics> Kernel for ClosedLoop<'_, D> {
-    type Output = Vec<f64>;
+    type Output = Vec<Outcome>;
 
     #[inline(always)]
-    fn run<W: Isa>(self) -> Vec<f64> {
-        let mut errors = Vec::with_capacity(self.selected.len());
+    fn run<W: Isa>(self) -> Vec<Outcome> {
+        let mut outcomes = Vec::with_capacity(self.selected.len());
         for loops in self.selected.loops() {
-            with_test_lanes!(W, loops.tests, self.of_group(loops, &mut errors));
+            with_test_lanes!(W, loops.tests, self.of_group(loops, &mut outcomes));
         }
-        errors
+        outcomes
     }
 }
 
 impl<D: Dynamics> ClosedLoop<'_, D> {
     #[inline(always)]
-    fn of_group<V: Vector>(&self, loops: &Loops, errors: &mut Vec<f64>) {
+    fn of_group<V: Vector>(&self, loops: &Loops, outcomes: &mut Vec<Outcome>) {
         let states = self.selected.signals().states();
         let start = Start {
             commands: Commands::Law {
@@ -49,10 +49,10 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
         let mut error = SquaredError { periods, recorded: &loops.recorded, steps, sum: V::splat(0.0) };
         let lasted = rollout(&self.dynamics, &start, &mut error);
         for (l, (&lasted, &steps)) in lasted.iter().zip(&loops.steps).enumerate() {
-            errors.push(if lasted < steps {
-                divergence_penalty(lasted, steps)
+            outcomes.push(if lasted < steps {
+                Outcome::Diverged { lasted, of: steps }
             } else {
-                error.sum.lane(l) / (steps * states) as f64
+                Outcome::Followed(error.sum.lane(l) / (steps * states) as f64)
             });
         }
     }

@@ -1,12 +1,12 @@
 //! Open loop: the one-step-ahead prediction error over the recorded transitions (paper, section IV.B).
 
-use super::divergence_penalty;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, lanes_for, with_lanes};
 use crate::model::Model;
 use crate::selected::{Block, SelectedTests};
 
-/// Mean squared error of the next state over the steps and components of each test (N).
+/// Mean squared error of the next state over the steps and components of each test (N), for a model that remembers
+/// nothing: its transitions are rows that know nothing of each other. Infinite where a prediction is not finite.
 pub(super) struct OpenLoop<'a> {
     pub model: Model<'a>,
     pub selected: &'a SelectedTests,
@@ -47,10 +47,8 @@ impl OpenLoop<'_> {
         }
     }
 
-    /// A prediction that is not finite, or worse than a run that diverged at once, is worth such a run.
     fn mean(&self, errors: &[f64]) -> f64 {
         let mean = errors.iter().sum::<f64>() / (errors.len() * self.selected.signals().states()) as f64;
-        let worst = divergence_penalty(0, 1);
-        if mean < worst { mean } else { worst }
+        if mean.is_finite() { mean } else { f64::INFINITY }
     }
 }

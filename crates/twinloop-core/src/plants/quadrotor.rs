@@ -6,6 +6,7 @@ use crate::dynamics::Dynamics;
 use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
 use crate::lanes::Vector;
+use crate::signals::Signals;
 
 /// The signs of the two gyroscopic terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +70,18 @@ impl Quadrotor {
         Ok(self)
     }
 
+    /// Refuses signals of another number of states or commands, or another period.
+    pub fn check(&self, signals: &Signals) -> Result<()> {
+        let found = (signals.states(), signals.commands(), signals.dt);
+        if found != (6, 4, self.dt) {
+            return invalid(format!(
+                "quadrotor: expected 6 states, 4 commands and a period of {} s, found {found:?}",
+                self.dt
+            ));
+        }
+        Ok(())
+    }
+
     /// Accelerations and rates at a state, with the rotors at given speeds.
     #[inline(always)]
     pub fn derivative<V: Vector>(&self, state: &[V], speeds: &[V], slope: &mut [V]) {
@@ -99,6 +112,20 @@ impl Quadrotor {
     }
 }
 
+impl Quadrotor {
+    /// Speeds of lagging rotors in the middle and at the end of a period. They approach a held command exponentially,
+    /// whatever the body does: no need to integrate them.
+    #[inline(always)]
+    fn follow<V: Vector>(&self, flight: &mut Flight<V>, command: &[V]) {
+        for (moment, share) in [(1, 0.5), (2, 1.0)] {
+            let left = libm::exp(-share * self.dt / self.motor_lag);
+            for (i, &wanted) in command.iter().enumerate() {
+                flight.speeds[moment][i] = wanted + (flight.speeds[0][i] - wanted) * left;
+            }
+        }
+    }
+}
+
 /// What the plant needs for a run and remembers in it.
 pub struct Flight<V: Vector> {
     stages: Stages<V>,
@@ -114,18 +141,18 @@ impl Dynamics for Quadrotor {
     }
 
     #[inline(always)]
+    fn remember<V: Vector>(&self, flight: &mut Flight<V>, command: &[V]) {
+        self.follow(flight, command);
+        flight.speeds[0] = flight.speeds[2];
+    }
+
+    #[inline(always)]
     fn step<V: Vector>(&self, flight: &mut Flight<V>, state: &mut [V], command: &[V]) {
         if self.motor_lag == 0.0 {
             rk4(state, self.dt, &mut flight.stages, Held { plant: self, command });
             return;
         }
-        // The speeds approach a held command exponentially, whatever the body does: no need to integrate them.
-        for (moment, share) in [(1, 0.5), (2, 1.0)] {
-            let left = libm::exp(-share * self.dt / self.motor_lag);
-            for (i, &wanted) in command.iter().enumerate() {
-                flight.speeds[moment][i] = wanted + (flight.speeds[0][i] - wanted) * left;
-            }
-        }
+        self.follow(flight, command);
         let lagging = Lagging { plant: self, speeds: &flight.speeds, stage: 0 };
         rk4(state, self.dt, &mut flight.stages, lagging);
         flight.speeds[0] = flight.speeds[2];

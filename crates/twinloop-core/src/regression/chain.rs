@@ -5,6 +5,8 @@
 //! once neither is right; the innovations of a Kalman filter are white for any share of the two, and because the filter
 //! is linear it can be run over each feature's own response as well as over the readings (Harvey 1989, chapter 3).
 
+use crate::error::{Result, invalid};
+
 /// States of a chain at most: position, speed, acceleration, jerk.
 pub const LONGEST: usize = 4;
 
@@ -33,6 +35,23 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Refuses what is no noise of so many sensors.
+    pub fn validated(self, sensors: usize) -> Result<Self> {
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let motion = [self.process, self.gust, self.memory].iter().all(|x| x.is_finite() && *x >= 0.0);
+        if self.sensors.len() != sensors
+            || !self.sensors.iter().all(|&x| positive(x))
+            || !motion
+            || self.memory == 0.0
+        {
+            return invalid(format!(
+                "noise: expected {sensors} sensor variances above 0 and (process variance, gust variance, memory), found \
+                 {self:?}"
+            ));
+        }
+        Ok(self)
+    }
+
     /// States of the filter beside those of the chain.
     pub(crate) fn hidden(&self) -> usize {
         usize::from(self.gust > 0.0)
@@ -45,6 +64,17 @@ impl Noise {
 }
 
 impl Chain {
+    /// Refuses what is no chain.
+    pub fn validated(self) -> Result<Self> {
+        if !(1..=LONGEST).contains(&self.states) || !(self.dt.is_finite() && self.dt > 0.0) {
+            return invalid(format!(
+                "chain: expected 1 to {LONGEST} states and a period above 0, found {} and {}",
+                self.states, self.dt
+            ));
+        }
+        Ok(self)
+    }
+
     /// What a period adds to each state where the features' values at its start, middle and end are known.
     pub fn increments(&self, start: f64, middle: f64, end: f64) -> [f64; LONGEST] {
         if !self.integrated {

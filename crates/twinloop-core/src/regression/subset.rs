@@ -5,6 +5,7 @@
 
 use super::gram::Gram;
 use super::inverse::{Inverse, Products};
+use crate::error::{Result, invalid};
 use crate::lanes::{Isa, Kernel, Vector, Width, dispatch};
 use crate::rng::Stream;
 
@@ -17,6 +18,19 @@ pub struct Annealing {
     pub largest: usize,
     /// Temperature at the end, in units of χ²; 2 draws subsets as often as they are likely.
     pub coldest: f64,
+}
+
+impl Annealing {
+    /// Refuses what is no walk.
+    pub fn validated(self) -> Result<Self> {
+        if self.largest == 0 || !(self.coldest.is_finite() && self.coldest > 0.0) {
+            return invalid(format!(
+                "annealing: expected subsets of 1 feature or more and a temperature above 0, found {} and {}",
+                self.largest, self.coldest
+            ));
+        }
+        Ok(self)
+    }
 }
 
 /// A subset and its energy: χ² and the prices of its features.
@@ -56,9 +70,9 @@ impl Choices {
     /// Of a Gram matrix, with the price of each feature in units of χ²; infinite if it may not be used.
     pub fn new(gram: &Gram, prices: &[f64]) -> Self {
         let lengths: Vec<f64> = (0..gram.features).map(|j| gram.product(j, j).sqrt()).collect();
-        let longest = lengths.iter().copied().filter(|l| l.is_finite()).fold(0.0, f64::max);
+        // Features have units of their own: none is short beside another.
         let usable = |j: &usize| {
-            lengths[*j].is_finite() && lengths[*j] > 1e-9 * longest.min(1e3) && prices[*j].is_finite()
+            lengths[*j].is_finite() && lengths[*j] > f64::MIN_POSITIVE.sqrt() && prices[*j].is_finite()
         };
         let features: Vec<usize> = (0..gram.features).filter(usable).collect();
         let row = |&i: &usize| {

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Frame, Influences, Model, Task, Trajectory, Width, Workers, closed_loops, final_distances,
+    Code, Frame, Influences, Model, Outcome, Task, Trajectory, Width, Workers, closed_loops, final_distances,
     open_loops, record, run_rows, step_rows,
 };
 
@@ -52,7 +52,7 @@ proptest! {
         let frame = Frame::new(form, &World::new().signals);
         let (states, commands): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
         let model = Model { code: &Code::new(&program), frame: &frame };
-        let step = |width| step_rows(&model, &slices(&states), &slices(&commands), width);
+        let step = |width| step_rows(&model, &slices(&states), &slices(&commands), &[], width);
         prop_assert!(same_with_every_width(step, all_same));
     }
 
@@ -68,7 +68,7 @@ proptest! {
         let frame = Frame::new(form, &world.signals);
         let model = Model { code: &Code::new(&program), frame: &frame };
         let task = Task::new(initial, target, steps).unwrap();
-        let limits = world.signals.limits(10.0);
+        let limits = world.signals.limits(10.0).unwrap();
         let rows = |count: usize, factor: f64| -> Vec<Vec<f64>> {
             gains.iter().map(|g| (0..count).map(|i| factor * g[i % 6]).collect()).collect()
         };
@@ -101,7 +101,9 @@ proptest! {
         let selected = world.selected(&experiments);
         let workers = |width| Workers::new(1, width).unwrap();
         prop_assert!(same_with_every_width(|w| open_loops(&models, &selected, &workers(w)), all_rows_same));
-        prop_assert!(same_with_every_width(|w| closed_loops(&models, &selected, &workers(w)), all_rows_same));
+        let errors = |outcomes: Vec<Outcome>| outcomes.into_iter().map(Outcome::error).collect::<Vec<_>>();
+        let closed = |w| closed_loops(&models, &selected, &workers(w)).into_iter().map(errors).collect();
+        prop_assert!(same_with_every_width(closed, all_rows_same));
     }
 }
 

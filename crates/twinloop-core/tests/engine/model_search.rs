@@ -5,8 +5,8 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use twinloop_core::pareto::{Archive, Distance, dominates, select};
 use twinloop_core::{
-    Experiment, Form, Grammar, Learnt, Model, ModelSearch, Problem, Purpose, Search, SelectedTests, Stream,
-    Variation, Width, Workers, closed_loops, open_loops,
+    Experiment, Form, Grammar, Learnt, Model, ModelSearch, Outcome, Problem, Purpose, Search, SelectedTests,
+    Stream, Variation, Width, Workers, closed_loops, open_loops,
 };
 
 use crate::oracle::{Pids, run};
@@ -58,8 +58,13 @@ fn judged(genomes: &[Arc<Learnt>], search: &ModelSearch, selected: &SelectedTest
         genomes.iter().map(|learnt| Model { code: &learnt.code, frame: search.frame() }).collect();
     let (open, closed) =
         (open_loops(&models, selected, &one_worker()), closed_loops(&models, selected, &one_worker()));
-    let interleaved = |(open, closed): (&Vec<f64>, &Vec<f64>)| {
-        open.iter().zip(closed).flat_map(|(open, closed)| [*open, *closed]).collect()
+    // The specification's numbers for what diverges.
+    let ranked = |outcome: &Outcome| match *outcome {
+        Outcome::Followed(error) => error,
+        Outcome::Diverged { lasted, of } => 1e6 * (2.0 - lasted as f64 / of as f64),
+    };
+    let interleaved = |(open, closed): (&Vec<f64>, &Vec<Outcome>)| {
+        open.iter().zip(closed).flat_map(|(open, closed)| [open.min(2e6), ranked(closed)]).collect()
     };
     open.iter().zip(&closed).map(interleaved).collect()
 }

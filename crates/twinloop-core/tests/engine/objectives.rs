@@ -1,9 +1,11 @@
 //! What models are judged by, against a computation test by test and step by step.
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Experiment, Form, Frame, Model, Program, SelectedTests, Width, Workers, closed_loops, of_model,
-    open_loops,
+    Code, Experiment, Form, Frame, Model, Outcome, Program, SelectedTests, Signals, Width, Workers,
+    closed_loops, of_model, open_loops,
 };
 
 use crate::oracle::{Pids, close, run, step};
@@ -25,7 +27,7 @@ fn expected_open_loop(world: &World, form: Form, program: &Program, experiment: 
 
 fn expected_closed_loop(world: &World, form: Form, program: &Program, experiment: &Experiment) -> f64 {
     let (recorded, n) = (rows(experiment), experiment.commands.len() / COMMANDS);
-    let limits = world.signals.limits(10.0);
+    let limits = world.signals.limits(10.0).unwrap();
     let step = |state: &[f64], command: &[f64]| step(world, program, form, state, command);
     let controller = Pids::new(world, &experiment.parameters);
     let run = run(step, controller, [recorded[0], &experiment.target], n, &limits, &[]);
@@ -36,14 +38,20 @@ fn expected_closed_loop(world: &World, form: Form, program: &Program, experiment
     errors.sum::<f64>() / (n * STATES) as f64
 }
 
-/// Both objectives of one model on the tests, open loop first.
+/// Both objectives of one model on the tests as the ranking sees them, open loop first.
 fn objectives(form: Form, program: &Program, selected: &SelectedTests) -> [Vec<f64>; 2] {
     let frame = Frame::new(form, selected.signals());
+    let row = of_model(Model { code: &Code::new(program), frame: &frame }, selected, Width::widest());
+    let every_other = |first| row.iter().skip(first).step_by(2).copied().collect();
+    [every_other(0), every_other(1)]
+}
+
+/// Both objectives of one model on the tests as values.
+fn outcomes(form: Form, program: &Program, selected: &SelectedTests) -> (Vec<f64>, Vec<Outcome>) {
+    let frame = Frame::new(form, selected.signals());
     let models = [Model { code: &Code::new(program), frame: &frame }];
-    [
-        open_loops(&models, selected, &one_worker()).remove(0),
-        closed_loops(&models, selected, &one_worker()).remove(0),
-    ]
+    let open = open_loops(&models, selected, &one_worker()).remove(0);
+    (open, closed_loops(&models, selected, &one_worker()).remove(0))
 }
 
 /// A recording in which nothing ever happens.
@@ -91,15 +99,27 @@ proptest! {
     }
 
     #[test]
-    fn a_row_of_objectives_is_open_loop_and_closed_loop_of_each_test_in_turn(
+    fn the_ranking_sees_finite_numbers_and_everybody_else_the_outcomes(
         (form, program) in any_model(),
         experiments in prop::collection::vec(experiment(1..20), 1..=5),
     ) {
         let selected = World::new().selected(&experiments);
-        let frame = Frame::new(form, selected.signals());
-        let row = of_model(Model { code: &Code::new(&program), frame: &frame }, &selected, Width::Baseline);
         let [open, closed] = objectives(form, &program, &selected);
-        prop_assert_eq!(row, open.into_iter().zip(closed).flat_map(|(o, c)| [o, c]).collect::<Vec<_>>());
+        let (errors, outcomes) = outcomes(form, &program, &selected);
+        for (ranked, error) in open.iter().zip(errors) {
+            prop_assert_eq!(*ranked, error.min(2e6));
+        }
+        for (i, (ranked, outcome)) in closed.iter().zip(outcomes).enumerate() {
+            let steps = experiments[i].commands.len() / COMMANDS;
+            match outcome {
+                Outcome::Followed(error) => prop_assert_eq!(*ranked, error),
+                Outcome::Diverged { lasted, of } => {
+                    prop_assert!(lasted < of && of == steps && outcome.error().is_infinite());
+                    prop_assert_eq!(*ranked, 1e6 * (2.0 - lasted as f64 / of as f64));
+                }
+            }
+            prop_assert_eq!(outcome.lasted(steps) == steps, outcome.error().is_finite());
+        }
     }
 }
 
@@ -155,6 +175,15 @@ fn a_prediction_that_is_not_finite_is_worth_a_run_that_diverges_at_once() {
     let [open, closed] =
         objectives(Form::Absolute, &text.parse().unwrap(), &World::new().selected(&[still(7)]));
     assert_eq!((open, closed), (vec![2e6], vec![2e6]));
+}
+
+#[test]
+fn an_error_beyond_the_largest_number_is_worth_a_run_that_diverges_at_once() {
+    let World { signals, family, .. } = World::new();
+    let vast = Signals { state_scales: vec![1e200; STATES], ..(*signals).clone() };
+    let selected = SelectedTests::new(Arc::new(vast), family, 10.0).unwrap().with_test(still(3)).unwrap();
+    let text = "program inputs=5 outputs=3 registers=8\npage 1\nr5 = r5 + 1e200\n";
+    assert_eq!(objectives(Form::Increment, &text.parse().unwrap(), &selected), [vec![2e6], vec![2e6]]);
 }
 
 #[test]

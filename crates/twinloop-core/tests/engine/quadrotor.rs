@@ -74,6 +74,7 @@ fn the_hovering_quadrotor_stays_where_it_is() {
         &quadrotor(Gyroscopic::Physical),
         &[&[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]],
         &[&[hover; 4]],
+        &[],
         Width::Baseline,
     );
     assert_eq!(next, [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]);
@@ -148,9 +149,9 @@ proptest! {
         let states = vec![[0.1; 6]; speeds.len()];
         let (states, speeds): (Vec<&[f64]>, Vec<&[f64]>) =
             (states.iter().map(|x| &x[..]).collect(), speeds.iter().map(|x| &x[..]).collect());
-        let together = step_rows(&plant, &states, &speeds, Width::widest());
+        let together = step_rows(&plant, &states, &speeds, &[], Width::widest());
         let alone: Vec<f64> = (0..speeds.len())
-            .flat_map(|i| step_rows(&plant, &states[i..=i], &speeds[i..=i], Width::Baseline))
+            .flat_map(|i| step_rows(&plant, &states[i..=i], &speeds[i..=i], &[], Width::Baseline))
             .collect();
         prop_assert_eq!(together, alone);
     }
@@ -191,7 +192,7 @@ proptest! {
         for (found, expected) in slope.iter().zip(derivative(&state)) {
             prop_assert!((found.lane(0) - expected).abs() < 1e-10);
         }
-        let found = step_rows(&*plant, &[&state], &[&speeds], Width::widest());
+        let found = step_rows(&*plant, &[&state], &[&speeds], &[], Width::widest());
         for (found, expected) in found.iter().zip(rk4(&state, 0.02, derivative)) {
             prop_assert!((found - expected).abs() < 1e-12);
         }

@@ -36,7 +36,7 @@ impl Setting {
             frame: Frame::new(form, &world.signals),
             code: Code::new(&program),
             task: Task::new(initial, target, steps).unwrap(),
-            limits: world.signals.limits(factor),
+            limits: world.signals.limits(factor).unwrap(),
             world,
             program,
         }
