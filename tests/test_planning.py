@@ -120,13 +120,14 @@ def test_gains_are_tuned_to_the_bottom_of_a_bowl_and_never_worse_than_the_start(
     bottom = np.array([0.3, 0.7, 0.5])
 
     def bowl(genes):
-        return ((family.to_unit(genes) - bottom) ** 2).sum(axis=1)
+        squares = ((family.to_unit(genes) - bottom) ** 2).sum(axis=1)
+        return np.stack([np.zeros(len(genes)), squares], axis=1)
 
     start = family.from_unit([0.9, 0.1, 0.9])
     how = {"spread": 0.2, "unit": Unit(1).part(0), "purpose": "gains"}
     genes = tune_gains(family, bowl, [start], evaluations=2000, **how)
     np.testing.assert_allclose(family.to_unit(genes), bottom, atol=0.02)
-    genes = tune_gains(family, lambda g: np.ones(len(g)), [start], evaluations=64, **how)
+    genes = tune_gains(family, lambda g: np.ones((len(g), 2)), [start], evaluations=64, **how)
     assert same_bits(genes, start)
 
 

@@ -304,7 +304,7 @@ class Quadrotor:
         workers: Workers | None = None,
         past: ArrayLike | None = None,
     ) -> _Floats:
-        """States (rows, 6) a period later; lagging rotors start at hover speed and have followed `past` (rows, p, 4)."""
+        """States (rows, 6) a period later; lagging rotors began at hover speed and followed a `past` (rows, p, 4)."""
 
 @final
 class Family:

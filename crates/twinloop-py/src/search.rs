@@ -43,8 +43,7 @@ impl PyVariation {
         normalised_tradeoff: bool,
     ) -> Result<Self> {
         let sum = mutation_share + crossover_share + reproduction_share;
-        // Written so that NaN is refused.
-        if !((sum - 1.0).abs() <= 1e-9) {
+        if sum.is_nan() || (sum - 1.0).abs() > 1e-9 {
             return Err(misuse(format!(
                 "variation: expected shares of the operators that sum to 1, found {sum}"
             )));

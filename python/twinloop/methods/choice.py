@@ -120,7 +120,7 @@ class Choice:
         again = self.planner.judge(
             members, flown.genes[np.newaxis], self.committee.sds, self.draws, excitation, ends, measured=True
         )
-        least = 1.01 * measured + DOUBT * float(again.qualities.std())
+        least = 1.01 * measured + DOUBT * again.scatter
         return bool(recorded[:, :, 0].mean() > least and again.mean[0] > least)
 
     def _tuned(self, genes: Floats, judged: Judged, recorded: Floats, reason: str) -> Test:

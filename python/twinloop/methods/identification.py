@@ -23,6 +23,7 @@ from twinloop.methods.calibration import OF_PARTS, factor, left_of_flights, need
 from twinloop.methods.choice import Choice
 from twinloop.methods.doubts import distinct, doubts
 from twinloop.methods.errors import errors, free_runs
+from twinloop.methods.following import following
 from twinloop.models import Twin
 from twinloop.objectives import normalised_error
 from twinloop.planning.judging import Committee, Task
@@ -167,17 +168,19 @@ class IdentifyAndPlan:
             workers=self.workers,
             watch=self._watch,
         )
-        free = free_runs(identified.members, book, self.workers)
-        frozen = np.array([run.frozen for run in book.experiments])
+        followed = following(
+            identified.members, book.experiments, self.options.divergence_factor, self.workers
+        )
+        free, frozen = followed.free, followed.frozen
         # A member that cannot follow the flights that it was learnt from is no member (E-SINDy's stability filter).
         wrong = (free > np.maximum(WRONG * frozen, 4.0 * free[0])).any(axis=1)
         # Where hardly any can, the ones that go wrong least still show where more must be known.
-        order = np.argsort((free / np.maximum(frozen, 1e-300)).max(axis=1), kind="stable")
         kept = {0, *np.flatnonzero(~wrong).tolist()}
-        kept |= set([i for i in order.tolist() if i not in kept][: max(0, FEWEST - len(kept))])
+        kept |= set([i for i in followed.order() if i not in kept][: max(0, FEWEST - len(kept))])
         believed = [identified.members[i] for i in sorted(kept)]
         follows = self._can_follow(identified, free[0], frozen)
-        lesson = self._lesson(identified, follows, book, free[0].tolist())
+        errors_of_best = free_runs(identified.members[:1], book, self.workers)[0]
+        lesson = self._lesson(identified, follows, book, errors_of_best.tolist())
         before = () if known is None else known.lessons
         return Learnt(told, identified, believed, follows, needed, (*before, lesson))
 
@@ -314,7 +317,8 @@ class IdentifyAndPlan:
 
     def _can_follow(self, known: Identified, free: Floats, frozen: Floats) -> bool:
         """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from."""
-        noise = float(np.square(known.sensors(self.setup.signals.n_x)).mean())
+        scales = np.array([state.scale for state in self.setup.signals.states])
+        noise = float(np.square(known.sensors(len(scales)) / scales).mean())
         lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
         return bool(np.isfinite(known.left)) and 2 * int(lost.sum()) <= len(lost)
 

@@ -13,7 +13,7 @@ from twinloop.controllers import Family
 from twinloop.streams import Purpose, Unit
 
 Score = Callable[[Floats], Floats]
-"""Scores (K,), to be minimised, of genes (K, size)."""
+"""Of genes (K, size) the share of their flights that diverges and a score (K, 2), to be minimised in this order."""
 OFFSPRING = 32
 """Genes of a generation."""
 NEAR = 0.02
@@ -62,18 +62,18 @@ def tune_gains(
         purpose: of their random numbers.
         watch: called after every generation.
     """
-    best_genes, best = np.asarray(starts[0], dtype=np.float64), float(score(np.atleast_2d(starts[0]))[0])
+    best_genes, best = np.asarray(starts[0], dtype=np.float64), tuple(score(np.atleast_2d(starts[0]))[0])
     for number, start in enumerate(starts):
         mean = np.clip(family.to_unit(start), 0.02, 0.98)
         search = _core.CmaEs(mean, spread, OFFSPRING, unit.part(number).named(purpose))
         for _ in range(max(1, evaluations // (len(starts) * OFFSPRING))):
             places = search.ask()
             genes = family.from_unit(places)
-            scores = score(genes)
-            i = int(np.argmin(scores))
-            if scores[i] < best:
-                best_genes, best = genes[i], float(scores[i])
-            search = search.tell(places, _dearer_outside(scores, places))
+            lost, scores = score(genes).T
+            i = int(np.lexsort((scores, lost))[0])
+            if (lost[i], scores[i]) < best:
+                best_genes, best = genes[i], (lost[i], scores[i])
+            search = search.tell(places, _ordered(lost, _dearer_outside(scores, places)))
             watch()
             if search.stopped:
                 break
@@ -88,3 +88,11 @@ def _dearer_outside(scores: Floats, places: Floats) -> Floats:
     outside = np.square(places - np.clip(places, 0.0, 1.0)).sum(axis=1)
     price = np.where(scores == 0.0, LEAST, np.abs(scores))
     return np.where(np.isfinite(scores), scores + np.where(np.isfinite(scores), price, 0.0) * outside, np.inf)
+
+
+def _ordered(lost: Floats, scores: Floats) -> Floats:
+    """Scores (K,) as they are; where any flights are lost, the places of all in the order of both.
+
+    A search looks at the order alone, and a share and a score have no common unit.
+    """
+    return np.argsort(np.lexsort((scores, lost))).astype(np.float64) if lost.any() else scores

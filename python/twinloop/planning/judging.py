@@ -16,10 +16,6 @@ from twinloop.streams import Unit
 
 Ends = tuple[Floats, Floats]
 """Initial states and target states (K, n_x)."""
-HOPELESS = 1e9
-"""What a flight that diverges is worth."""
-DIVERGED = 1e-3 * HOPELESS
-"""A mean or spread of this or more: some flight in it has diverged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +44,34 @@ class Committee:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Qualities (members, draws, K) and the worst usage of the envelope (members, draws, K)."""
+    """Qualities and worst usages of the envelope (members, draws, K), both infinite where a flight diverges."""
 
     qualities: Floats
     usages: Floats
 
     @property
     def mean(self) -> Floats:
-        """Over members and draws (K,)."""
+        """Over members and draws (K,); infinite where any flight diverges."""
         mean: Floats = self.qualities.mean(axis=(0, 1))
         return mean
+
+    @property
+    def lost(self) -> Floats:
+        """Share of the flights that diverge (K,)."""
+        lost: Floats = np.isinf(self.qualities).mean(axis=(0, 1))
+        return lost
+
+    @property
+    def lasting(self) -> Judged:
+        """The flights that do not diverge, with zeros for those that do."""
+        lasts = np.isfinite(self.qualities)
+        return Judged(np.where(lasts, self.qualities, 0.0), np.where(lasts, self.usages, 0.0))
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of the flights that do not diverge; 0 where none is left."""
+        left = self.qualities[np.isfinite(self.qualities)]
+        return float(left.std()) if left.size else 0.0
 
     @property
     def worst_usage(self) -> Floats:
@@ -81,7 +95,7 @@ def expected(means: Floats) -> tuple[float, float]:
     Args:
         means: of the members.
     """
-    if bool((means >= DIVERGED).any()):
+    if not np.isfinite(means).all():
         return float("inf"), float("inf")
     return float(means.mean()), float(means.std())
 
@@ -127,7 +141,7 @@ class Judge:
         measured: bool = False,
         off: Floats | None = None,
     ) -> Judged:
-        """Flies candidates on members under noise; what diverges is worth `HOPELESS`.
+        """Flies candidates on members under noise.
 
         Qualities are those of the true states, which gains are chosen by, or, `measured`, those that a record of the
         flight would give. Where `off` is given flights begin elsewhere, as far as it says (n_x,), drawn like noise.
@@ -140,9 +154,7 @@ class Judge:
             members, self.flights(genes, excitation, ends), self.quality.engine, self.signals,
             noise=noise, offsets=offsets, measured=measured, workers=self.workers,
         )  # fmt: skip
-        return Judged(
-            np.where(np.isfinite(values), values, HOPELESS), np.where(np.isfinite(usages), usages, HOPELESS)
-        )
+        return Judged(values, usages)
 
     def lasting(
         self,
@@ -153,7 +165,7 @@ class Judge:
     ) -> list[_core.Model]:
         """Members that do not blow up on half of the flights; the best one in any case."""
         judged = self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
-        share = (judged.qualities >= HOPELESS).any(axis=1).mean(axis=1)
+        share = np.isinf(judged.qualities).any(axis=1).mean(axis=1)
         return [member for i, member in enumerate(members) if i == 0 or share[i] < 0.5]
 
     def noise(self, sds: Floats, draws: int) -> Floats | None:

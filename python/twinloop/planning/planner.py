@@ -16,7 +16,7 @@ from twinloop.flights import disagreements
 from twinloop.planning.candidates import Candidates, candidates
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import nearby, tune_gains
-from twinloop.planning.judging import DIVERGED, Committee, Judge, Judged, Task, expected, risk
+from twinloop.planning.judging import Committee, Judge, Judged, Task, expected, risk
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 from twinloop.streams import Purpose
@@ -147,10 +147,17 @@ class Planner(Judge):
         """One of two searches, with half of the evaluations."""
         options = self.options
 
+        first = float(self.judge(members, starts[0][np.newaxis], sds, draws).mean[0])
+        unit = first if np.isfinite(first) else 0.0
+
         def score(genes: Floats) -> Floats:
             judged = self.judge(members, genes, sds, draws)
-            excess = np.maximum(0.0, judged.worst_usage - (1.0 - options.margin))
-            return judged.mean * (1.0 + 10.0 * excess) + excess
+            lasts = judged.lasting
+            mean = lasts.qualities.sum(axis=(0, 1)) / np.maximum(
+                1, np.isfinite(judged.qualities).sum(axis=(0, 1))
+            )
+            excess = np.maximum(0.0, lasts.worst_usage - (1.0 - options.margin))
+            return np.stack([judged.lost, mean + excess * (10.0 * mean + unit)], axis=1)
 
         return tune_gains(
             self.family, score, starts, evaluations=options.evaluations // 2, spread=spread,
@@ -291,13 +298,14 @@ class Planner(Judge):
     def _scatter(self, committee: Committee, tuned: Floats) -> float:
         """How far the quality of one flight is from that of the next, by the sensors' noise alone."""
         flights = self.judge(committee.members[:1], tuned[np.newaxis], committee.sds, self.options.draws)
-        scatter = float(flights.qualities.std())
-        return scatter if scatter < DIVERGED else 0.0
+        return flights.scatter if np.isfinite(flights.qualities).all() else 0.0
 
     def _limit(self, tuned: float, goal: str, told: int, first: float, scatter: float) -> float:
         """Predicted quality that a test may have at most."""
         if goal == "model":
             return max(first, 2.0 * tuned)
+        if not np.isfinite(tuned):
+            return first + scatter
         given = power(self.options.share, max(1, told)) * max(0.0, first - tuned)
         # What is lost in the scatter of the flights costs nothing.
         given = 0.1 * given if goal == "control" else max(scatter, given)

@@ -65,8 +65,8 @@ def quality_of(
     """A quality with the weights that its kind has by default.
 
     The final distance counts every state alike, as in the paper. The integrals count the states that a task is about,
-    which are those that are no other's derivative and no body rate: as they are where they have one unit, else in units
-    of their scales.
+    which are those that are no other's derivative and no body rate, each in units of its scale; where all of them have
+    one unit, times the scale of the first, so that the quality of states of equal scales is in their unit.
 
     Args:
         kind: "iae", "ise" or "final_distance".
@@ -88,7 +88,8 @@ def quality_of(
                 for state in signals.states
             ]
             units = {state.unit for state, counts in zip(signals.states, counted, strict=True) if counts}
+            first = next((s.scale for s, counts in zip(signals.states, counted, strict=True) if counts), 1.0)
             for i, state in enumerate(signals.states):
-                size = state.scale if len(units) > 1 else 1.0
-                chosen[i] = 1.0 / (size if kind == "iae" else size * size) if counted[i] else 0.0
+                share = (first if len(units) == 1 else 1.0) / state.scale
+                chosen[i] = (share if kind == "iae" else share * share) if counted[i] else 0.0
     return Quality(kind, chosen, effort, effort_rate, signals)

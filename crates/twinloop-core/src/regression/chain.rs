@@ -66,7 +66,7 @@ impl Noise {
 impl Chain {
     /// Refuses what is no chain.
     pub fn validated(self) -> Result<Self> {
-        if !(1..=LONGEST).contains(&self.states) || !(self.dt.is_finite() && self.dt > 0.0) {
+        if !((1..=LONGEST).contains(&self.states) && self.dt.is_finite() && self.dt > 0.0) {
             return invalid(format!(
                 "chain: expected 1 to {LONGEST} states and a period above 0, found {} and {}",
                 self.states, self.dt
