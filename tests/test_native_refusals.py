@@ -366,7 +366,7 @@ def calls(world):
 
 
 def restored(world):
-    """Calls that make values of what was read off them."""
+    """Calls that make values of what was read off them, and calls on records."""
     w = world
     instructions = [("*", w.n_x + w.n_u, 0, 0.5), ("sin", w.n_x + w.n_u, 1, None)]
     of_models = {
@@ -398,6 +398,11 @@ def restored(world):
     }
     shape = {"inputs": w.n_x + w.n_u, "outputs": w.n_x, "registers": 2 * w.n_x + w.n_u}
     return {
+        "Quality.recorded": (
+            w.quality.recorded,
+            {"signals": w.signals, "target": w.target, "states": w.states, "commands": w.commands},
+        ),
+        "usages": (_core.usages, {"signals": w.signals, "envelope": w.envelope, "states": w.states}),
         "Program": (_core.Program, {**shape, "pages": [instructions]}),
         "ModelSearch.restored": (_core.ModelSearch.restored, of_models),
         "TestSearch.restored": (_core.TestSearch.restored, of_tests),
@@ -513,6 +518,7 @@ ALONE = {
     ("predictions", "model"),
     ("ModelSearch.start", "selected"),
     ("ModelSearch.restored", "signals"),
+    ("Quality.recorded", "signals"),
 }
 """Arguments that the others, arrays, fit where they are as many."""
 

@@ -10,6 +10,7 @@ from oracles import same_bits
 from strategies import program_text
 from twinloop import _core
 from twinloop.flights import candidates, qualities
+from twinloop.history import Experiment
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
@@ -144,16 +145,16 @@ def test_what_lies_outside_the_box_is_dearer_the_further_out_whatever_the_scores
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("weights", [(), (2.0, 0.5)])
-def test_the_quality_of_a_flight_is_the_engines(kind, weights):
+def test_a_flight_is_judged_alike_when_it_is_planned_and_when_it_was_flown(kind, weights):
     known = signals()
     quality = quality_of(kind, known, weights, effort=0.3, effort_rate=0.02)
     model, family = member(known, 1.0), family_of(known)
     test = tl.Test(family, TUNED, TASK.initial_state, TASK.target_state, STEPS)
     flights = candidates(family, TUNED[None], TASK.initial_state, TASK.target_state, STEPS)
-    expected = qualities([model], flights, quality.engine, known)[0][0, 0, 0]
-    assert quality.flown(tl.Twin(model, known).simulate(test), TASK.target_state) == pytest.approx(
-        expected, rel=1e-10
-    )
+    expected, used = (values[0, 0, 0] for values in qualities([model], flights, quality.engine, known))
+    flown = tl.Twin(model, known).simulate(test)
+    assert quality.flown(flown, TASK.target_state) == expected
+    assert Experiment(test, flown, None, 1.0, None, None).usage == used
 
 
 def test_the_integrals_count_what_a_task_is_about():

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.errors import engine_input
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.test import Test
@@ -68,14 +68,11 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""
-        most, signals = np.zeros(len(self.trajectory.states)), self.replayed.family.signals
-        middle = np.array([0.0 if s.envelope is None else 0.5 * sum(s.envelope) for s in signals.states])
-        off = np.abs(signals.difference(self.trajectory.states, middle))
-        for distances, state in zip(off.T, signals.states, strict=True):
-            if state.envelope is not None:
-                low, high = state.envelope
-                most = np.maximum(most, distances / (0.5 * (high - low)))
-        return most
+        signals = self.replayed.family.signals
+        with engine_input():
+            return _core.usages(
+                signals.engine, [state.envelope for state in signals.states], self.trajectory.states
+            )
 
 
 @dataclass(frozen=True)

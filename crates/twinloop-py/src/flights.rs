@@ -8,8 +8,8 @@ use twinloop_core::{
 };
 
 use crate::arrays::{
-    Cube, Matrix, RowsOrBlocks, Vector, optional_blocks, optional_rows, rows, to_cube, to_integer_rows,
-    to_vector, vector, views,
+    Cube, Matrix, RowsOrBlocks, Vector, VectorOrRows, optional_blocks, optional_rows, rows, to_cube,
+    to_integer_rows, to_vector, vector, views,
 };
 use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
@@ -94,10 +94,36 @@ impl PyQuality {
         Ok(Self(quality.validated()?))
     }
 
+    /// Of a recorded run: states (n + 1, n_x) and commands (n, n_u).
+    fn recorded(
+        &self,
+        signals: &PySignals,
+        target: VectorOrRows<'_>,
+        states: Matrix<'_>,
+        commands: Matrix<'_>,
+    ) -> Result<f64> {
+        let signals = &signals.0;
+        let states = rows("states", &states, signals.states())?.concat();
+        let commands = rows("commands", &commands, signals.commands())?.concat();
+        Ok(self.0.recorded(signals, &target.numbers(), &states, &commands)?)
+    }
+
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.kind.name()
     }
+}
+
+/// The largest share of an envelope that each state uses (rows,).
+#[pyfunction]
+pub fn usages<'py>(
+    py: Python<'py>,
+    signals: &PySignals,
+    envelope: Vec<Option<(f64, f64)>>,
+    states: Matrix<'py>,
+) -> Result<Bound<'py, PyArray1<f64>>> {
+    let states = rows("states", &states, signals.0.states())?.concat();
+    Ok(to_vector(py, Envelope::new(&envelope)?.usages(&signals.0, &states)?))
 }
 
 /// What flights are flown on: members of a committee, or the truth.

@@ -35,7 +35,7 @@ mod _core {
     #[pymodule_export]
     use crate::elementary::{cos, exp, log, power, sin, tanh};
     #[pymodule_export]
-    use crate::flights::{PyFlights, PyQuality, disagreements, qualities};
+    use crate::flights::{PyFlights, PyQuality, disagreements, qualities, usages};
     #[pymodule_export]
     use crate::model::{PyModel, PySignals, command_effects};
     #[pymodule_export]

@@ -97,7 +97,8 @@ class Problem:
         state, end = chain.states[0], self.stages.end
         new = [term for term in terms if (state, term) not in self._feedthrough]
         if new:
-            step = 1e-3 * max(float(np.abs(end[:, state]).max()), 1e-6)
+            # Of a state that never left 0 any step will do.
+            step = 1e-3 * (float(np.abs(end[:, state]).max()) or 1.0)
             above, below = (end.copy() for _ in range(2))
             above[:, state] += step
             below[:, state] -= step

@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.errors import engine_input
 from twinloop.flights import quality as engine_quality
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -46,17 +47,8 @@ class Quality:
             trajectory: of at least one step.
             target: state that it should have been led to (n_x,), or a row for each of its states (n + 1, n_x).
         """
-        dt = self.signals.dt
-        goal = target if target.ndim == 1 else target[1 : len(trajectory.states)]
-        errors = self.signals.difference(trajectory.states[1:], goal)
-        if self.kind == "final_distance":
-            value = float(np.sqrt((self.weights * errors[-1] ** 2).sum()))
-        else:
-            powers = np.abs(errors) if self.kind == "iae" else errors**2
-            value = float(dt * (powers * self.weights).sum())
-        scaled = trajectory.commands / np.array([command.size for command in self.signals.commands])
-        value += self.effort * dt * float((scaled**2).sum())
-        return value + self.effort_rate * float((np.diff(scaled, axis=0) ** 2).sum()) / dt
+        with engine_input():
+            return self.engine.recorded(self.signals.engine, target, trajectory.states, trajectory.commands)
 
 
 def quality_of(

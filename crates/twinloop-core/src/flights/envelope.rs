@@ -2,7 +2,8 @@
 
 use crate::difference::Periods;
 use crate::error::{Result, invalid};
-use crate::lanes::Vector;
+use crate::lanes::{Vector, scalars};
+use crate::signals::Signals;
 
 /// Bounds that states may safely move in.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +38,20 @@ impl Envelope {
     /// Number of states, with an envelope or without.
     pub fn states(&self) -> usize {
         self.states
+    }
+
+    /// The largest share of an envelope that each of some states (rows × n_x) uses.
+    pub fn usages(&self, signals: &Signals, states: &[f64]) -> Result<Vec<f64>> {
+        let n_x = signals.states();
+        if self.states != n_x || !states.len().is_multiple_of(n_x) {
+            return invalid(format!(
+                "envelope: expected one of {n_x} states and rows of as many, found {} and {} numbers",
+                self.states,
+                states.len()
+            ));
+        }
+        let usage = |state: &[f64]| self.reach(&signals.periods, &scalars(state)).usage().lane(0);
+        Ok(states.chunks_exact(n_x).map(usage).collect())
     }
 
     /// How far flights got that start at a state (n_x).

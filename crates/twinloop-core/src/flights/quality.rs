@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use crate::difference::Periods;
 use crate::error::{Error, Result, invalid};
-use crate::lanes::Vector;
+use crate::lanes::{Vector, scalars};
 use crate::signals::Signals;
 use crate::task::target_at;
 
@@ -70,6 +70,36 @@ impl Quality {
             ));
         }
         Ok(self)
+    }
+
+    /// Of a run that was recorded: its states (n + 1) × n_x and commands n × n_u; towards a target (n_x), or a row for
+    /// each of its states or more.
+    pub fn recorded(
+        &self,
+        signals: &Signals,
+        target: &[f64],
+        states: &[f64],
+        commands: &[f64],
+    ) -> Result<f64> {
+        let (n_x, n_u) = (signals.states(), signals.commands());
+        let steps = commands.len() / n_u;
+        let found = [self.weights.len(), states.len(), commands.len()];
+        let varies = target.len().is_multiple_of(n_x) && target.len() >= (steps + 1) * n_x;
+        let fits = found == [n_x, (steps + 1) * n_x, steps * n_u] && (target.len() == n_x || varies);
+        if steps == 0 || !fits {
+            return invalid(format!(
+                "quality: expected weights of {n_x} states, n + 1 ≥ 2 of them, n times {n_u} commands and a target or a row \
+                 of it for each state, found {found:?} and {} numbers",
+                target.len()
+            ));
+        }
+        let target = scalars(target);
+        let mut tally = self.tally(signals, &target);
+        let steps = commands.chunks_exact(n_u).zip(states.chunks_exact(n_x).skip(1));
+        for (step, (command, next)) in steps.enumerate() {
+            tally.add(step, &scalars(command), &scalars(next));
+        }
+        Ok(tally.total().lane(0))
     }
 
     /// Nothing flown yet.

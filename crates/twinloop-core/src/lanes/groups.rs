@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::vector::Vector;
+use super::vector::{Scalar, Vector};
 
 /// Splits `count` tests into groups that fill lanes well: 32 as long as there are as many, then 8, then what is left.
 pub(crate) fn groups(count: usize) -> Vec<Range<usize>> {
@@ -73,6 +73,11 @@ pub(crate) fn vectors<V: Vector>(interleaved: &[f64]) -> Vec<V> {
         *vector = V::load(values);
     }
     vectors
+}
+
+/// Numbers, each in a vector of one lane.
+pub(crate) fn scalars(values: &[f64]) -> Vec<Scalar> {
+    values.iter().map(|&value| Scalar::splat(value)).collect()
 }
 
 /// Rows of equal length, one a lane.

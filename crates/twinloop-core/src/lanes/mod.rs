@@ -18,7 +18,7 @@ mod piece;
 mod vector;
 mod width;
 
-pub(crate) use groups::{groups, interleave, lanes_for, pack, vectors, with_lanes, with_test_lanes};
+pub(crate) use groups::{groups, interleave, lanes_for, pack, scalars, vectors, with_lanes, with_test_lanes};
 pub use piece::Apart;
 #[cfg(test)]
 pub(crate) use vector::Wide;

@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 
 use crate::dynamics::Dynamics;
-use crate::lanes::{Scalar, Vector};
+use crate::lanes::{Scalar, Vector, scalars};
 use crate::model::Model;
 use crate::selected::{Experiment, SelectedTests};
 
@@ -41,8 +41,4 @@ pub(super) fn after_steps(model: Model<'_>, selected: &SelectedTests, horizon: u
         if mean.is_finite() { mean } else { f64::INFINITY }
     };
     selected.experiments().map(of_test).collect()
-}
-
-fn scalars(values: &[f64]) -> Vec<Scalar> {
-    values.iter().map(|&value| Scalar::splat(value)).collect()
 }
