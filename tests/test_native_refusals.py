@@ -20,6 +20,22 @@ REFUSALS = (ValueError, TypeError, OverflowError)
 """What a refusal may be; `twinloop.errors.engine_input` makes InvalidInput of the first and the last."""
 
 
+LAWS = ("pid", "cascade", "state_feedback", "python")
+
+
+class Nothing:
+    """A controller that asks for nothing."""
+
+    def __init__(self, commands):
+        self.commands = commands
+
+    def reset(self):
+        pass
+
+    def command(self, state, target):
+        return np.zeros(self.commands)
+
+
 class World:
     """What a campaign hands to the engine: signals of its own, and everything that is made for them.
 
@@ -37,11 +53,8 @@ class World:
         self.command_scales = np.full(n_u, factor)
         self.derivatives = [None] * n_x
         self.signals = _core.Signals(dt, self.scales, self.bounds, self.command_scales, self.derivatives)
-        self.matrix, self.offset = np.ones((n_u, 1)), np.zeros(n_u)
-        self.low, self.high, self.logarithmic = np.zeros(3), np.ones(3), [False] * 3
-        self.family = _core.Family.pid(
-            self.signals, [(0, None)], self.low, self.high, self.logarithmic, self.matrix, self.offset, 1.0
-        )
+        self.gain_bounds, self.output = [(0.0, 1.0, False)] * 3, (np.ones((n_u, 1)), np.zeros(n_u), 1.0)
+        self.family = _core.Family.pid(self.signals, [(0, None)], self.gain_bounds, self.output)
         self.grammar = _core.Grammar(n_x + n_u, n_x, pages=2, page_length=3)
         self.program, self.other_program = self.grammar.random(n_x, 2)
         last = n_x + n_u
@@ -104,9 +117,10 @@ def calls(world):
         "command_scales": w.command_scales,
         "derivative_of": w.derivatives,
         "kinematics": None,
+        "periods": None,
     }
-    box = {"low": w.low, "high": w.high, "logarithmic": w.logarithmic}
-    output = {"matrix": w.matrix, "offset": w.offset, "power": 1.0}
+    law = {"gains": w.gain_bounds, "output": w.output}
+    filtered = {"derivative_filter": 0.1, "anti_windup": True}
     vehicle = {
         "dt": w.dt,
         "arm": 0.1,
@@ -159,17 +173,24 @@ def calls(world):
             quadrotor.step,
             {"states": np.zeros((2, 6)), "commands": np.zeros((2, 4)), "past": np.zeros((2, 3, 4))},
         ),
-        "Family.pid": (_core.Family.pid, {"signals": w.signals, "axes": [(0, None)], **box, **output}),
-        "Family.state_feedback": (
-            _core.Family.state_feedback,
+        "Family.pid": (_core.Family.pid, {"signals": w.signals, "axes": [(0, None)], **law, **filtered}),
+        "Family.cascade": (
+            _core.Family.cascade,
             {
                 "signals": w.signals,
-                "states": [0, 1],
-                "integrals": [0],
-                "outputs": 1,
-                **box,
-                **output,
+                "axes": [(0, w.n_x - 1, 1.0)],
+                **law,
+                "gains": [*w.gain_bounds, 0.5],
+                **filtered,
             },
+        ),
+        "Family.state_feedback": (
+            _core.Family.state_feedback,
+            {"signals": w.signals, "states": [0, 1], "integrals": [0], "outputs": 1, **law},
+        ),
+        "Family.python": (
+            _core.Family.python,
+            {"signals": w.signals, "make": lambda gains: Nothing(w.n_u), "gains": w.gain_bounds},
         ),
         "Family.controller": (
             w.family.controller,
@@ -508,7 +529,7 @@ def holds_the_engines_own(value):
     return type(first).__module__ == "twinloop._core" and not isinstance(first, anybodys)
 
 
-STARTS = {("Family.pid", "signals"), ("Family.state_feedback", "signals"), ("Model.shape", "signals")}
+STARTS = {("Model.shape", "signals"), *((f"Family.{law}", "signals") for law in LAWS)}
 """Arguments that all others are numbers for."""
 NUMBERS = {"program", "first", "second", "grammar", "task", "quality", "grams", "population", "archive"}
 """Arguments that are made of numbers without a unit or a period: others where they are more or fewer."""

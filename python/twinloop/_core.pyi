@@ -499,9 +499,7 @@ class Quality:
     def recorded(self, signals: Signals, target: ArrayLike, states: ArrayLike, commands: ArrayLike) -> float:
         """Of a recorded run: target (n_x,) or rows of it (≥ n + 1, n_x), states (n + 1, n_x), commands (n, n_u)."""
 
-def usages(
-    signals: Signals, envelope: Sequence[tuple[float, float] | None], states: ArrayLike
-) -> _Floats:
+def usages(signals: Signals, envelope: Sequence[tuple[float, float] | None], states: ArrayLike) -> _Floats:
     """The largest share of an envelope that each state (rows, n_x) uses: 1 at a bound (rows,)."""
 
 def qualities(

@@ -58,8 +58,9 @@ def following(
     frozen = np.empty(len(flights))
     for j, flight in enumerate(flights):
         test, states, steps = flight.replayed, flight.trajectory.states, flight.trajectory.steps
-        scales = np.array([state.scale for state in test.family.signals.states])
-        frozen[j] = np.square((states[1:] - states[0]) / scales).mean()
+        signals = test.family.signals
+        scales = np.array([state.scale for state in signals.states])
+        frozen[j] = np.square(signals.difference(states[1:], states[0]) / scales).mean()
         excitation = None if test.excitation is None else test.excitation[np.newaxis, :steps]
         for i, model in enumerate(models):
             with engine_input():
@@ -68,12 +69,12 @@ def following(
                     test.family.engine,
                     test.genes[np.newaxis],
                     _core.Task(states[0], test.target_state, steps),
-                    test.family.signals.engine,
+                    signals.engine,
                     excitation=excitation,
                     divergence_factor=divergence_factor,
                     workers=workers,
                 )
             lasted[i, j] = runs.lasted[0] / steps
-            misses = np.square((runs.states[0, 1:] - states[1:]) / scales)
+            misses = np.square(signals.difference(runs.states[0, 1:], states[1:]) / scales)
             free[i, j] = misses.mean() if lasted[i, j] == 1.0 else np.inf
     return Following(free, lasted, frozen)
