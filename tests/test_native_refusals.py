@@ -540,6 +540,7 @@ ALONE = {
     ("ModelSearch.start", "selected"),
     ("ModelSearch.restored", "signals"),
     ("Quality.recorded", "signals"),
+    ("usages", "signals"),
 }
 """Arguments that the others, arrays, fit where they are as many."""
 

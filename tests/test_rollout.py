@@ -96,7 +96,7 @@ def test_excitation_moves_the_commands_and_disturbance_the_true_state(rig, rig_f
 
 def test_an_excitation_is_clipped_to_the_bounds_of_the_commands(rig, rig_family):
     task, genes = _core.Task(START, TARGET, 4), drawn(1)
-    excitation = np.array([[[9.0, -9.0], [-9.0, 9.0], [0.0, 0.0], [np.inf, -np.inf]]])
+    excitation = np.array([[[9.0, -9.0], [-9.0, 9.0], [0.0, 0.0], [1e300, -1e300]]])
     model = models(rig, "increment")[1]
     runs = _core.rollout(model, rig_family, genes, task, rig, excitation=excitation, divergence_factor=1e6)
     assert runs.commands[0, [0, 1, 3]].tolist() == [[1.0, -3.0], [-1.0, 2.0], [1.0, -3.0]]

@@ -14,6 +14,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.elementary import log
 from twinloop.identification.actuation import groups
+from twinloop.identification.description import shortest
 from twinloop.identification.directions import Direction, together
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum, total
@@ -79,9 +80,9 @@ def search_hidden(
         for rest in rests
     ]
     found = [tried(hidden) for hidden in [*kinds, *known]]
-    best = min(found, key=lambda answer: answer[0])[1].hidden[0]
+    best = shortest(found, lambda answer: answer[0])[1].hidden[0]
     found += [tried(best._replace(time=time * longest)) for time in (TIMES[0], TIMES[2])]
-    _, actuation, sums = min(found, key=lambda answer: answer[0])
+    _, actuation, sums = shortest(found, lambda answer: answer[0])
     return actuation, sums
 
 

@@ -18,6 +18,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.identification.chains import Chain
 from twinloop.identification.committee import committee
+from twinloop.identification.description import shorter, shortest
 from twinloop.identification.directions import directions
 from twinloop.identification.fitting import Fitting, Tuned, described
 from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
@@ -164,7 +165,7 @@ class _Learner:
             self.fitting.runs, self.selection.ladder = list(runs), plain
             tuned = self._smoothed(way())
             found.append((described(tuned), tuned, self.fitting.runs, self.selection.ladder))
-        _, tuned, self.fitting.runs, self.selection.ladder = min(found, key=lambda answer: answer[0])
+        _, tuned, self.fitting.runs, self.selection.ladder = shortest(found, lambda answer: answer[0])
         return tuned
 
     def _anew(self) -> Tuned:
@@ -228,7 +229,7 @@ class _Learner:
                 actuation, again = self._hidden(actuation, tuned.sums, again)
             tuned = self.fitting.tuned(again, self.selection.given, actuation)
             # Descriptions of raw states and of smoothed ones do not compare.
-            if (number == 1 and np.isfinite(tuned.left)) or described(tuned) < described(best):
+            if (number == 1 and np.isfinite(tuned.left)) or shorter(described(tuned), described(best)):
                 best, runs = tuned, self.fitting.runs
             if not np.isfinite(tuned.left):
                 break
@@ -300,7 +301,7 @@ class _Learner:
             unit=unit.part(0), purpose="hidden_subsets",
         )  # fmt: skip
         price = 0.0 if actuation.hidden else PRICE
-        if total(best) + price >= total(plain):
+        if not shorter(total(best) + price, total(plain)):
             self.pool.forget(entered)
             return actuation, list(plain)
         self.selection.admit_hidden()
@@ -321,11 +322,11 @@ class _Learner:
             if np.isfinite(answer.left):
                 found.append(answer)
         of_each = zip(tuned.sums, *(answer.sums for answer in found), strict=True)
-        shortest = [min(sums, key=lambda sum_: sum_.energy) for sums in of_each]
+        best = [shortest(sums, lambda found: found.energy) for sums in of_each]
         self.fitting.runs = runs
-        if shortest != tuned.sums:
-            mixed = self.fitting.tuned(shortest, self.selection.given, actuation)
-            if described(mixed) < described(tuned):
+        if best != tuned.sums:
+            mixed = self.fitting.tuned(best, self.selection.given, actuation)
+            if shorter(described(mixed), described(tuned)):
                 tuned = mixed
             else:
                 self.fitting.runs = runs

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from twinloop.arrays import Floats
 from twinloop.identification.actuation import groups
+from twinloop.identification.description import shorter, shortest
 from twinloop.identification.structure import Sum, total
 from twinloop.law.actuation import Actuation, Actuator
 from twinloop.signals import Signals
@@ -44,11 +45,11 @@ def search_actuators(
             for lag in LAGS:
                 if lag == 0.0 and delay == 0:
                     continue
-                score, tried, found = min(
-                    (_tried(signals, best, group, lag, delay, rest, judge) for rest in rests),
-                    key=lambda answer: answer[0],
+                score, tried, found = shortest(
+                    [_tried(signals, best, group, lag, delay, rest, judge) for rest in rests],
+                    lambda answer: answer[0],
                 )
-                if score + PRICE < energy:
+                if shorter(score + PRICE, energy):
                     best, sums, energy, rising = tried, found, score + PRICE, 0
                 else:
                     rising += 1

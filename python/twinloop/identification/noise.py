@@ -14,6 +14,7 @@ from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.chains import Chain, Motion
 from twinloop.identification.coasting import coasted
+from twinloop.identification.description import shortest
 from twinloop.identification.problem import Problem
 from twinloop.identification.records import Run
 from twinloop.signals import Signals
@@ -113,7 +114,7 @@ def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = Tr
         found = _core.most_likely_noises(
             [(regression, [0.0], *start, low, slow) for start in begun], problem.workers
         )
-    sensors, motion, _ = min(found, key=lambda answer: answer[2])
+    sensors, motion, _ = shortest(found, lambda answer: answer[2])
     return chain.with_noise(sensors, motion)
 
 

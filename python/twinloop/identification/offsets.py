@@ -17,6 +17,7 @@ from twinloop.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.chains import Chain
 from twinloop.identification.coasting import coasted, coasting
+from twinloop.identification.description import shortest
 from twinloop.identification.noise import floor_of
 from twinloop.identification.records import Run
 from twinloop.signals import Signals
@@ -137,7 +138,7 @@ class _Group:
             # The noise was found too large while it had to explain the offset.
             chains = self._believed(size)
             around = {tried: self._energy(tried, chains) for tried in (size, size - step, size + step)}
-            size = min(around, key=around.__getitem__)
+            size = shortest(list(around), around.__getitem__)
             step *= 0.5
         return self._at(size)
 

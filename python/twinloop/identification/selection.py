@@ -10,6 +10,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.elementary import log
 from twinloop.identification.chains import Chain, chains
+from twinloop.identification.description import shortest
 from twinloop.identification.directions import directions, terms_of, unequal
 from twinloop.identification.evolution import evolve
 from twinloop.identification.formulas import parsed_term
@@ -99,7 +100,7 @@ class Selection:
         above = [unexplained(problem, chain, self.scales, options.gusts) for chain in self.driven]
         none: list[Sum | None] = [None] * len(self.driven)
         high = self.search(problem, terms, none, above, options.moves, 2)
-        return [a if a.energy <= b.energy else b for a, b in zip(low, high, strict=True)], high
+        return [shortest(both, lambda found: found.energy) for both in zip(low, high, strict=True)], high
 
     def climb(self, problem: Problem, known: Sequence[Sum], brief: bool = False) -> list[Sum]:
         """The best sums of all rungs and of evolved terms, where some are known; `brief`: of the first rung only.
