@@ -31,6 +31,8 @@ pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noi
 
 /// Factors by which a variance is tried in turn, coarse to fine.
 const STEPS: [f64; 5] = [100.0, 10.0, 3.0, 1.5, 1.15];
+/// What a move must gain: where a variance makes no difference, what rounding takes depends on the readings' units.
+const GAIN: f64 = 1e-6;
 /// Times that all of them are gone through: where one variance began far too large, the others are small after the first.
 const LADDERS: usize = 3;
 
@@ -69,7 +71,7 @@ pub fn most_likely_noise(
                             continue;
                         }
                         let found = likelihood(chain, records, residuals, &tried);
-                        if found < score {
+                        if found < score - GAIN {
                             (best, score, moved) = (tried, found, true);
                         }
                     }
