@@ -295,8 +295,7 @@ def calls(world):
                 "moves": 20,
                 "largest": 2,
                 "starts": 2,
-                "seed": 0,
-                "iteration": 0,
+                "unit": (0, "subsets", [0]),
                 "coldest": 2.0,
             },
         ),
@@ -308,9 +307,7 @@ def calls(world):
                 "lags": [[w.n_u - 1]],
                 "iterations": 2,
                 "draws": 1,
-                "seed": 0,
-                "iteration": 0,
-                "unit": 0,
+                "unit": (0, "subsets", [0]),
             },
         ),
         "predictions": (_core.predictions, recorded),
@@ -419,6 +416,7 @@ def restored(world):
     }
     shape = {"inputs": w.n_x + w.n_u, "outputs": w.n_x, "registers": 2 * w.n_x + w.n_u}
     return {
+        **drawn(w),
         "Quality.recorded": (
             w.quality.recorded,
             {"signals": w.signals, "target": w.target, "states": w.states, "commands": w.commands},
@@ -427,6 +425,32 @@ def restored(world):
         "Program": (_core.Program, {**shape, "pages": [instructions]}),
         "ModelSearch.restored": (_core.ModelSearch.restored, of_models),
         "TestSearch.restored": (_core.TestSearch.restored, of_tests),
+    }
+
+
+def drawn(world):
+    """Calls on streams of random numbers, elementary functions and CMA-ES."""
+    w, unit = world, (0, _core.purposes()[0], [1])
+    stream, search = _core.Stream(unit), _core.CmaEs(np.full(w.n_x, 0.5), 0.2, 6, unit)
+    elementary = {
+        name: (getattr(_core, name), {"x": np.ones(3)}) for name in ("exp", "log", "sin", "cos", "tanh")
+    }
+    return {
+        **elementary,
+        "power": (_core.power, {"x": 2.0, "y": 3.0}),
+        "purposes": (_core.purposes, {}),
+        "eigen": (_core.eigen, {"matrix": np.eye(w.n_x)}),
+        "Stream": (_core.Stream, {"unit": unit}),
+        "Stream.uniform": (stream.uniform, {"low": 0.0, "high": 1.0}),
+        "Stream.below": (stream.below, {"n": 3}),
+        "Stream.log_uniform": (stream.log_uniform, {"low": 0.5, "high": 2.0}),
+        "Stream.uniforms": (lambda shape: stream.uniforms(*shape), {"shape": (2, 3)}),
+        "Stream.normals": (lambda shape: stream.normals(*shape), {"shape": (2, 3)}),
+        "CmaEs": (_core.CmaEs, {"mean": np.full(w.n_x, 0.5), "step": 0.2, "population": 6, "unit": unit}),
+        "CmaEs.ask": (search.ask, {}),
+        "CmaEs.tell": (search.tell, {"points": search.ask(), "values": np.arange(6.0)}),
+        "Family.places": (w.family.places, {"parameters": w.gains}),
+        "Family.at": (w.family.at, {"places": w.gains}),
     }
 
 

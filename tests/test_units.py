@@ -188,7 +188,7 @@ TANKS = {
     "pressure in fine units": Units([2.0**17, 1.0]),
     "pressure in coarse units": Units([2.0**-14, 1.0]),
     "heat in fine units": Units([1.0, 2.0**12]),
-    "all at once": Units([2.0**-11, 1.0], command=2.0**8, time=2.0**-8),
+    "all at once": Units([2.0**-11, 2.0**13], command=2.0**8, time=2.0**-8),
 }
 
 

@@ -8,6 +8,9 @@ use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
 use crate::rng::Name;
 
+/// More points of a generation than this are refused.
+const MOST_POINTS: usize = 1_000_000;
+
 /// A search for the least value of a function as a value: ask for points, judge them, tell.
 #[pyclass(frozen, name = "CmaEs", module = "twinloop._core")]
 pub struct PyCmaEs(CmaEs);
@@ -16,6 +19,11 @@ pub struct PyCmaEs(CmaEs);
 impl PyCmaEs {
     #[new]
     fn new(mean: Vector<'_>, step: f64, population: usize, unit: Name) -> Result<Self> {
+        if population > MOST_POINTS {
+            return Err(misuse(format!(
+                "CMA-ES: expected at most {MOST_POINTS} points of a generation, found {population}"
+            )));
+        }
         Ok(Self(CmaEs::new(&vector(&mean), step, population, unit.unit()?)?))
     }
 
@@ -65,6 +73,12 @@ pub fn eigen<'py>(
     if order != columns {
         return Err(misuse(format!("eigen: expected a square matrix, found {order} × {columns}")));
     }
-    let found = twinloop_core::Eigen::new(&rows("eigen", &matrix, order)?.concat(), order);
+    let numbers = rows("eigen", &matrix, order)?.concat();
+    if numbers.is_empty() || !numbers.iter().all(|x| x.is_finite()) {
+        return Err(misuse(
+            "eigen: expected finite numbers, at least one, found NaN, an infinite one or none".into(),
+        ));
+    }
+    let found = twinloop_core::Eigen::new(&numbers, order);
     Ok((to_vector(py, found.values), to_matrix(py, order, found.vectors)))
 }

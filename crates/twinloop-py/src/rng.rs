@@ -20,6 +20,10 @@ impl Name {
     }
 }
 
+/// More numbers at once, or axes of an array, than these are refused.
+const MOST_DRAWN: usize = 1 << 32;
+const MOST_AXES: usize = 32;
+
 /// The random numbers of one unit of work, one after another.
 #[pyclass(frozen, name = "Stream", module = "twinloop._core")]
 pub struct PyStream(Mutex<Stream>);
@@ -80,6 +84,12 @@ impl PyStream {
         shape: &[usize],
         draw: impl Fn(&mut Stream) -> f64,
     ) -> Result<Bound<'py, PyArrayDyn<f64>>> {
+        let count = shape.iter().try_fold(1_usize, |count, &length| count.checked_mul(length));
+        if shape.len() > MOST_AXES || !count.is_some_and(|count| count <= MOST_DRAWN) {
+            return Err(misuse(format!(
+                "stream: expected at most {MOST_AXES} axes and {MOST_DRAWN} numbers, found the shape {shape:?}"
+            )));
+        }
         let drawn = self.drawn(|stream| ArrayD::from_shape_simple_fn(shape, || draw(stream)))?;
         Ok(drawn.into_pyarray(py))
     }
