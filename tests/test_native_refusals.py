@@ -417,6 +417,10 @@ def restored(world):
     shape = {"inputs": w.n_x + w.n_u, "outputs": w.n_x, "registers": 2 * w.n_x + w.n_u}
     return {
         **drawn(w),
+        "replay": (
+            _core.replay,
+            {"dynamics": w.model, "initial": w.start, "commands": w.commands, "signals": w.signals},
+        ),
         "Quality.recorded": (
             w.quality.recorded,
             {"signals": w.signals, "target": w.target, "states": w.states, "commands": w.commands},
@@ -610,6 +614,8 @@ def test_hostile_arguments_are_refused_or_answered_but_never_a_panic(name):
         ("Flights", "steps"),
         ("Archive", "columns"),
         ("Workers", "threads"),
+        ("CmaEs", "population"),
+        ("k_step", "steps"),
         ("Regression", "states"),
         ("Family.state_feedback", "outputs"),
     ],
