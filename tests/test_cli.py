@@ -307,6 +307,17 @@ def test_a_failure_exits_with_its_code_and_one_line(monkeypatch, failure, code):
     assert re.fullmatch(r"twinloop: [^\n]+", done.stderr.strip())  # click ends the line of a ^C first
 
 
+def test_where_no_controller_is_fit_to_fly_it_is_said_and_the_command_exits_with_1(monkeypatch):
+    def none(campaign):
+        _ = campaign.twin
+        raise twinloop.NotAvailable("No controller to fly: every flight tumbled.")
+
+    monkeypatch.setattr("twinloop.campaign.Campaign.best_test", property(none))
+    done = invoke(*QUICK, "--experiments", "1")
+    assert done.exit_code == 1 and "NO CONTROLLER TO FLY\nevery flight tumbled." in done.stdout
+    assert "CONTROLLER TO FLY: TEST" not in done.stdout and "Controller: none to fly" in done.stdout
+
+
 TINY = [*PAPER, "--generations", "2", "--experiments", "1"]
 
 

@@ -251,6 +251,27 @@ def test_where_all_flights_diverged_there_is_no_controller_to_fly():
     assert "known to fly" not in campaign.ask().reason
 
 
+def test_attached_failed_and_abandoned_flights_are_in_the_store(tmp_path):
+    pytest.importorskip("sqlalchemy")
+    campaign = new(store=tmp_path / "campaign.db")
+    first = campaign.test(GAINS)
+    campaign.tell(first, PLANT.run(first))
+    campaign.attach(by_hand(25))
+    failed, left = campaign.ask(), campaign.ask()
+    campaign.tell_failed(failed, "the motor cut out", partial=cut(PLANT.run(failed), 5))
+    campaign.abandon(left)
+    asked = campaign.ask(last=True)
+    campaign.close()
+    again = tl.Campaign.load(tmp_path / "campaign.db", threads=1)
+    assert [again.status(test) for test in (first, failed, left, asked)] == [
+        "flown", "failed", "abandoned", "asked"
+    ]  # fmt: skip
+    assert [run.number for run in again.experiments] == [0, None, failed.number]
+    assert again.failures[0].reason == "the motor cut out" and again.failures[0].recorded
+    assert same_bits(again.best_test.genes, campaign.best_test.genes)
+    again.close()
+
+
 # Regulation
 
 

@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
@@ -22,7 +23,7 @@ from rich.progress import (
 )
 
 from twinloop.campaign import available_threads
-from twinloop.errors import TwinloopError
+from twinloop.errors import RemarkWarning, TwinloopError
 from twinloop.exam import campaigns
 from twinloop.exam.campaigns import Measured
 from twinloop.exam.held_out import HeldOut
@@ -104,6 +105,7 @@ def _as_a_worker() -> None:
     Nor does a worker outlive the main process, however that ends: it would go on writing into the store.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    warnings.simplefilter("ignore", RemarkWarning)  # what is remarked of twins by the hundred is no news here
     threading.Thread(target=_end_with_the_main_process, daemon=True).start()
 
 
