@@ -20,7 +20,7 @@ from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.exports.export import asked, delivered, exported_controller
 from twinloop.history import Experiment, Failure, Iteration, Lesson, Progress
-from twinloop.keeping import Keeping, look
+from twinloop.keeping import Keeping, heading, look
 from twinloop.law.law import Law
 from twinloop.linear.margins import Margins, margins_of
 from twinloop.logbook import Logbook
@@ -300,13 +300,15 @@ class Campaign(Recorded, kind="campaign"):
             NotAvailable: the packages of the extra `store` are missing.
             StoreFailure: somebody else writes the campaign, or the store cannot be read.
         """
-        kept = look(where, name, read_only)
         campaign = object.__new__(cls)
-        campaign._begin(Setup.from_record(kept.setup), threads, progress)
         if read_only:
+            kept = look(where, name, read_only)
+            campaign._begin(Setup.from_record(kept.setup), threads, progress)
             campaign._recall(kept)
         else:
-            campaign._open(where, kept.name)
+            known, setup = heading(where, name)
+            campaign._begin(Setup.from_record(setup), threads, progress)
+            campaign._open(where, known)
         return campaign
 
     @property

@@ -5,8 +5,9 @@ from __future__ import annotations
 import platform
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from twinloop.logbook import Logbook
 from twinloop.methods import Method
 from twinloop.records import Record, Recorded
 from twinloop.setup import Setup
-from twinloop.store import Keeper, Kept, found, kept, opened
+from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened
+
+Answer = TypeVar("Answer")
 
 SECONDS = 30.0
 """Between two checkpoints of a search that is under way, at most."""
@@ -160,9 +163,33 @@ def look(where: str | Path, name: str | None, read_only: bool) -> Kept:
         NotAvailable: the packages of the extra `store` are missing.
         StoreFailure: the store cannot be read.
     """
+    return _of_store(where, name, read_only, found)
+
+
+def heading(where: str | Path, name: str | None) -> tuple[str, Record]:
+    """Name and setup of a campaign that is to be written on; the rest is read once nobody else can write it.
+
+    Args:
+        where: a file, or the address of a server.
+        name: of the campaign; None: the only one.
+
+    Returns:
+        Both.
+
+    Raises:
+        InvalidInput: no store, or no such campaign in it.
+        NotAvailable: the packages of the extra `store` are missing.
+        StoreFailure: the store cannot be read.
+    """
+    return _of_store(where, name, False, begun)
+
+
+def _of_store(
+    where: str | Path, name: str | None, read_only: bool, wanted: Callable[[Store, str | None], Answer | None]
+) -> Answer:
     store = opened(where, read_only=read_only)
     try:
-        answer, names = found(store, name), [row["name"] for row in kept(store)]
+        answer, names = wanted(store, name), [row["name"] for row in kept(store)]
     finally:
         store.close()
     if answer is None and name is not None and names:

@@ -1,6 +1,6 @@
 """The durable store: campaigns in a database, so that nothing that was told is ever lost."""
 
 from twinloop.store.database import Store, opened
-from twinloop.store.keeper import Keeper, Kept, found, kept
+from twinloop.store.keeper import Keeper, Kept, begun, found, kept
 
-__all__ = ["Keeper", "Kept", "Store", "found", "kept", "opened"]
+__all__ = ["Keeper", "Kept", "Store", "begun", "found", "kept", "opened"]

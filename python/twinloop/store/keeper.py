@@ -140,6 +140,30 @@ def _only_name(connection: Connection, store: Store) -> str:
     return str(names[0]) if names else ""
 
 
+def begun(store: Store, name: str | None) -> tuple[str, Record] | None:
+    """Name and setup of a campaign, without what was told.
+
+    Args:
+        store: open.
+        name: of the campaign; None: the only one.
+
+    Returns:
+        Both; None where there is no such campaign.
+
+    Raises:
+        InvalidInput: no name and several campaigns.
+    """
+    from sqlalchemy import select
+
+    from twinloop.store.schema import campaigns
+
+    with store.transaction() as connection:
+        name = _only_name(connection, store) if name is None else name
+        of_this = campaigns.c.name == name
+        setup = connection.execute(select(campaigns.c.setup).where(of_this)).scalar()
+    return None if setup is None else (name, from_text(setup, f"Store {store.name}, campaign {name}"))
+
+
 class Keeper:
     """The only writer of a campaign.
 
