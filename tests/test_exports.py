@@ -20,7 +20,7 @@ from twinloop.exports.c_source import c_source
 from twinloop.exports.checks import c_controller, c_simulation, python_controller, python_simulation
 from twinloop.exports.controller_source import controller_c, controller_python
 from twinloop.exports.python_source import python_source
-from twinloop.noise import Noise
+from twinloop.noise import LastingDisturbance, Noise
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 
@@ -230,7 +230,9 @@ def test_latex_says_what_the_equations_say():
 def test_a_twin_comes_back_in_another_process_with_the_same_numbers(tmp_path):
     errors = [TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)]
     lone = TWINS["actuators and hidden states"]()
-    noise = Noise(np.array([1e-3, 5e-3]), np.array([0.0, 1e-3]), (((1, 0), True, 0.1, 0.3),), 0.05)
+    noise = Noise(
+        np.array([1e-3, 5e-3]), np.array([0.0, 1e-3]), (LastingDisturbance((1, 0), True, 0.1, 0.3),), 0.05
+    )
     twin = tl.Twin(
         lone.model, SIGNALS, errors, members=[lone.model], noise=noise, seed=3, inflation=1.5,
         offsets=lone.offsets, flights=lone.flights,

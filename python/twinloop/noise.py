@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,22 @@ from twinloop.elementary import exp
 from twinloop.records import Recorded
 
 
+class LastingDisturbance(NamedTuple):
+    """What drives states beside the commands and is forgotten slowly, such as gusts.
+
+    Args:
+        states: that it drives: the first one, then its integral, and so on.
+        integrated: whether it is a derivative of the first one, and not what is added to it in a period.
+        sd: its standard deviation, in the unit of the first state, a second where it is a derivative.
+        memory: time after which it is forgotten to 1/e, s.
+    """
+
+    states: tuple[int, ...]
+    integrated: bool
+    sd: float
+    memory: float
+
+
 @dataclass(frozen=True, eq=False)
 class Noise(Recorded, kind="noise"):
     """What a twin does not predict.
@@ -19,14 +36,13 @@ class Noise(Recorded, kind="noise"):
     Args:
         sensors: standard deviation of each state's sensor (n_x,), in its unit.
         moves: standard deviation of what a white disturbance adds to each state in a period (n_x,), in its unit.
-        gusts: lasting disturbances: the states that each drives, whether as a derivative, its standard deviation, and
-            the time in s after which it is forgotten to 1/e.
+        lasting: disturbances that last.
         dt: period, s.
     """
 
     sensors: Floats
     moves: Floats
-    gusts: tuple[tuple[tuple[int, ...], bool, float, float], ...] = ()
+    lasting: tuple[LastingDisturbance, ...] = ()
     dt: float = 1.0
 
     def drawn(self, draws: int, steps: int, stream: _core.Stream) -> tuple[Floats, Floats]:
@@ -37,7 +53,7 @@ class Noise(Recorded, kind="noise"):
     def disturbance(self, draws: int, steps: int, stream: _core.Stream) -> Floats:
         """Draws of what disturbances add to the states (draws, steps, n_x)."""
         added = self.moves * stream.normals(draws, steps, len(self.moves))
-        for states, integrated, size, memory in self.gusts:
+        for states, integrated, size, memory in self.lasting:
             kept = float(exp(-self.dt / memory))
             fresh = stream.normals(draws, steps)
             gust = np.empty((draws, steps))

@@ -240,7 +240,7 @@ def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[s
     # By exact readings none is told: the least that is believed was held.
     if twin.noise is None or exact(lesson.misfit):
         return []
-    lasting = {states[0]: (size, memory) for states, _, size, memory in twin.noise.gusts}
+    lasting = {each.states[0]: (each.sd, each.memory) for each in twin.noise.lasting}
     found: list[dict[str, object]] = []
     for i, (state, white) in enumerate(zip(campaign.signals.states, twin.noise.moves.tolist(), strict=True)):
         size, memory = lasting.get(i, (0.0, 0.0))

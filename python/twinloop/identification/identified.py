@@ -14,7 +14,7 @@ from twinloop.identification.noise import exact
 from twinloop.identification.pool import Pool
 from twinloop.identification.structure import Sum
 from twinloop.law.actuation import Actuation
-from twinloop.noise import Noise
+from twinloop.noise import LastingDisturbance, Noise
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -110,12 +110,14 @@ class Identified(Recorded, kind="identified"):
         for chain in self.chains:
             period = signals.dt if chain.integrated else 1.0
             moves[chain.states[0]] = np.sqrt(chain.motion[0] * period)
-        gusts = [
-            (chain.states, chain.integrated, float(np.sqrt(chain.motion[1])), chain.motion[2])
+        lasting = [
+            LastingDisturbance(
+                tuple(chain.states), chain.integrated, float(np.sqrt(chain.motion[1])), chain.motion[2]
+            )
             for chain in self.chains
             if chain.motion[1] > 0.0
         ]
-        return Noise(self.sensors(signals.n_x), moves, tuple(gusts), signals.dt)
+        return Noise(self.sensors(signals.n_x), moves, tuple(lasting), signals.dt)
 
     def sensors(self, n_x: int) -> Floats:
         """Standard deviation of each state's sensor (n_x,)."""
