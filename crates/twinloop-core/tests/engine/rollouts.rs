@@ -1,13 +1,15 @@
 //! Roll-outs: closed loops side by side.
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Controller, Form, Frame, Influences, Model, Periods, Program, Task, Trajectory, Width,
-    final_distances, record,
+    Code, Controller, Family, ForeignController, ForeignLaw, Form, Frame, Influences, Model, Periods,
+    Program, Task, Trajectory, Width, final_distances, record, replay,
 };
 
 use crate::oracle::{Pids, all_same, close, run, step};
-use crate::worlds::{STATES, World, any_model, gains, one_worker, state};
+use crate::worlds::{GAINS, STATES, World, any_model, free, gains, one_worker, state};
 
 fn slices(rows: &[Vec<f64>]) -> Vec<&[f64]> {
     rows.iter().map(|row| &row[..]).collect()
@@ -58,6 +60,32 @@ impl Setting {
     }
 }
 
+/// A family as something outside of the engine would fly it: one controller at a time.
+#[derive(Debug)]
+struct Outside(Arc<Family>);
+
+impl ForeignLaw for Outside {
+    fn gains(&self) -> usize {
+        GAINS
+    }
+
+    fn start(&self, gains: &[f64]) -> Box<dyn ForeignController> {
+        Box::new(One(Controller::new(self.0.clone(), gains.to_vec()).unwrap()))
+    }
+}
+
+struct One(Controller);
+
+impl ForeignController for One {
+    fn reset(&mut self) {
+        self.0.reset();
+    }
+
+    fn command(&mut self, state: &[f64], target: &[f64], command: &mut [f64]) {
+        command.copy_from_slice(&self.0.command(state, target).unwrap());
+    }
+}
+
 /// Adds a constant of its own to the first state of each lane: the command that its gain asks for, and nothing else.
 fn drift() -> Program {
     "program inputs=5 outputs=3 registers=8\npage 1\nr5 = r3 * 0.5\n".parse().unwrap()
@@ -97,6 +125,42 @@ proptest! {
                 prop_assert_eq!(found.measured.len(), found.states.len());
                 prop_assert_eq!(found.commands.len(), steps * 2);
             }
+        }
+    }
+
+    #[test]
+    fn a_run_under_recorded_commands_is_the_run_that_they_were_recorded_of(
+        (form, program) in any_model(),
+        ends in [state(), state()],
+        gains in gains(),
+        steps in 1..25_usize,
+    ) {
+        let setting = Setting::new(form, program, ends, steps, 10.0);
+        let run = setting.record(&[gains], &[]).remove(0);
+        let model = Model { code: &setting.code, frame: &setting.frame };
+        let sent = run.commands.len() / 2;
+        let again = replay(&model, &setting.task.initial, &run.commands, sent, &setting.limits);
+        prop_assert_eq!(again.lasted, run.lasted.min(sent));
+        prop_assert!(all_same(&again.states, &run.states));
+    }
+
+    #[test]
+    fn a_law_outside_of_the_engine_flies_as_one_inside_does(
+        (form, program) in any_model(),
+        ends in [state(), state()],
+        gains in prop::collection::vec(gains(), 1..12),
+    ) {
+        let mut setting = Setting::new(form, program, ends, 12, 10.0);
+        let inside = setting.record(&gains, &[]);
+        let bounds = setting.world.signals.command_bounds.clone();
+        let law = Arc::new(Outside(setting.world.family.clone()));
+        let family = Family::foreign(law, vec![free(-1.0, 5.0); GAINS], STATES, bounds).unwrap();
+        setting.world.family = Arc::new(family);
+        for (found, expected) in setting.record(&gains, &[]).iter().zip(&inside) {
+            prop_assert_eq!(found.lasted, expected.lasted);
+            let lasted = expected.lasted;
+            prop_assert!(all_same(&found.states[..(lasted + 1) * STATES], &expected.states[..(lasted + 1) * STATES]));
+            prop_assert!(all_same(&found.commands[..lasted * 2], &expected.commands[..lasted * 2]));
         }
     }
 
@@ -230,7 +294,8 @@ fn noise_is_what_the_controller_reads_and_never_what_the_system_does() {
 fn tasks_that_no_run_can_have_are_refused() {
     let refusal =
         |initial: Vec<f64>, target, steps| Task::new(initial, target, steps).unwrap_err().to_string();
-    assert!(refusal(vec![0.0], vec![0.0; 2], 1).contains("found 1 and 2"));
+    assert!(refusal(vec![0.0], vec![0.0; 3], 1).contains("found 3 and 1"));
+    assert!(refusal(vec![0.0; 2], vec![0.0; 4], 2).contains("for each of 3 states, found 4 and 2"));
     assert!(refusal(vec![], vec![], 1).contains("found 0 and 0"));
     assert!(refusal(vec![f64::NAN], vec![0.0], 1).contains("finite states"));
     assert!(refusal(vec![0.0], vec![f64::INFINITY], 1).contains("finite states"));
@@ -238,4 +303,7 @@ fn tasks_that_no_run_can_have_are_refused() {
     assert!(refusal(vec![0.0], vec![1.0], Task::MOST_STEPS + 1).contains("found 10000001"));
     let task = Task::new(vec![1.0, 2.0], vec![4.0, -2.0], 1).unwrap();
     assert_eq!(task.distance(&Periods::default()), 5.0);
+    // Of a reference the last row counts.
+    let rows = vec![9.0, 9.0, 4.0, -2.0];
+    assert_eq!(Task::new(vec![1.0, 2.0], rows, 1).unwrap().distance(&Periods::default()), 5.0);
 }

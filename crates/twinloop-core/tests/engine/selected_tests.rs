@@ -28,13 +28,14 @@ fn a_further_test_makes_a_new_value() {
 #[test]
 fn recordings_that_do_not_fit_are_refused() {
     type Spoil = fn(&mut Experiment);
-    let table: [(Spoil, &str); 13] = [
+    let table: [(Spoil, &str); 14] = [
         (|e| (e.commands, e.states) = (vec![], vec![0.0; STATES]), "n ≥ 1 steps"),
         (|e| e.commands.truncate(5), "n × 2 commands, found 12 and 5 numbers"),
         (|e| e.states.truncate(11), "found 11 and 6 numbers"),
         (|e| e.states.extend([0.0; STATES]), "found 15 and 6 numbers"),
-        (|e| e.parameters.push(0.0), "expected 6 parameters and a target of 3 states, found 7 and 3"),
+        (|e| e.parameters.push(0.0), "expected 6 parameters and a target of 3 states, or a row"),
         (|e| e.target.truncate(2), "found 6 and 2"),
+        (|e| e.target = vec![0.0; 3 * STATES], "found 6 and 9"),
         (|e| e.excitation.truncate(5), "at least the 3 recorded steps, found 5 numbers"),
         (|e| e.excitation.truncate(4), "at least the 3 recorded steps, found 4 numbers"),
         (|e| e.excitation[2] = f64::NAN, "cut the bad samples"),
