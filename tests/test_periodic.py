@@ -17,7 +17,7 @@ from twinloop.identification.identify import identify_runs
 from twinloop.identification.libraries import LIBRARIES, rungs
 from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.objectives import frozen_error, selected_tests
+from twinloop.objectives import closed_loop, frozen_error, open_loop, selected_tests
 from twinloop.presets import options_of
 from twinloop.test import final_distance
 from twinloop.trajectory import check_recorded, continued
@@ -162,7 +162,7 @@ def test_errors_of_models_do_not_see_how_a_record_was_wrapped(seed):
     for states in (truth, shifted):
         record = tl.Trajectory(0.05 * np.arange(25), states, commands)
         selected = selected_tests([test], [record])
-        errors = [of(pendulums(SIGNALS), selected, WORKERS) for of in (_core.open_loop, _core.closed_loop)]
+        errors = [of(pendulums(SIGNALS), selected, WORKERS) for of in (open_loop, closed_loop)]
         whole = continued(check_recorded(record, SIGNALS, 24, 10.0), SIGNALS, test.initial_state)
         assert same_bits(whole.states, truth)
         found.append([*errors, frozen_error(whole, SIGNALS), final_distance(states[-1], [1.0, 0.0], SIGNALS)])

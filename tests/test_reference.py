@@ -12,7 +12,7 @@ from twinloop import _core, flights
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
 from twinloop.flight import fly, fly_commands
-from twinloop.objectives import selected_tests
+from twinloop.objectives import closed_loop, selected_tests
 from twinloop.planning.quality import quality_of
 from twinloop.test import final_distance
 
@@ -101,14 +101,14 @@ def test_models_are_judged_on_tests_with_and_without_a_reference_side_by_side(fa
     runs = [fly(model, test) for test in tests]
     # The last one was cut: of its reference only the first rows were flown.
     runs[2] = tl.Trajectory(runs[2].t[:15], runs[2].states[:15], runs[2].commands[:14], "aborted", "by hand")
-    together = _core.closed_loop([model], selected_tests(tests, runs), WORKERS)
+    together = closed_loop([model], selected_tests(tests, runs), WORKERS)
     alone = [
-        _core.closed_loop([model], selected_tests([t], [r]), WORKERS)[0, 0]
+        closed_loop([model], selected_tests([t], [r]), WORKERS)[0, 0]
         for t, r in zip(tests, runs, strict=True)
     ]
     assert same_bits(together[0], alone) and together.max() == 0.0
     other = led(family, 0.5 * ROWS)
-    assert _core.closed_loop([model], selected_tests([other], [runs[1]]), WORKERS)[0, 0] > 1e-3
+    assert closed_loop([model], selected_tests([other], [runs[1]]), WORKERS)[0, 0] > 1e-3
 
 
 @pytest.mark.parametrize("preset", ["paper", "default"])
