@@ -85,7 +85,7 @@ impl PyStream {
         draw: impl Fn(&mut Stream) -> f64,
     ) -> Result<Bound<'py, PyArrayDyn<f64>>> {
         let count = shape.iter().try_fold(1_usize, |count, &length| count.checked_mul(length));
-        if shape.len() > MOST_AXES || !count.is_some_and(|count| count <= MOST_DRAWN) {
+        if shape.len() > MOST_AXES || count.is_none_or(|count| count > MOST_DRAWN) {
             return Err(misuse(format!(
                 "stream: expected at most {MOST_AXES} axes and {MOST_DRAWN} numbers, found the shape {shape:?}"
             )));

@@ -270,7 +270,10 @@ fn misuse_is_refused_with_advice() {
     let search = start(world_grammar(), FORM, variation(), &one).unwrap();
     assert!(refusal(search.clone().learn(&none, &one_worker())).contains("found none; tell one first"));
     let error = refusal(search.advance(&two, 1, &one_worker()));
-    assert!(error.contains("the 1 tests") && error.contains("found 2; call learn first"), "{error}");
+    assert!(
+        error.contains("the 1 tests") && error.contains("found 2, or others; call learn first"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -278,7 +281,7 @@ fn variations_that_make_no_generation_are_refused() {
     assert!(variation().validated().is_ok());
     type Spoil = fn(&mut Variation);
     let table: [(Spoil, &str); 11] = [
-        (|v| v.population = 1, "population of 2 or more"),
+        (|v| v.population = 1, "population of 2 to 10000000"),
         (|v| v.archive_cap = 0, "archive of 1 or more"),
         (|v| v.mutation_share = -0.1, "shares between 0 and 1"),
         (|v| v.mutation_share = f64::NAN, "shares between 0 and 1"),
