@@ -82,7 +82,7 @@ def test_kinematics_are_among_the_equations():
     )
     program = _core.Program.parse(program_text(7, 3, 12, [["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"]]))
     model = tl.Twin(_core.Model(program, "acceleration", body.engine), body)
-    for pitch in (0.4, math.pi / 2 - 1e-5):
+    for pitch in (0.4, -1.1):
         state = np.array([0.3, pitch, -0.2, 0.5, -0.7, 0.9])
         found = model.linearise(state, [0.3], discrete=True)
         expected = differences(lambda x: model.predict(x, [0.3]), state, 1e-7)

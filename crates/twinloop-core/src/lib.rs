@@ -3,6 +3,7 @@
 
 mod actuators;
 mod any_dynamics;
+mod attitude;
 mod cmaes;
 mod controller;
 mod difference;

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::str::FromStr;
 
 use crate::actuators::{Actuation, Line};
+use crate::attitude::{angles, quaternion, turning};
 use crate::difference::Periods;
 use crate::dynamics::{Dynamics, step_apart};
 use crate::error::{Error, Result, invalid};
@@ -65,8 +66,8 @@ impl FromStr for Form {
 enum Slope {
     State(usize),
     Output(usize),
-    /// The turning of one of the three angles of the rigid body.
-    Turn(usize),
+    /// An angle of the rigid body, which goes on as a quaternion.
+    Turn,
 }
 
 /// How the outputs of programs become dynamics; shared by all models of a search.
@@ -92,10 +93,7 @@ impl Frame {
         let slopes = (0..signals.states()).map(|state| {
             match signals.derivative_of.iter().position(|&of| of == Some(state)) {
                 Some(rate) => Slope::State(rate),
-                None if signals.is_given(state) => {
-                    let body = signals.kinematics.expect("a given state that is no integral");
-                    Slope::Turn(body.angles.iter().position(|&angle| angle == state).expect("an angle of it"))
-                }
+                None if signals.is_given(state) => Slope::Turn,
                 None => Slope::Output(outputs.next().expect("endless")),
             }
         });
@@ -198,7 +196,7 @@ impl<'a> Model<'a> {
         state: &mut [V],
         command: &[V],
     ) {
-        let ModelWorkspace { bank, stages, line } = workspace;
+        let ModelWorkspace { bank, stages, line, turned, seen } = workspace;
         let effects = match line {
             None => [command; 3],
             Some(line) => [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]],
@@ -212,8 +210,19 @@ impl<'a> Model<'a> {
                 }
             }
             Form::Acceleration => {
-                let held = Held { model: self, bank, effects, stage: 0 };
-                rk4(state, self.frame.dt, stages, held);
+                let body = self.frame.body.as_ref();
+                let before = body.map(|body| body.angles.map(|angle| state[angle]));
+                if let Some(before) = before {
+                    turned[..state.len()].copy_from_slice(state);
+                    turned[state.len()..].copy_from_slice(&quaternion(before));
+                }
+                let held = Held { model: self, bank, effects, stage: 0, before, seen };
+                rk4(if body.is_some() { turned } else { state }, self.frame.dt, stages, held);
+                if let (Some(body), Some(before)) = (body, before) {
+                    let (states, attitude) = turned.split_at(state.len());
+                    state.copy_from_slice(states);
+                    set_angles(state, body, attitude, before);
+                }
             }
         }
     }
@@ -271,17 +280,16 @@ pub struct ModelWorkspace<V: Vector> {
     stages: Stages<V>,
     /// What the actuators hold, where there are any.
     line: Option<Line<V>>,
+    /// Of a rigid body: the states and the quaternion of its angles behind them; the states of a stage.
+    turned: Vec<V>,
+    seen: Vec<V>,
 }
 
 impl<'a> Model<'a> {
     /// A workspace whose lanes are models of their own: constants of the code (each on lanes, in the code's order), and
     /// times of the actuation.
     pub(crate) fn variants<V: Vector>(&self, constants: &[V], times: &[V]) -> ModelWorkspace<V> {
-        ModelWorkspace {
-            bank: self.code.bank_of(constants),
-            stages: Stages::new(self.integrated()),
-            line: self.line(Some(times)),
-        }
+        self.workspace_of(self.code.bank_of(constants), self.line(Some(times)))
     }
 
     fn line<V: Vector>(&self, times: Option<&[V]>) -> Option<Line<V>> {
@@ -289,8 +297,12 @@ impl<'a> Model<'a> {
         (!actuation.is_direct()).then(|| Line::new(actuation, factors, *dt, times))
     }
 
-    fn integrated(&self) -> usize {
-        if self.frame.form == Form::Acceleration { self.frame.states() } else { 0 }
+    fn workspace_of<V: Vector>(&self, bank: Bank<V>, line: Option<Line<V>>) -> ModelWorkspace<V> {
+        let states = if self.frame.form == Form::Acceleration { self.frame.states() } else { 0 };
+        let body = if states > 0 && self.frame.body.is_some() { states } else { 0 };
+        let turned = vec![V::splat(0.0); if body > 0 { body + 4 } else { 0 }];
+        let (stages, seen) = (Stages::new(states.max(turned.len())), turned[..body].to_vec());
+        ModelWorkspace { bank, stages, line, turned, seen }
     }
 }
 
@@ -298,11 +310,7 @@ impl Dynamics for Model<'_> {
     type Workspace<V: Vector> = ModelWorkspace<V>;
 
     fn workspace<V: Vector>(&self) -> ModelWorkspace<V> {
-        ModelWorkspace {
-            bank: self.code.bank(),
-            stages: Stages::new(self.integrated()),
-            line: self.line(None),
-        }
+        self.workspace_of(self.code.bank(), self.line(None))
     }
 
     #[inline(always)]
@@ -325,44 +333,50 @@ struct Held<'a, V: Vector> {
     bank: &'a mut Bank<V>,
     effects: [&'a [V]; 3],
     stage: usize,
+    /// Angles of the rigid body, if there is one, at the start of the period.
+    before: Option<[V; 3]>,
+    seen: &'a mut [V],
 }
 
 /// Which of the three effects each stage of the integrator sees.
 const STAGES: [usize; 4] = [0, 1, 1, 2];
 
 impl<V: Vector> Field<V> for Held<'_, V> {
+    /// Of the states, and of the quaternion of a rigid body's angles behind them.
     #[inline(always)]
     fn slope(&mut self, point: &[V], slope: &mut [V]) {
-        let outputs = self.model.outputs(self.bank, point, self.effects[STAGES[self.stage]]);
-        self.stage += 1;
         let frame = self.model.frame;
+        let (states, attitude) = point.split_at(frame.states());
+        let states = match (&frame.body, self.before) {
+            (Some(body), Some(before)) => {
+                self.seen.copy_from_slice(states);
+                set_angles(self.seen, body, attitude, before);
+                &*self.seen
+            }
+            _ => states,
+        };
+        let outputs = self.model.outputs(self.bank, states, self.effects[STAGES[self.stage]]);
+        self.stage += 1;
         for (slope, source) in slope.iter_mut().zip(&frame.slopes) {
             *slope = match *source {
-                Slope::State(rate) => point[rate],
+                Slope::State(rate) => states[rate],
                 Slope::Output(output) => outputs[output],
-                Slope::Turn(angle) => turn(frame.body.as_ref().expect("a body that turns"), angle, point),
+                Slope::Turn => V::splat(0.0),
             };
+        }
+        if let Some(body) = &frame.body {
+            let attitude = std::array::from_fn(|i| attitude[i]);
+            let rates = body.rates.map(|rate| states[rate]);
+            slope[states.len()..].copy_from_slice(&turning(attitude, rates));
         }
     }
 }
 
-/// cos of the pitch at which Euler's angles are taken to have no more meaning.
-const GIMBAL: f64 = 1e-3;
-
-/// Derivative of roll, pitch or yaw under body rates (z-y-x angles; Diebel 2006, equation 79).
+/// Writes the angles of a quaternion into the states of a rigid body.
 #[inline(always)]
-fn turn<V: Vector>(body: &RigidBody, angle: usize, point: &[V]) -> V {
-    let [roll, pitch, _] = body.angles.map(|state| point[state]);
-    let [p, q, r] = body.rates.map(|state| point[state]);
-    let (sin, cos) = (roll.map(libm::sin), roll.map(libm::cos));
-    let yawing = q * sin + r * cos;
-    let cos_pitch = pitch.map(|pitch| {
-        let cos = libm::cos(pitch);
-        if cos.abs() < GIMBAL { GIMBAL.copysign(cos) } else { cos }
-    });
-    match angle {
-        0 => p + yawing * pitch.map(libm::sin) / cos_pitch,
-        1 => q * cos - r * sin,
-        _ => yawing / cos_pitch,
+fn set_angles<V: Vector>(state: &mut [V], body: &RigidBody, attitude: &[V], before: [V; 3]) {
+    let found = angles(std::array::from_fn(|i| attitude[i]), before);
+    for (&at, angle) in body.angles.iter().zip(found) {
+        state[at] = angle;
     }
 }

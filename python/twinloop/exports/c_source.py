@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from twinloop._core import __version__
-from twinloop.exports.python_source import equation_roots, joined
+from twinloop.exports.python_source import joined, stepped_roots
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Writer, decimal
+from twinloop.signals import RigidBody
 
 KEYWORDS = frozenset(
     """
@@ -146,7 +148,7 @@ def _outputs(law: Law, name: str, precision: str) -> str:
     prefix = "t"
     while any(symbol.startswith(prefix) and symbol[len(prefix) :].isdigit() for symbol in symbols):
         prefix += "_"
-    roots = equation_roots(law)
+    roots = stepped_roots(law)
     writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, dialect)
     needed = {
         int(law.expressions[number].value)
@@ -289,27 +291,105 @@ def _stepped(law: Law, name: str, precision: str, n_x: int) -> list[str]:
             "    }",
             "}",
         ]
+    body = law.signals.kinematics
+    size, begun, slopes = n_x, "x", f"{name}_outputs("
+    if body is not None:
+        size, begun, slopes = n_x + 4, "begun", f"{name}_slopes(before, "
+        lines = [
+            *_turned(law, name, precision, body),
+            *lines[:2],
+            f"    real seen[3][SEEN], first[{size}], begun[{size}], ended[{size}];",
+            f"    const real before[3] = {{{', '.join(f'x[{i}]' for i in _places(law, body.angles))}}};",
+            f"    {name}_effects(memory, u, seen);",
+            f"    for (int i = 0; i < {n_x}; ++i) {{",
+            "        begun[i] = x[i];",
+            "    }",
+            f"    {name}_quaternion(before, begun + {n_x});",
+        ]
     half, whole, sixth = (_number(law.signals.dt * share, precision) for share in (0.5, 1.0, 1.0 / 6.0))
+    target = "next" if body is None else "ended"
 
     def moved(slope: str, time: str) -> list[str]:
         return [
-            f"    for (int i = 0; i < {n_x}; ++i) {{",
-            f"        point[i] = x[i] + {time} * {slope}[i];",
+            f"    for (int i = 0; i < {size}; ++i) {{",
+            f"        point[i] = {begun}[i] + {time} * {slope}[i];",
             "    }",
         ]
 
-    return [
-        *lines,
-        f"    real second[{n_x}], third[{n_x}], fourth[{n_x}], point[{n_x}];",
-        f"    {name}_outputs(x, seen[0], first);",
+    lines += [
+        f"    real second[{size}], third[{size}], fourth[{size}], point[{size}];",
+        f"    {slopes}{begun}, seen[0], first);",
         *moved("first", half),
-        f"    {name}_outputs(point, seen[1], second);",
+        f"    {slopes}point, seen[1], second);",
         *moved("second", half),
-        f"    {name}_outputs(point, seen[1], third);",
+        f"    {slopes}point, seen[1], third);",
         *moved("third", whole),
-        f"    {name}_outputs(point, seen[2], fourth);",
-        f"    for (int i = 0; i < {n_x}; ++i) {{",
-        f"        next[i] = x[i] + {sixth} * (first[i] + 2 * second[i] + 2 * third[i] + fourth[i]);",
+        f"    {slopes}point, seen[2], fourth);",
+        f"    for (int i = 0; i < {size}; ++i) {{",
+        f"        {target}[i] = {begun}[i] + {sixth} * (first[i] + 2 * second[i] + 2 * third[i] + fourth[i]);",
         "    }",
+    ]
+    return [*lines, *([] if body is None else [f"    {name}_seen(before, ended, next);"]), "}"]
+
+
+def _places(law: Law, names: Sequence[str]) -> list[int]:
+    return [law.signals.state_names.index(name) for name in names]
+
+
+def _turned(law: Law, name: str, precision: str, body: RigidBody) -> list[str]:
+    """The attitude of a rigid body as a quaternion behind the states: no pitch is singular for it."""
+    f, n_x = "f" if precision == "float" else "", law.signals.n_x
+    pi, half = _number(math.pi, precision), _number(0.5, precision)
+    angles, rates = _places(law, body.angles), _places(law, body.rates)
+    return [
+        f"static void {name}_quaternion(const real angles[3], real q[4])",
+        "{",
+        *(
+            f"    const real s{i} = sin{f}({half} * angles[{i}]), c{i} = cos{f}({half} * angles[{i}]);"
+            for i in range(3)
+        ),
+        "    q[0] = c0 * c1 * c2 + s0 * s1 * s2;",
+        "    q[1] = s0 * c1 * c2 - c0 * s1 * s2;",
+        "    q[2] = c0 * s1 * c2 + s0 * c1 * s2;",
+        "    q[3] = c0 * c1 * s2 - s0 * s1 * c2;",
         "}",
+        "",
+        "/* The states of y, their angles those of the quaternion behind them, the nearest to what they were. */",
+        f"static void {name}_seen(const real before[3], const real y[{n_x + 4}], real x[{n_x}])",
+        "{",
+        f"    const real a = y[{n_x}], b = y[{n_x + 1}], c = y[{n_x + 2}], d = y[{n_x + 3}];",
+        "    const real across = 2 * (c * d + a * b), up = a * a - b * b - c * c + d * d;",
+        f"    real angles[3] = {{atan2{f}(across, up),",
+        f"        atan2{f}(-2 * (b * d - a * c), sqrt{f}(across * across + up * up)),",
+        f"        atan2{f}(2 * (b * c + a * d), a * a + b * b - c * c - d * d)}};",
+        f"    if (cos{f}(before[1]) < 0) {{",
+        f"        angles[0] += {pi};",
+        f"        angles[1] = {pi} - angles[1];",
+        f"        angles[2] += {pi};",
+        "    }",
+        "    for (int i = 0; i < 3; ++i) {",
+        f"        angles[i] += 2 * {pi} * rint{f}((before[i] - angles[i]) / (2 * {pi}));",
+        "    }",
+        f"    for (int i = 0; i < {n_x}; ++i) {{",
+        "        x[i] = y[i];",
+        "    }",
+        *(f"    x[{place}] = angles[{i}];" for i, place in enumerate(angles)),
+        "}",
+        "",
+        f"static void {name}_slopes(const real before[3], const real y[{n_x + 4}], const real u[SEEN],",
+        f"    real out[{n_x + 4}])",
+        "{",
+        f"    real x[{n_x}];",
+        f"    {name}_seen(before, y, x);",
+        f"    {name}_outputs(x, u, out);",
+        f"    const real a = y[{n_x}], b = y[{n_x + 1}], c = y[{n_x + 2}], d = y[{n_x + 3}];",
+        "    const real "
+        + ", ".join(f"{letter} = {half} * x[{place}]" for letter, place in zip("pqr", rates, strict=True))
+        + ";",
+        f"    out[{n_x}] = -(b * p + c * q + d * r);",
+        f"    out[{n_x + 1}] = a * p + c * r - d * q;",
+        f"    out[{n_x + 2}] = a * q - b * r + d * p;",
+        f"    out[{n_x + 3}] = a * r + b * q - c * p;",
+        "}",
+        "",
     ]

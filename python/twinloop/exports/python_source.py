@@ -149,20 +149,69 @@ def _step(x, start, middle, end):
     "acceleration": '''
 def _step(x, start, middle, end):
     """One Runge-Kutta step of order four."""
+    return _integrated(_outputs, x, start, middle, end)
+''',
+}
 
-    def along(slope, time):
-        return [value + time * rate for value, rate in zip(x, slope)]
+_INTEGRATED = """
+def _integrated(slope, x, start, middle, end):
+    def along(rates, time):
+        return [value + time * rate for value, rate in zip(x, rates)]
 
-    first = _outputs(x, start)
-    second = _outputs(along(first, 0.5 * DT), middle)
-    third = _outputs(along(second, 0.5 * DT), middle)
-    fourth = _outputs(along(third, DT), end)
+    first = slope(x, start)
+    second = slope(along(first, 0.5 * DT), middle)
+    third = slope(along(second, 0.5 * DT), middle)
+    fourth = slope(along(third, DT), end)
     return [
         value + DT / 6.0 * (a + 2.0 * b + 2.0 * c + d)
         for value, a, b, c, d in zip(x, first, second, third, fourth)
     ]
-''',
-}
+"""
+
+_TURNED = '''
+def _quaternion(roll, pitch, yaw):
+    (sr, sp, sy), (cr, cp, cy) = ([f(0.5 * angle) for angle in (roll, pitch, yaw)] for f in (_sin, _cos))
+    return [
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    ]
+
+
+def _angles(a, b, c, d, before):
+    """Roll, pitch and yaw, by whole turns the nearest to what they were."""
+    across, up = 2.0 * (c * d + a * b), a * a - b * b - c * c + d * d
+    roll = math.atan2(across, up)
+    pitch = math.atan2(-2.0 * (b * d - a * c), math.sqrt(across * across + up * up))
+    yaw = math.atan2(2.0 * (b * c + a * d), a * a + b * b - c * c - d * d)
+    if _cos(before[1]) < 0.0:
+        roll, pitch, yaw = roll + math.pi, math.pi - pitch, yaw + math.pi
+    turns = [(old - new) / math.tau for old, new in zip(before, (roll, pitch, yaw))]
+    return [
+        angle + math.tau * (round(turn) if math.isfinite(turn) else turn)
+        for angle, turn in zip((roll, pitch, yaw), turns)
+    ]
+
+
+def _step(x, start, middle, end):
+    """One Runge-Kutta step of order four; the attitude goes on as a quaternion, for which no pitch is singular."""
+    before = [x[i] for i in ANGLES]
+
+    def seen(y):
+        states = list(y[:-4])
+        for i, angle in zip(ANGLES, _angles(*y[-4:], before)):
+            states[i] = angle
+        return states
+
+    def slope(y, u):
+        states, (a, b, c, d) = seen(y), y[-4:]
+        p, q, r = (0.5 * states[i] for i in RATES)
+        turning = [-(b * p + c * q + d * r), a * p + c * r - d * q, a * q - b * r + d * p, a * r + b * q - c * p]
+        return [*_outputs(states, u), *turning]
+
+    return seen(_integrated(slope, [*x, *_quaternion(*before)], start, middle, end))
+'''
 
 
 def python_source(law: Law) -> str:
@@ -206,7 +255,17 @@ def python_source(law: Law) -> str:
         for name, offset in zip(signals.state_names, law.offsets, strict=True)
         if offset != 0.0
     ]
-    parts = ["\n".join(head) + "\n", _HELPERS, _outputs(law), _STEPS[law.form]]
+    steps = [_STEPS[law.form]]
+    if law.form == "acceleration":
+        body = signals.kinematics
+        if body is not None:
+            angles, rates = (
+                tuple(map(signals.state_names.index, names)) for names in (body.angles, body.rates)
+            )
+            head += [f"ANGLES = {angles!r}  # roll, pitch and yaw", f"RATES = {rates!r}  # of the body"]
+            steps = [_TURNED]
+        steps.insert(0, _INTEGRATED)
+    parts = ["\n".join(head) + "\n", _HELPERS, _outputs(law), *steps]
     return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE])
 
 
@@ -217,6 +276,22 @@ def equation_roots(law: Law) -> tuple[int, ...]:
         law: of a twin.
     """
     return law.derivatives() if law.form == "acceleration" else law.outputs
+
+
+def stepped_roots(law: Law) -> tuple[int, ...]:
+    """The same for a step, in which the angles of a rigid body go on as a quaternion: 0 stands for their derivatives.
+
+    Args:
+        law: of a twin.
+    """
+    body = law.signals.kinematics
+    if law.form != "acceleration" or body is None:
+        return equation_roots(law)
+    nothing = law.expressions.constant(0.0)
+    return tuple(
+        nothing if name in body.angles else node
+        for name, node in zip(law.signals.state_names, law.derivatives(), strict=True)
+    )
 
 
 def joined(terms: Sequence[Term], between: str) -> str:
@@ -233,7 +308,7 @@ def joined(terms: Sequence[Term], between: str) -> str:
 
 
 def _outputs(law: Law) -> str:
-    roots = equation_roots(law)
+    roots = stepped_roots(law)
     symbols = [f"{name}_" if name == "math" or name.startswith("_") else name for name in law.symbols]
     prefix = "t"
     while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in symbols):

@@ -87,6 +87,9 @@ class _Page:
         }
         units = ", ".join(f"{state.name} in {state.unit or 'units'}" for state in signals.states)
         lines = [f"Form {self.law.form!r}: {kinds[self.law.form]}; {units}."]
+        body = signals.kinematics if self.law.form == "acceleration" else None
+        if body is not None:
+            lines.append(f"{', '.join(body.angles)} go on as a quaternion, so that no pitch is singular")
         lines += [
             f"{state.name} wraps: the equations see it from {-0.5 * state.period:g} to {0.5 * state.period:g}"
             f" {state.unit}".rstrip()

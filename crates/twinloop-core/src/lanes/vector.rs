@@ -62,6 +62,16 @@ pub trait Vector:
         Self::load(&lanes)
     }
 
+    /// `f` of each lane and the same lane of another.
+    #[inline(always)]
+    fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let (mut lanes, mut others) = ([0.0; 64], [0.0; 64]);
+        self.store(&mut lanes);
+        other.store(&mut others);
+        lanes[..Self::LANES].iter_mut().zip(&others).for_each(|(lane, &other)| *lane = f(*lane, other));
+        Self::load(&lanes)
+    }
+
     /// The number in one lane.
     fn lane(self, l: usize) -> f64 {
         let mut lanes = [0.0; 64];
