@@ -15,7 +15,8 @@ class TestErrors(Recorded, kind="test_errors"):
         test: number of the test, None for a run that nobody asked for; a replicate has a row of its own.
         open_loop: mean squared error one step ahead, over steps and components, SI units squared.
         closed_loop: mean squared error of the free run under the test's own controller, or, for a run that nobody asked
-            for, under its recorded commands; the same units.
+            for, under its recorded commands; the same units; infinite where it
+            diverges.
         normalised: closed_loop over that of the model that never moves; 1 means useless.
         before: closed-loop error of the twin that the last `ask` before it knew; None if nothing was asked yet.
         after: closed-loop error now.

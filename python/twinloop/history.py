@@ -167,7 +167,7 @@ class Lesson(Recorded, kind="lesson"):
         hidden: states that commands fill: which commands, whether with their squares, the mean at rest in units of
             their scale (None: that of the first period), and the time in s after which 1/e is left.
         offsets: by how much later than those of the driven states each state's readings were taken from it, s.
-        closed_loop: of the best model, one for each selected test, SI units squared.
+        closed_loop: of the best model, one for each selected test, SI units squared; infinite where it diverges.
         normalised: closed_loop over that of the model that never moves.
         follows: whether the best model, flown by itself, follows at least half of the runs that it was learnt from; if
             not, nothing is planned on it.
