@@ -3,8 +3,8 @@
 import math
 
 import twinloop as tl
-from twinloop.result import summary
-from twinloop.text import render
+from twinloop.faces.result import summary
+from twinloop.faces.text import render
 
 signals = tl.Signals(
     states=[

@@ -4,7 +4,7 @@ import inspect
 import re
 from pathlib import Path
 
-import twinloop.snapshots  # the kinds that `import twinloop` does not bring along
+import twinloop.campaign.coevolution.snapshots  # the kinds that `import twinloop` does not bring along
 import twinloop.systems.rotorpy  # noqa: F401
 from twinloop.records import KINDS
 

@@ -8,7 +8,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
-from twinloop.presets import options_of, parsed
+from twinloop.campaign.presets import options_of, parsed
 
 STATE, COMMAND = tl.State("x", "m", 1.0), tl.Command("u", "V", (-1.0, 1.0))
 GAINS = {"x.kp": (0.0, 1.0), "x.ki": (0.0, 1.0), "x.kd": (0.0, 1.0)}

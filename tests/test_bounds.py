@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from twinloop import _core
-from twinloop.identification.bounds import bounded_solution
+from twinloop.identification.terms.bounds import bounded_solution
 
 QUIET = (0.0, 0.0, 1.0)
 

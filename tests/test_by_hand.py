@@ -14,8 +14,8 @@ import twinloop as tl
 from conftest import pendulum_step
 from test_looking import SIGNALS, SMALL
 from test_records import same
-from twinloop.campaign_file import _toml, read_file, template
-from twinloop.cli import main
+from twinloop.campaign.campaign_file import _toml, read_file, template
+from twinloop.faces.cli import main
 from twinloop.logs import write_columns
 
 PENDULUM = template("rig.db").partition("[options]")[0]

@@ -372,7 +372,7 @@ class StopAt:
 def test_an_interrupted_campaign_keeps_the_best_so_far_and_goes_on_with_the_same_bits(
     monkeypatch, new_campaign, pendulum, call
 ):
-    monkeypatch.setattr("twinloop.search.CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr("twinloop.campaign.coevolution.search.CHUNK_SECONDS", 0.0)
     campaign = new_campaign(progress=StopAt(call))
     with pytest.raises(KeyboardInterrupt):
         campaign.run(pendulum, 3)
@@ -394,7 +394,7 @@ def test_an_interrupted_campaign_keeps_the_best_so_far_and_goes_on_with_the_same
 def test_an_interrupted_iteration_is_in_the_history_with_the_generations_it_had(
     monkeypatch, new_campaign, pendulum
 ):
-    monkeypatch.setattr("twinloop.search.CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr("twinloop.campaign.coevolution.search.CHUNK_SECONDS", 0.0)
     campaign = new_campaign(progress=StopAt(5))
     with pytest.raises(KeyboardInterrupt):
         campaign.run(pendulum, 3)  # one experiment, then four generations
@@ -405,7 +405,7 @@ def test_an_interrupted_iteration_is_in_the_history_with_the_generations_it_had(
 
 
 def test_progress_says_where_the_campaign_is(monkeypatch, new_campaign, pendulum):
-    monkeypatch.setattr("twinloop.search.CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr("twinloop.campaign.coevolution.search.CHUNK_SECONDS", 0.0)
     seen = []
     campaign = new_campaign(progress=seen.append).run(pendulum, 2)
     phases = [p.phase for p in seen]
@@ -469,7 +469,7 @@ def test_settings_reach_the_engine(new_campaign, pendulum):
 
 
 def test_the_preset_paper_is_table_1(new_campaign):
-    from twinloop.presets import options_of
+    from twinloop.campaign.presets import options_of
 
     paper = options_of("paper")
     assert (paper.model_generations, paper.model_population) == (15_000, 250)

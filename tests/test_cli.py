@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import twinloop
-from twinloop.cli import main
+from twinloop.faces.cli import main
 
 PAPER = ["run", "quadrotor", "--preset", "paper"]
 SMALL = [*PAPER, "--generations", "30", "--experiments", "2", "--set", "model_population=40"]
@@ -360,7 +360,7 @@ def test_a_result_that_cannot_be_written_is_printed(monkeypatch, tmp_path):
     def full(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("twinloop.working.write_text", full)
+    monkeypatch.setattr("twinloop.faces.working.write_text", full)
     done = invoke(*TINY, "--json", "--output", str(tmp_path / "result.json"))
     assert done.exit_code == 1 and "No space left" in done.stderr
     assert len(json.loads(done.stdout)["experiments"]) == 1
@@ -401,7 +401,7 @@ def test_ctrl_c_and_sigterm_end_with_130_and_the_best_so_far(tmp_path, sent):
 
 @pytest.mark.parametrize("finished", [0, 1])
 def test_ctrl_c_under_default_shows_the_best_so_far_if_there_is_any(monkeypatch, finished):
-    learn, calls = twinloop.methods.identification.identify_runs, []
+    learn, calls = twinloop.campaign.identify_and_plan.method.identify_runs, []
 
     def interrupted(*arguments, **how):
         calls.append(1)
@@ -409,7 +409,7 @@ def test_ctrl_c_under_default_shows_the_best_so_far_if_there_is_any(monkeypatch,
             raise KeyboardInterrupt
         return learn(*arguments, **how)
 
-    monkeypatch.setattr("twinloop.methods.identification.identify_runs", interrupted)
+    monkeypatch.setattr("twinloop.campaign.identify_and_plan.method.identify_runs", interrupted)
     done = invoke(*QUICK, "--json")
     assert done.exit_code == 130
     if not finished:

@@ -9,9 +9,9 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
 from oracles import rk4, same_bits
 from twinloop.campaign import controller_to_fly
-from twinloop.logbook import _check_first_reading
-from twinloop.noise import Noise
-from twinloop.result import summary
+from twinloop.campaign.logbook import _check_first_reading
+from twinloop.faces.result import summary
+from twinloop.law.noise import Noise
 
 SMALL = {
     "moves": 1500, "starts": 1, "generations": 0, "lags": False, "evaluations": 256, "candidates": 32,

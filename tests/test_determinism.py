@@ -5,8 +5,8 @@ import pytest
 
 from oracles import same_bits
 from twinloop import _core
-from twinloop.presets import options_of
-from twinloop.search import start_models, start_tests
+from twinloop.campaign.coevolution.search import start_models, start_tests
+from twinloop.campaign.presets import options_of
 
 WORKERS = [_core.Workers(threads=threads) for threads in (1, 2, 16)]
 WORKERS += [_core.Workers(threads=2, width=width) for width in _core.vector_widths()]
@@ -145,7 +145,7 @@ def test_a_whole_campaign_depends_on_its_seed(new_campaign, pendulum):
 @pytest.mark.parametrize("seconds", [0.0, 1e9])
 def test_how_progress_is_cut_into_chunks_changes_no_bit(monkeypatch, new_campaign, pendulum, seconds):
     expected = outcome(new_campaign().run(pendulum, 3))
-    monkeypatch.setattr("twinloop.search.CHUNK_SECONDS", seconds)
+    monkeypatch.setattr("twinloop.campaign.coevolution.search.CHUNK_SECONDS", seconds)
     seen = []
     campaign = new_campaign(progress=seen.append).run(pendulum, 3)
     assert outcome(campaign) == expected

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import same_bits
 from twinloop import _core
-from twinloop.identification.chains import chains
-from twinloop.identification.directions import directions, terms_of, together, unequal
+from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.identification.structure import Sum
-from twinloop.presets import options_of
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.chains import chains
+from twinloop.identification.terms.directions import directions, terms_of, together, unequal
+from twinloop.identification.terms.pool import Pool
 
 WORKERS = _core.Workers()
 FAST = {

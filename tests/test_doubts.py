@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop.methods.doubts import distinct, doubts
+from twinloop.campaign.identify_and_plan.diagnostics import distinct, doubts
 
 DT, STEPS = 0.02, 200
 SIGNALS = tl.Signals(

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import twinloop as tl
 from twinloop import _core
-from twinloop.cli import main
+from twinloop.campaign.presets import options_of
 from twinloop.exam import bars, campaigns, held_out, kinds, least_squares, measures, operon, quality, study
 from twinloop.exam.integrals import regression
 from twinloop.exam.kinds import Campaigner, Fitter, Flyer, Optimum
@@ -25,9 +25,9 @@ from twinloop.exam.store import Address, Row, Store
 from twinloop.exam.systems import Subject, subject
 from twinloop.exam.tables import as_markdown, render, tables
 from twinloop.exam.tuning import score, tuned, variants
+from twinloop.faces.cli import main
 from twinloop.law.parsing import program_of
-from twinloop.models import Twin
-from twinloop.presets import options_of
+from twinloop.law.twin import Twin
 
 PAPER = for_smoke(LEARNERS["paper"])
 RANDOM = LEARNERS["random-gains"]

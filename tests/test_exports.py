@@ -14,13 +14,13 @@ import twinloop as tl
 from oracles import registers_of
 from strategies import program_text, programs
 from twinloop import _core
-from twinloop.accuracy import TestErrors
 from twinloop.errors import NotAvailable
-from twinloop.exports.c_source import c_source
-from twinloop.exports.checks import c_controller, c_simulation, python_controller, python_simulation
-from twinloop.exports.controller_source import controller_c, controller_python
-from twinloop.exports.python_source import python_source
-from twinloop.noise import LastingDisturbance, Noise
+from twinloop.law.accuracy import TestErrors
+from twinloop.law.exports.c_source import c_source
+from twinloop.law.exports.checks import c_controller, c_simulation, python_controller, python_simulation
+from twinloop.law.exports.controller_source import controller_c, controller_python
+from twinloop.law.exports.python_source import python_source
+from twinloop.law.noise import LastingDisturbance, Noise
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 

@@ -5,11 +5,11 @@ import pytest
 
 import twinloop as tl
 from twinloop import _core
-from twinloop.identification.formulas import bounded_term, fixed_term, parsed_term
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
 from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.terms.formulas import bounded_term, fixed_term, parsed_term
+from twinloop.identification.terms.pool import Pool
 
 SIGNALS = tl.Signals(
     states=[

@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import UNARY, operate, same_bits
 from twinloop import _core
-from twinloop.identification.chains import chains
-from twinloop.identification.fitting import Fitting
+from twinloop.campaign.presets import options_of
+from twinloop.identification.fit.fitting import Fitting
+from twinloop.identification.fit.parts import parts
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.libraries import LIBRARIES, rungs
-from twinloop.identification.parts import parts
-from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run, guessed_noise
+from twinloop.identification.search.structure import all_judged, prices
+from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
-from twinloop.identification.structure import all_judged, prices
+from twinloop.identification.terms.libraries import LIBRARIES, rungs
+from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation, Actuator
-from twinloop.presets import options_of
 
 WORKERS = _core.Workers()
 FAST = {

@@ -13,8 +13,8 @@ from oracles import Pid, same_bits
 from twinloop import _core
 from twinloop.contracts import check_controller
 from twinloop.controllers import PID, Cascade, Mixer, StateFeedback
-from twinloop.result import summary
-from twinloop.text import render
+from twinloop.faces.result import summary
+from twinloop.faces.text import render
 
 ANGLES = ("roll", "pitch", "yaw")
 SYSTEM = tl.systems.Quadrotor()

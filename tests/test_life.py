@@ -11,8 +11,8 @@ from conftest import PENDULUM_GAINS, pendulum_step
 from oracles import same_bits
 from test_looking import CONTROLLER, FULL_LIFE, SIGNALS, SMALL, lived, outcome
 from test_looking import new as begin
-from twinloop.result import summary, to_json
-from twinloop.text import render
+from twinloop.faces.result import summary, to_json
+from twinloop.faces.text import render
 
 GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
 PLANT = tl.systems.Simulated(SIGNALS, pendulum_step, default_gains=PENDULUM_GAINS)

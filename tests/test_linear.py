@@ -15,10 +15,10 @@ from twinloop import _core
 from twinloop.errors import NotAvailable
 from twinloop.law.expressions import Expressions
 from twinloop.law.law import Law
-from twinloop.linear.controller import linear_controller
-from twinloop.linear.jacobian import jacobian
-from twinloop.linear.margins import Loops
-from twinloop.linear.plant import linearised, trimmed
+from twinloop.law.linear.controller import linear_controller
+from twinloop.law.linear.jacobian import jacobian
+from twinloop.law.linear.margins import Loops
+from twinloop.law.linear.plant import linearised, trimmed
 
 SIGNALS = tl.Signals(
     states=[tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 8.0, derivative_of="angle")],

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, TINY, pendulum_step
-from twinloop.result import summary
+from twinloop.faces.result import summary
 
 SIGNALS = tl.Signals(
     [

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from test_offsets import BODY, read, turning
-from twinloop.identification.chains import chains
-from twinloop.identification.noise import given_noise, kinematic_noise
 from twinloop.identification.records import guessed_noise
+from twinloop.identification.sensors.chains import chains
+from twinloop.identification.sensors.noise import given_noise, kinematic_noise
 
 SCALES = np.array([state.scale for state in BODY.states])
 

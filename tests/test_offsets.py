@@ -7,11 +7,11 @@ from scipy.integrate import solve_ivp
 import twinloop as tl
 from oracles import same_bits
 from twinloop import _core
-from twinloop.identification.chains import chains
+from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.offsets import late_groups, moved, search_offsets
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.presets import options_of
+from twinloop.identification.sensors.chains import chains
+from twinloop.identification.sensors.offsets import late_groups, moved, search_offsets
 
 WORKERS = _core.Workers()
 DT = 0.04

@@ -9,14 +9,14 @@ import twinloop as tl
 from oracles import same_bits
 from strategies import program_text
 from twinloop import _core
+from twinloop.campaign.history import Experiment
+from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
-from twinloop.history import Experiment
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner
 from twinloop.planning.quality import KINDS, quality_of
-from twinloop.presets import options_of
 from twinloop.streams import Unit
 
 STEPS = 40

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop.plots import campaign_picture
+from twinloop.faces.plots import campaign_picture
 
 QUICK = {
     "moves": 1000,

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import twinloop as tl
 from oracles import Pid, quadrotor_derivative, same_bits
 from twinloop.contracts import check_system
-from twinloop.flight import fly
+from twinloop.law.flight import fly
 from twinloop.objectives import frozen_error
 from twinloop.systems.gusts import as_disturbance, gust_accelerations
 from twinloop.systems.sensors import run_stream

@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 import twinloop as tl
 from strategies import programs
 from twinloop import _core
-from twinloop.identification.chains import Chain
+from twinloop.campaign.coevolution.snapshots import ModelSnapshot, TestSnapshot
+from twinloop.campaign.presets import options_of
+from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.identification.structure import Sum
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
-from twinloop.presets import options_of
 from twinloop.records import KINDS, Recorded, from_text, plain, to_text
-from twinloop.setup import Setup
-from twinloop.snapshots import ModelSnapshot, TestSnapshot
 
 WORKERS = _core.Workers(threads=2)
 NUMBERS = st.floats(-1e6, 1e6, allow_nan=False)
@@ -266,7 +266,7 @@ def test_a_model_search_goes_on_from_its_record_with_the_same_bits(searched):
 
 
 def test_a_test_search_goes_on_from_its_record_with_the_same_bits(searched):
-    from twinloop.search import start_tests
+    from twinloop.campaign.coevolution.search import start_tests
 
     setup, models = searched.setup, searched.models
     search = start_tests(
@@ -313,7 +313,7 @@ def test_members_that_another_dominates_are_no_archive(searched):
 
 
 def test_genes_outside_their_bounds_are_no_tests(searched):
-    from twinloop.search import start_tests
+    from twinloop.campaign.coevolution.search import start_tests
 
     setup, models = searched.setup, searched.models
     search = start_tests(

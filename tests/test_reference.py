@@ -11,7 +11,7 @@ from oracles import same_bits
 from twinloop import _core, flights
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
-from twinloop.flight import fly, fly_commands
+from twinloop.law.flight import fly, fly_commands
 from twinloop.objectives import closed_loop, selected_tests
 from twinloop.planning.quality import quality_of
 from twinloop.test import final_distance

@@ -11,8 +11,8 @@ import twinloop as tl
 from test_life import PLANT, begun, by_hand, cut, new
 from test_looking import new as new_of
 from twinloop.errors import RemarkWarning
+from twinloop.faces.result import summary, to_json
 from twinloop.remarks import Remark
-from twinloop.result import summary, to_json
 
 GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
 

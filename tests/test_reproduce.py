@@ -6,7 +6,7 @@ import statistics
 import pytest
 from click.testing import CliRunner
 
-from twinloop.cli import main
+from twinloop.faces.cli import main
 from twinloop.reproduce.paper import TABLE_3
 from twinloop.reproduce.study import Setting, begin, deviation, mean
 from twinloop.reproduce.table2 import forgot_from

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import twinloop as tl
 from twinloop import _core
-from twinloop.identification.pool import Pool
+from twinloop.identification.terms.pool import Pool
 
 DT = 0.01
 NAMES = ("roll", "pitch", "yaw", "p", "q", "r")

@@ -16,7 +16,7 @@ from conftest import TINY
 from faults import killed_and_resumed
 from test_looking import CONTROLLER, LIFE, SIGNALS, SMALL, lived
 from test_records import same
-from twinloop import keeping
+from twinloop.campaign import keeping
 from twinloop.records import to_text
 from twinloop.store import found, kept, opened
 

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from test_cli import invoke, same_but_for_run_info
-from twinloop.cli import main
+from twinloop.faces.cli import main
 
 SMALL = (
     "run", "quadrotor", "--preset", "paper", "--generations", "6", "--test-generations", "3", "--noise", "0.001",

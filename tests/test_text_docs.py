@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from twinloop.presets import DefaultOptions, parsed
+from twinloop.campaign.presets import DefaultOptions, parsed
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = [

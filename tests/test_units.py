@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop.flight import fly
+from twinloop.law.flight import fly
 
 QUICK = {
     "moves": 600, "starts": 1, "evaluations": 128, "candidates": 24, "committee_size": 4, "tuning_steps": 4,

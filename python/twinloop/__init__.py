@@ -11,8 +11,8 @@ from twinloop.errors import (
     SystemFailure,
     TwinloopError,
 )
+from twinloop.law.twin import Twin, load_twin
 from twinloop.logs import load
-from twinloop.models import Twin, load_twin
 from twinloop.remarks import Remark
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems import System

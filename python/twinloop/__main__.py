@@ -1,6 +1,6 @@
 """Lets `python -m twinloop` be the command `twinloop`."""
 
-from twinloop.cli import main
+from twinloop.faces.cli import main
 
 if __name__ == "__main__":
     main()

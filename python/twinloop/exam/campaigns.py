@@ -13,8 +13,8 @@ from twinloop.exam.held_out import PENALTY, HeldOut
 from twinloop.exam.kinds import Campaigner
 from twinloop.exam.measures import coverage, number_of_terms, quantiles, violated
 from twinloop.exam.systems import Draw, Subject
-from twinloop.flight import fly
-from twinloop.models import Twin
+from twinloop.law.flight import fly
+from twinloop.law.twin import Twin
 from twinloop.streams import Unit
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory

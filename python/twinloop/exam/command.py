@@ -12,7 +12,6 @@ from pathlib import Path
 import click
 
 from twinloop.arrays import whole
-from twinloop.console import duration
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.exam.kinds import Fitter, Tuner
 from twinloop.exam.learners import LEARNERS, for_smoke, learner
@@ -24,6 +23,7 @@ from twinloop.exam.systems import SUBJECTS
 from twinloop.exam.tables import FORMATS, as_text, render
 from twinloop.exam.tuning import EXPERIMENTS as TUNING_EXPERIMENTS
 from twinloop.exam.tuning import score, tuned, variants
+from twinloop.faces.console import duration
 
 ASK_ABOVE = 600.0
 """Seconds of estimated work above which a person at a terminal is asked first."""

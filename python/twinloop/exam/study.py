@@ -31,7 +31,7 @@ from twinloop.exam.kinds import Campaigner, Fitter, Flyer, Optimum, Tuner
 from twinloop.exam.plan import Job
 from twinloop.exam.store import MissingFlights, Row, Store
 from twinloop.exam.systems import Subject, subject
-from twinloop.models import Twin
+from twinloop.law.twin import Twin
 
 LINE_SECONDS = 30.0
 """Between two plain lines, where there is no terminal."""

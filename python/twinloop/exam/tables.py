@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from twinloop.exam.bars import BARS
 from twinloop.exam.results import Results, Spread, spread
 from twinloop.exam.systems import subject
-from twinloop.result import to_json
-from twinloop.text import table
+from twinloop.faces.result import to_json
+from twinloop.faces.text import table
 
 FORMATS = ("text", "markdown", "json")
 COLUMNS = (0, 1, 2, 3, 4, 6, 9, 10, 15, 19, 20)

@@ -9,12 +9,12 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput
-from twinloop.identification.chains import Chain
-from twinloop.identification.noise import exact
-from twinloop.identification.pool import Pool
-from twinloop.identification.structure import Sum
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.noise import exact
+from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
-from twinloop.noise import LastingDisturbance, Noise
+from twinloop.law.noise import LastingDisturbance, Noise
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals

@@ -16,24 +16,24 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.identification.chains import Chain
-from twinloop.identification.committee import committee
-from twinloop.identification.description import shorter, shortest
-from twinloop.identification.directions import directions
-from twinloop.identification.fitting import Fitting, Tuned, described
-from twinloop.identification.hidden import PRICE, enter_directions, filled, search_hidden
+from twinloop.identification.fit.committee import committee
+from twinloop.identification.fit.fitting import Fitting, Tuned, described
+from twinloop.identification.fit.parts import parts
 from twinloop.identification.identified import Identified
-from twinloop.identification.lags import search_actuators
-from twinloop.identification.noise import exact, kinematic_noise
-from twinloop.identification.offsets import moved, search_offsets
-from twinloop.identification.parts import parts
-from twinloop.identification.pool import Pool
-from twinloop.identification.problem import Problem
+from twinloop.identification.inputs.hidden import PRICE, enter_directions, filled, search_hidden
+from twinloop.identification.inputs.lags import search_actuators
 from twinloop.identification.records import Run, stages
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
-from twinloop.identification.selection import Selection
+from twinloop.identification.search.description import shorter, shortest
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import Selection
+from twinloop.identification.search.structure import Sum, total
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.noise import exact, kinematic_noise
+from twinloop.identification.sensors.offsets import moved, search_offsets
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.structure import Sum, total
+from twinloop.identification.terms.directions import directions
+from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
 from twinloop.streams import Unit

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.identification.bounds import Limits
-from twinloop.identification.chains import Chain
-from twinloop.identification.noise import BEST_SENSOR, exact
-from twinloop.identification.pool import Pool
 from twinloop.identification.records import Run
-from twinloop.identification.structure import Sum
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.noise import BEST_SENSOR, exact
+from twinloop.identification.terms.bounds import Limits
+from twinloop.identification.terms.pool import Pool
 from twinloop.law.law import hidden_names
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from twinloop.identification.libraries import LIBRARIES
+from twinloop.identification.terms.libraries import LIBRARIES
 from twinloop.signals import Signals
 
 FORMS = ("auto", "absolute", "increment", "acceleration")

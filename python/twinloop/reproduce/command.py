@@ -9,12 +9,12 @@ import click
 from twinloop.arrays import whole
 from twinloop.campaign import available_threads
 from twinloop.errors import InvalidInput, unknown
-from twinloop.files import check_picture, check_writable, write_text
+from twinloop.faces.files import check_picture, check_writable, write_text
+from twinloop.faces.result import to_json
+from twinloop.faces.run_info import Stopwatch
+from twinloop.faces.terminal import is_utf_8
 from twinloop.reproduce import figure6, table1, table2, table3
 from twinloop.reproduce.study import Setting
-from twinloop.result import to_json
-from twinloop.run_info import Stopwatch
-from twinloop.terminal import is_utf_8
 
 STUDIES = {"table1": table1, "table2": table2, "table3": table3, "figure6": figure6}
 RUNS = {"table1": 1, "table2": 5, "table3": 25, "figure6": 5}

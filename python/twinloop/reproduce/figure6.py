@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from twinloop.plots import iterations_picture
+from twinloop.faces.plots import iterations_picture
+from twinloop.faces.result import Result, plain_dict
+from twinloop.faces.text import table
 from twinloop.reproduce.study import Run, Setting, described, finished_runs, headed
-from twinloop.result import Result, plain_dict
-from twinloop.text import table
 
 
 def compute(setting: Setting) -> Result:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop.campaign import Campaign
-from twinloop.console import Watch
-from twinloop.history import Iteration
-from twinloop.presets import Options, options_of
+from twinloop.campaign.history import Iteration
+from twinloop.campaign.presets import Options, options_of
+from twinloop.faces.console import Watch
+from twinloop.faces.result import Result, plain_dict
 from twinloop.reproduce.paper import DIFFERENCES, ITERATIONS
-from twinloop.result import Result, plain_dict
 from twinloop.systems import Quadrotor
 
 FREQUENCIES = (1.8, 2.2)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from twinloop.presets import Options, options_of
+from twinloop.campaign.presets import Options, options_of
+from twinloop.faces.result import Result, plain_dict
+from twinloop.faces.text import table
 from twinloop.reproduce.paper import ITERATIONS, TABLE_1
 from twinloop.reproduce.study import Setting, headed
-from twinloop.result import Result, plain_dict
-from twinloop.text import table
 
 
 def compute(setting: Setting) -> Result:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from twinloop.faces.result import Result, plain_dict
+from twinloop.faces.text import table
 from twinloop.reproduce.paper import ITERATIONS, TABLE_2, TABLE_2_REMARKS
 from twinloop.reproduce.study import Setting, described, deviation, finished_runs, headed, mean
-from twinloop.result import Result, plain_dict
-from twinloop.text import table
 
 FORGOTTEN_FACTOR, FORGOTTEN_ERROR = 5.0, 0.1
 FORGOTTEN = (

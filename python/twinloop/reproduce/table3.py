@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from twinloop import _core
-from twinloop.console import Watch
+from twinloop.campaign.coevolution.search import chunks, start_tests
+from twinloop.campaign.history import Progress
 from twinloop.errors import NotAvailable
-from twinloop.history import Progress
+from twinloop.faces.console import Watch
+from twinloop.faces.result import Result, plain_dict
+from twinloop.faces.text import table
 from twinloop.reproduce.paper import ITERATIONS, TABLE_3
 from twinloop.reproduce.study import Run, Setting, begin, deviation, headed, mean
-from twinloop.result import Result, plain_dict
-from twinloop.search import chunks, start_tests
 from twinloop.test import Test, final_distance
-from twinloop.text import table
 
 VERSIONS = {"two_objectives": False, "three_objectives": True}
 STAGES = (1, ITERATIONS)

@@ -11,7 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats, at_least_zero, floats, number, whole
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input, unknown
-from twinloop.flight import fly
+from twinloop.law.flight import fly
 from twinloop.signals import Command, Signals, State
 from twinloop.systems.base import System
 from twinloop.systems.gusts import as_disturbance, gust_accelerations

@@ -13,7 +13,7 @@ import numpy as np
 from twinloop.arrays import Floats, at_least_zero, whole
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import NotAvailable, unknown
-from twinloop.flight import fly
+from twinloop.law.flight import fly
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems.base import System
 from twinloop.systems.quadrotor import ANGLES, gains_from_frequency

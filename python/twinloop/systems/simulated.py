@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput, SystemFailure
-from twinloop.flight import fly
+from twinloop.law.flight import fly
 from twinloop.signals import Signals
 from twinloop.systems.base import System
 from twinloop.test import Test, check_signals

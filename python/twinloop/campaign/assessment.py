@@ -1,0 +1,124 @@
+"""What a campaign's twin leaves of its flights, and what another experiment would bring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment, Lesson
+from twinloop.campaign.setup import Setup
+from twinloop.law.flight import fly
+from twinloop.law.twin import Twin
+from twinloop.streams import Unit
+from twinloop.test import Test
+
+REPEATS = 32
+"""Flights on the twin from which the scatter of a measurement is taken."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What another experiment would bring, by the committee's own estimate, beside what a repeated flight scatters.
+
+    Args:
+        before_test: number of the test that was planned last; the estimate was made then. None: none was.
+        trusted: whether the twin followed its runs then and does now; if not, it can advise nobody.
+        gain: quality that knowing which model is right would have brought; None where no committee was asked.
+        share: of the quality of the controller to fly that this is; None where either is unknown.
+        scatter: standard deviation of the quality if one flight were repeated; None where it cannot be told.
+        stop: whether the gain is lost in the scatter: for the controller another experiment does not pay. None where
+            nobody can say.
+    """
+
+    before_test: int | None
+    trusted: bool
+    gain: float | None
+    share: float | None
+    scatter: float | None
+    stop: bool | None
+
+
+def advice(twin: Twin, setup: Setup, lessons: Sequence[Lesson], best: Test | None) -> Advice:
+    """What another experiment would bring.
+
+    Args:
+        twin: of the campaign.
+        setup: of the campaign.
+        lessons: of its identifications, with what was planned after each.
+        best: the controller to fly, if there is any.
+    """
+    judged = [(plan, lesson) for lesson in lessons for plan in lesson.asked if math.isfinite(plan.predicted)]
+    gain = judged[-1][0].gain if judged else None
+    # A model that does not follow its own runs, then or now, can advise nobody.
+    trusted = bool(judged) and judged[-1][1].follows and lessons[-1].follows
+    scatter = None if best is None else _scatter(twin, setup, best)
+    quality = None if best is None else best.predicted if best.measured is None else best.measured
+    known = gain is not None and quality is not None and math.isfinite(quality) and quality > 0.0
+    return Advice(
+        before_test=judged[-1][0].test if judged else None,
+        trusted=trusted,
+        gain=gain,
+        share=gain / quality if known else None,  # type: ignore[operator]
+        scatter=scatter,
+        stop=None if gain is None or scatter is None or not trusted else gain <= scatter,
+    )
+
+
+def rmse(twin: Twin, experiments: Sequence[Experiment]) -> Floats:
+    """Root mean square of flown minus simulated over all flights, each from where it began.
+
+    Args:
+        twin: to be compared with them.
+        experiments: at least one.
+
+    Returns:
+        One a state (n_x,), in its unit.
+    """
+    squares, rows = np.zeros(twin.signals.n_x), 0
+    for run in experiments:
+        test = twin.as_flown(run.replayed, run.trajectory)
+        # Without the committee's band, which `twin.simulate` would draw for each flight.
+        simulated = fly(twin.model, test, divergence_factor=twin.divergence_factor).states[1:]
+        flown = run.trajectory.states[1 : len(simulated) + 1]
+        squares += np.square(twin.signals.difference(flown, simulated[: len(flown)])).sum(axis=0)
+        rows += len(flown)
+    return np.asarray(np.sqrt(squares / max(1, rows)), dtype=np.float64)
+
+
+def expected_quality(twin: Twin, setup: Setup, test: Test) -> float | None:
+    """Quality that a twin expects to be measured of a flight, under the sensors' noise.
+
+    Args:
+        twin: that flies it.
+        setup: of the campaign.
+        test: to be flown.
+
+    Returns:
+        The mean; None if a flight diverges.
+    """
+    values = _repeated(twin, setup, test, gusts=False)
+    return None if np.isnan(values).any() else float(np.mean(values))
+
+
+def _scatter(twin: Twin, setup: Setup, best: Test) -> float | None:
+    """Standard deviation of the quality that would be measured if the same flight were repeated, on the twin."""
+    values = [value for value in _repeated(twin, setup, best, gusts=True) if not math.isnan(value)]
+    return float(np.std(values)) if len(values) > 1 else None
+
+
+def _repeated(twin: Twin, setup: Setup, test: Test, gusts: bool) -> list[float]:
+    """Qualities that would be measured if a flight were repeated, on the twin; NaN for one that diverges."""
+    draws: list[tuple[Floats | None, Floats | None]] = [(None, None)]
+    if twin.noise is not None:
+        noise, moves = twin.noise.drawn(REPEATS, test.steps, Unit(setup.seed).part(0).stream("repeats"))
+        draws = [(seen, moved if gusts else None) for seen, moved in zip(noise, moves, strict=True)]
+    values = []
+    for seen, moved in draws:
+        run = fly(twin.model, test, noise=seen, disturbance=moved, divergence_factor=twin.divergence_factor)
+        lasted = run.steps == test.steps
+        values.append(setup.quality.flown(run, test.target_state) if lasted else math.nan)
+    return values

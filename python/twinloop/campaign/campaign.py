@@ -1,0 +1,809 @@
+"""The double loop, counted in experiments: ask for a test, fly it, tell what happened (section III.C)."""
+
+from __future__ import annotations
+
+import copy
+import os
+import weakref
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats, floats, whole
+from twinloop.campaign.assessment import Advice, advice, rmse
+from twinloop.campaign.coevolution import Coevolution
+from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Progress
+from twinloop.campaign.identify_and_plan import IdentifyAndPlan
+from twinloop.campaign.keeping import Keeping, heading, look
+from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.method import Method
+from twinloop.campaign.presets import AnyOptions, Options
+from twinloop.campaign.setup import Setup, checked, refuse_arguments
+from twinloop.controllers import Controller, Family, UnboundFamily
+from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
+from twinloop.law.exports.export import asked, delivered, exported_controller
+from twinloop.law.law import Law
+from twinloop.law.linear.margins import Margins, margins_of
+from twinloop.law.twin import Twin
+from twinloop.objectives import closed_loop
+from twinloop.records import Record, Recorded, checked_record
+from twinloop.remarks import warn
+from twinloop.signals import Signals
+from twinloop.store import Kept
+from twinloop.systems import System
+from twinloop.test import Test, check_signals
+from twinloop.trajectory import Trajectory
+
+ARGUMENTS = (
+    "signals",
+    "controller",
+    "initial_state",
+    "target_state",
+    "duration",
+    "preset",
+    "seed",
+    "options",
+    "goal",
+    "quality",
+    "operators",
+    "threads",
+    "progress",
+    "store",
+    "name",
+)
+GENTLE = "gentle"
+"""The excitation of a first test where nothing else is asked for: the preset's own."""
+
+
+class Campaign(Recorded, kind="campaign"):
+    """Learns a twin and a controller from as few experiments as possible.
+
+    Args:
+        signals: of the system.
+        controller: a family of controllers, such as `twinloop.controllers.PID`.
+        initial_state: where every test starts (n_x,), SI units, radians.
+        target_state: where every test should end (n_x,), the same units. A reference that varies with time is a
+            function of it in s, sampled at `dt`, or a row for each period and one for the end (n + 1, n_x).
+        duration: of a test, s; a whole number of periods.
+        preset: "default", or "paper" for the algorithm of the paper to the letter.
+        seed: of all random numbers; equal seeds give equal bits.
+        options: other values for some of the preset's options, by name.
+        goal: what the flights are for: "control" (the best controller soon), "model" (a twin that is right
+            everywhere), or "both", the default.
+        quality: what is minimised: "iae" (integrated absolute error, the default), "ise" (squared) or "final_distance"
+            (the paper's).
+        operators: that evolved programs may use; by default the preset's.
+        threads: how many the engine may use, by default all that there are; no result depends on it.
+        progress: called with a `Progress` a few times a second while the loops run.
+        store: a file of SQLite, or the address of a database such as "postgresql+psycopg://user@host/database", where
+            all that is asked and told is committed before the call returns. A campaign of this name that is there
+            already, with the same arguments, goes on with the same bits. None: nothing outlives the process.
+        name: of the campaign in its store, which may hold several.
+
+    Raises:
+        InvalidInput: an argument that cannot be used, or that this version does not have.
+        NotAvailable: the packages of the extra `store` are missing.
+        StoreFailure: somebody else writes the campaign, or the store cannot be written.
+    """
+
+    def __init__(
+        self,
+        signals: Signals,
+        *,
+        controller: UnboundFamily,
+        initial_state: ArrayLike,
+        target_state: ArrayLike | Callable[[float], ArrayLike],
+        duration: float,
+        preset: str = "default",
+        seed: int = 0,
+        options: Mapping[str, object] | None = None,
+        goal: str | None = None,
+        quality: str | None = None,
+        operators: Sequence[str] | None = None,
+        threads: int | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        store: str | Path | None = None,
+        name: str = "campaign",
+        **other: object,
+    ) -> None:
+        refuse_arguments("Campaign", other, ARGUMENTS)
+        setup = checked(
+            signals,
+            controller,
+            initial_state,
+            target_state,
+            duration,
+            preset,
+            options,
+            seed,
+            goal,
+            quality,
+            operators,
+        )
+        self._begin(setup, threads, progress)
+        if store is not None:
+            self._open(store, name)
+
+    def _begin(self, setup: Setup, threads: int | None, progress: Callable[[Progress], None] | None) -> None:
+        self.setup = setup
+        self.threads = (
+            available_threads() if threads is None else whole("Campaign, threads", threads, least=1)
+        )
+        if progress is not None and not callable(progress):
+            raise InvalidInput(
+                f"Campaign, progress: expected something to call with a Progress, found {progress!r}; pass a function."
+            )
+        self.progress = progress
+        self.interrupted = False
+        with engine_input():
+            self._workers = _core.Workers(threads=self.threads)
+        self._book = Logbook(self.setup)
+        self._method = self._chosen()
+        self._controller: Controller | None = None
+        self._keeping: Keeping | None = None
+
+    def _open(self, where: str | Path, name: str) -> None:
+        """Goes on with what a store holds, and keeps there what comes."""
+        keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
+        try:
+            self._recall(keeping.kept)
+        except BaseException:
+            keeping.close()
+            raise
+        keeping.restored(self._method.memory)
+        self._keeping = keeping
+        # A campaign that nobody holds any more writes no more; the end of the process is one of those.
+        weakref.finalize(self, keeping.close)
+
+    def _recall(self, kept: Kept) -> None:
+        self._book = Logbook.from_record(kept.logbook, self.setup)
+        if kept.memory is not None:
+            self._method.restore(kept.memory, self._book)
+
+    @property
+    def signals(self) -> Signals:
+        """Of the system."""
+        return self.setup.signals
+
+    @property
+    def family(self) -> Family:
+        """Of the controllers, bound to the signals."""
+        return self.setup.family
+
+    @property
+    def options(self) -> AnyOptions:
+        """Of the preset, with those that were changed."""
+        return self.setup.options
+
+    @classmethod
+    def recorded_fields(cls) -> tuple[str, ...]:
+        """Names of the fields that a record has, in order."""
+        return "setup", "logbook", "memory"
+
+    def to_record(self) -> Record:
+        """The campaign as numbers, texts, lists and dicts: its setup, all that was told, all that was learnt.
+
+        Raises:
+            NotAvailable: its controllers have no plain form.
+        """
+        return {
+            **self._head(),
+            "setup": self.setup.to_record(),
+            "logbook": self._book.to_record(),
+            "memory": self._method.to_record(),
+        }
+
+    @classmethod
+    def from_record(
+        cls,
+        record: object,
+        *given: object,
+        threads: int | None = None,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> Campaign:
+        """The campaign that a record was written of; it goes on with the same bits.
+
+        Args:
+            record: such as `to_record` gives, or JSON gives back.
+            given: nothing; a campaign is whole.
+            threads: how many the engine may use, by default all that there are.
+            progress: called with a `Progress` a few times a second while the loops run.
+
+        Returns:
+            A campaign of its own.
+
+        Raises:
+            InvalidInput: another kind, a newer version, an unknown or missing key, or a value that cannot be used.
+        """
+        found = checked_record(record, cls, cls.recorded_fields(), cls.KIND)
+        campaign = object.__new__(cls)
+        campaign._begin(Setup.from_record(found["setup"]), threads, progress)
+        campaign._book = Logbook.from_record(found["logbook"], campaign.setup)
+        campaign._method.restore(found["memory"], campaign._book)
+        return campaign
+
+    def __copy__(self) -> Campaign:
+        """A campaign that goes on by itself from here, with the same bits.
+
+        Both call the same `progress`; the copy's `controller` is at rest.
+        """
+        campaign = object.__new__(Campaign)
+        campaign.setup, campaign.threads = self.setup, self.threads
+        campaign.progress, campaign.interrupted = self.progress, self.interrupted
+        campaign._workers = _core.Workers(threads=self.threads)
+        campaign._book = self._book.copied()
+        campaign._method = campaign._chosen()
+        campaign._method.memory, campaign._controller = self._method.memory, None
+        campaign._keeping = None  # a store has one writer
+        return campaign
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Campaign:
+        """As `copy.copy`: what both share are values that never change."""
+        return copy.copy(self)
+
+    # Keeping
+
+    def save(self, where: str | Path, name: str = "campaign") -> None:
+        """Writes the campaign into a store, or what is new into one where it was saved before.
+
+        Args:
+            where: a file of SQLite, or the address of a database; made where there is none.
+            name: of the campaign there.
+
+        Raises:
+            InvalidInput: another campaign of that name is there, or no store.
+            NotAvailable: the packages of the extra `store` are missing.
+            StoreFailure: the store cannot be written.
+        """
+        keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
+        try:
+            mine, known = self._book.to_record(), keeping.kept.logbook
+            lists = [key for key, value in known.items() if isinstance(value, list)]
+            if known["identity"] != mine["identity"] or any(
+                mine[key][: len(known[key])] != known[key] for key in lists
+            ):
+                raise InvalidInput(
+                    f"Campaign.save: expected {keeping.name} to be this one as it was, found another one, or one that"
+                    " has gone on by itself; choose another name."
+                )
+            keeping.keep(self._book, self._method)
+        finally:
+            keeping.close()
+
+    @classmethod
+    def load(
+        cls,
+        where: str | Path,
+        name: str | None = None,
+        *,
+        read_only: bool = False,
+        threads: int | None = None,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> Campaign:
+        """A campaign from a store, where it is kept from now on too; it goes on with the same bits.
+
+        Args:
+            where: a file of SQLite, or the address of a database.
+            name: of the campaign there; None: the only one.
+            read_only: whether to look only: others may write it meanwhile, and what is done here is not kept.
+            threads: how many the engine may use, by default all that there are.
+            progress: called with a `Progress` a few times a second while the loops run.
+
+        Returns:
+            The campaign.
+
+        Raises:
+            InvalidInput: no store, no such campaign, or several and no name.
+            NotAvailable: the packages of the extra `store` are missing.
+            StoreFailure: somebody else writes the campaign, or the store cannot be read.
+        """
+        campaign = object.__new__(cls)
+        if read_only:
+            kept = look(where, name, read_only)
+            campaign._begin(Setup.from_record(kept.setup), threads, progress)
+            campaign._recall(kept)
+        else:
+            known, setup = heading(where, name)
+            campaign._begin(Setup.from_record(setup), threads, progress)
+            campaign._open(where, known)
+        return campaign
+
+    @property
+    def store(self) -> str | None:
+        """Where it is kept; None: nowhere."""
+        return None if self._keeping is None else self._keeping.store
+
+    def close(self) -> None:
+        """Lets others write the campaign in its store; nothing that is done afterwards is kept there."""
+        if self._keeping is not None:
+            self._keeping.close()
+            self._keeping = None
+
+    def _keep(self) -> None:
+        if self._keeping is not None:
+            self._keeping.keep(self._book, self._method)
+
+    @contextmanager
+    def _entering(self) -> Iterator[None]:
+        """What is entered in the book meanwhile is committed at the end, or taken back."""
+        book, memory = self._book.copied(), self._method.memory
+        try:
+            yield
+            self._keep()
+        except BaseException:
+            self._book, self._method.memory = book, memory
+            raise
+
+    # Ask and tell
+
+    def test(
+        self, gains: Mapping[str, float] | ArrayLike, excitation: ArrayLike | str | None = GENTLE
+    ) -> Test:
+        """A test with gains of your own: the first one, a controller that you already trust.
+
+        Args:
+            gains: all gains by name, or (size,) in order; in their units and bounds.
+            excitation: what is added to the controller's commands (steps, n_u), in their units; the sum is
+                clipped to the commands' bounds. None: nothing. By default the preset's own, a gentle one that
+                fades out; the preset "paper" has none.
+
+        Returns:
+            The test, to be flown and told.
+
+        Raises:
+            InvalidInput: gains or an excitation that cannot be used.
+        """
+        genes = self.family.genes(gains)
+        if isinstance(excitation, str):
+            if excitation != GENTLE:
+                raise InvalidInput(
+                    f"Campaign.test, excitation: expected an array, None or {GENTLE!r}, found {excitation!r}."
+                )
+            added = self._method.first_excitation(len(self._book.tests))
+        elif excitation is not None:
+            shape = (self.setup.steps, self.signals.n_u)
+            added = floats("Campaign.test, excitation (steps, commands)", excitation, shape)
+        else:
+            added = None
+        with self._entering():
+            return self._book.new_test(genes, excitation=added)
+
+    def ask(self, last: bool = False) -> Test:
+        """Learns from all that was told, then picks the test on which the best models disagree.
+
+        Asking again without telling learns nothing new and gives another test.
+
+        Args:
+            last: whether no other test will be asked for. The preset "default" then flies the best gains that it
+                knows as they are, unless its option `exploit_last` is off; to "paper" it means nothing.
+
+        Returns:
+            The test, to be flown and told, with its predicted quality, its risk and the reason for it.
+
+        Raises:
+            NotAvailable: nothing was told yet.
+        """
+        self.interrupted = False
+        self._learn()
+        with self._interruptible(), self._entering():
+            return self._method.ask(self._book, bool(last))
+
+    def tell(self, test: Test, trajectory: Trajectory) -> None:
+        """Adds a run to what is to be learnt. Tests may be told in any order; one told again is a replicate.
+
+        Args:
+            test: from this campaign.
+            trajectory: what the system answered; shorter than the test if the run was cut.
+
+        Raises:
+            InvalidInput: a test of another campaign, or a useless trajectory; nothing has changed.
+        """
+        with self._entering():
+            self._book.tell(test, trajectory, self._error_so_far)
+        self.interrupted = False
+
+    def tell_failed(self, test: Test, reason: str, partial: Trajectory | None = None) -> None:
+        """Tells that a test failed on the system: that, too, is a result.
+
+        It has no quality, counts as a run, and speaks against its gains: the preset "default" never takes them, or
+        gains close to them, for known to fly.
+
+        Args:
+            test: from this campaign.
+            reason: what happened, in a few words.
+            partial: what was recorded until then, of at least one step; it is learnt from. None: nothing.
+
+        Raises:
+            InvalidInput: a test of another campaign, no reason, or a useless record; nothing has changed.
+        """
+        with self._entering():
+            self._book.fail(test, reason, partial, self._error_so_far)
+        self.interrupted = False
+
+    def attach(self, trajectory: Trajectory) -> None:
+        """Adds a run that nobody asked for, of any length and under any commands, to what is to be learnt.
+
+        The twin is judged on it by its free run under the recorded commands. It has no quality, and is no run of a
+        test: `run` does not count it.
+
+        Args:
+            trajectory: of the same signals.
+
+        Raises:
+            InvalidInput: a useless trajectory; nothing has changed.
+            NotAvailable: the preset "paper" learns from tests of its controllers only.
+        """
+        if isinstance(self._method, Coevolution):
+            raise NotAvailable(
+                "Campaign.attach: expected the preset 'default', found 'paper', which learns from tests of its"
+                ' controllers only; choose preset="default".'
+            )
+        with self._entering():
+            self._book.attach(trajectory, self._error_so_far)
+        self.interrupted = False
+
+    def abandon(self, test: Test) -> None:
+        """Says that a test will not be flown: `run` does not fly it. If it is flown after all, tell it.
+
+        Args:
+            test: from this campaign, of which no run was told.
+
+        Raises:
+            InvalidInput: a test of another campaign, or one that was flown.
+        """
+        with self._entering():
+            self._book.abandon(test)
+
+    def status(self, test: Test) -> str:
+        """Where a test is in its life.
+
+        Args:
+            test: from this campaign.
+
+        Returns:
+            "asked", "flown" (one run at least was complete), "aborted" (none was), "failed" or "abandoned".
+
+        Raises:
+            InvalidInput: a test of another campaign.
+        """
+        return self._book.status(test)
+
+    def run(self, system: System, experiments: int = 4) -> Campaign:
+        """The whole loop; the last test is that of `ask(last=True)`.
+
+        What was asked for, and neither told nor abandoned, is flown first. Where nothing was told, the first test is
+        the last one made by `campaign.test`, or that of `system.default_gains`.
+
+        Args:
+            system: anything with `signals` and `run(test)`.
+            experiments: runs on the system in all, the first, those told before and those that failed included, those
+                that were attached not.
+
+        Returns:
+            The campaign.
+
+        Raises:
+            InvalidInput: no system, one that answers with something else than a usable trajectory, or fewer experiments
+                than were told already.
+            KeyboardInterrupt: Ctrl-C. Nothing that was told is lost: `interrupted` says so, the results give the best
+                so far, and calling again goes on from there with the same bits.
+            NotAvailable: there is no first test.
+        """
+        budget = whole("Campaign.run, experiments", experiments, least=1)
+        described = isinstance(getattr(system, "signals", None), Signals)
+        if not (described and callable(getattr(system, "run", None))):
+            raise InvalidInput(
+                "Campaign.run, system: expected an object with twinloop.Signals as `signals` and with `run(test)`, "
+                f"found {type(system).__name__}; add them."
+            )
+        told = self._book.runs
+        if budget < told:
+            raise InvalidInput(
+                f"Campaign.run, experiments: expected at least the {told} runs that were told already, found {budget};"
+                f" every run counts, so for one more say {told + 1}."
+            )
+        self.interrupted = False
+        if self._keeping is not None:
+            self._keeping.fly(system, budget)
+        with self._interruptible():
+            while self._book.runs < budget:
+                test = self._next(system, last=self._book.runs + 1 == budget)
+                check_signals(test, system.signals)
+                self._report_experiment()
+                self.tell(test, system.run(test))
+        return self
+
+    # What came out
+
+    @property
+    def twin(self) -> Twin:
+        """The best model, after learning all that was told; the best so far after an interruption."""
+        self._learn()
+        return self._method.twin(self._book)
+
+    @property
+    def best_test(self) -> Test:
+        """The controller to fly, without excitation, after learning all that was told.
+
+        With the preset "default": the gains tuned on the committee, unless it is not confident that they beat the
+        best ones flown. With "paper": the flown test that ended nearest to its target. It carries the quality that
+        the twin predicts and, if it was flown, the measured one. To fly and tell it, make a test of it with
+        `campaign.test`.
+
+        Raises:
+            NotAvailable: nothing was told; or, with "default", there is no controller to fly: none has flown to its
+                end, and the twin cannot answer for the one that it prefers.
+        """
+        self._learn()
+        with self._interruptible():
+            return self._method.best_test(self._book)
+
+    @property
+    def controller(self) -> Controller:
+        """That of `best_test`, for a real loop: `.parameters`, `.reset()`, `.command(state, target)`.
+
+        It is one object with one memory for as long as the gains of `best_test` are the same: call `reset` before each
+        run. Other gains, which only something that was told can bring, are another controller, at rest.
+        """
+        best = self.best_test
+        if self._controller is None or self._controller.genes.tobytes() != best.genes.tobytes():
+            self._controller = best.controller()
+        return self._controller
+
+    def margins(
+        self, parameters: Mapping[str, float] | ArrayLike | None = None, broken_at: str = "axes"
+    ) -> Margins:
+        """How far the loops of a controller are from instability around the target, on the twin and on its committee.
+
+        Each loop is broken at one place while the others stay closed. All is in discrete time, with the delays and lags
+        of actuators. The twin is linearised at the target under the command that holds it, the controller where its
+        error is 0.
+
+        Args:
+            parameters: gains of the controller, by name or in order; None: those of `best_test`.
+            broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+
+        Returns:
+            Gain, phase and delay margins, crossover, Ms and Mt of each loop, nominal and the worst of the committee.
+
+        Raises:
+            InvalidInput: unknown gains, or another place to break a loop at.
+            NotAvailable: nothing was told, or the twin or the controller cannot be linearised there.
+        """
+        if broken_at not in ("axes", "commands"):
+            raise unknown("place to break a loop at", broken_at, ("axes", "commands"))
+        genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
+        twin, described = self.twin, self.setup.controller
+        mixer = getattr(described, "output", None)
+        if mixer is None or broken_at == "commands":
+            names: Sequence[str] = self.signals.command_names
+        else:
+            axes = getattr(described, "axes", None)
+            names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
+        laws = [twin.law, *(Law.of(member, self.signals) for member in twin.members)]
+        return margins_of(laws, self.family, genes, self.setup.final_target, mixer, names, broken_at)
+
+    def export_controller(
+        self,
+        to: str | Path,
+        parameters: Mapping[str, float] | ArrayLike | None = None,
+        *,
+        precision: str = "double",
+        force: bool = False,
+    ) -> str | tuple[Path, ...]:
+        """A controller as Python or C99 without dependencies, one call a period; clipped, with all its options.
+
+        It is run on the states of the campaign's flights and compared with the controller itself: differences above
+        1e-9 of a command's scale are refused (1e-3 in single precision).
+
+        Args:
+            to: "python" or "c", or the path of a file that ends in ".py" or ".c".
+            parameters: gains, by name or in order; None: those of `best_test`.
+            precision: of C, "double" or "float".
+            force: without the comparison.
+
+        Returns:
+            The text where a kind was asked for (in C the header, then the source), else the paths that were written.
+
+        Raises:
+            InvalidInput: unknown gains, no such kind, or a path that cannot be written.
+            NotAvailable: a family of one's own, or an export that could not be checked.
+        """
+        kind, path = asked(to, None)
+        genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
+        name = "controller" if path is None else path.stem
+        flights = [] if force else [run.trajectory for run in self.experiments]
+        described, target = self.setup.controller, self.setup.target_state
+        texts = exported_controller(described, self.family, genes, kind, name, precision, flights, target)
+        return delivered(texts, name, path)
+
+    @property
+    def committee(self) -> tuple[_core.Model, ...]:
+        """Models that judge tests, the best first, after learning all that was told."""
+        self._learn()
+        return tuple(self._method.committee())
+
+    @property
+    def models(self) -> _core.ModelSearch:
+        """The paper's model loop as a value, after learning all that was told.
+
+        Raises:
+            NotAvailable: the preset has no such loop, or nothing was told.
+        """
+        self._learn()
+        if not isinstance(self._method, Coevolution):
+            raise NotAvailable(
+                f"Campaign.models: expected the preset 'paper', found {self.setup.preset!r}, which has no model loop;"
+                " use `committee`."
+            )
+        return self._method.models
+
+    @property
+    def experiments(self) -> tuple[Experiment, ...]:
+        """All that was told and attached, in order."""
+        return tuple(self._book.experiments)
+
+    @property
+    def tests(self) -> tuple[Test, ...]:
+        """All that were made, by their numbers."""
+        return tuple(self._book.tests)
+
+    @property
+    def waiting(self) -> tuple[Test, ...]:
+        """Tests that were asked for, and neither told nor abandoned, in their order."""
+        return tuple(self._book.waiting())
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """Tests that failed, in the order they were told."""
+        return tuple(self._book.failures)
+
+    @property
+    def rmse(self) -> Floats:
+        """Root mean square of flown minus simulated over all flights, each from where it began (n_x,), in each unit."""
+        return rmse(self.twin, self._book.experiments)
+
+    @property
+    def advice(self) -> Advice | None:
+        """What another experiment would bring, after learning all that was told; None with the preset "paper"."""
+        twin, history = self.twin, self.history
+        lessons = [record for record in history if isinstance(record, Lesson)]
+        return advice(twin, self.setup, lessons, controller_to_fly(self)[0]) if lessons else None
+
+    def plot(self, path: str | Path) -> None:
+        """Draws every state of every flight, flown and predicted, above the errors and qualities by experiment.
+
+        Args:
+            path: of the picture, .svg or .png.
+
+        Raises:
+            InvalidInput: another suffix, or a file that cannot be written.
+            NotAvailable: matplotlib is missing, or nothing was told.
+        """
+        _face("files").check_picture(Path(path))
+        quality = self.setup.quality
+        words = _face("text").quality_words(quality.kind, _face("result").quality_unit(quality))
+        _face("plots").campaign_picture(self, Path(path), words)
+
+    def report(self, name: str = "campaign") -> str:
+        """The whole result for a person, beginning with a verdict of three lines; `print(campaign)` shows it.
+
+        Args:
+            name: of the system, for its title.
+
+        Raises:
+            NotAvailable: nothing was told.
+        """
+        text: str = _face("text").render(_face("result").summary(self, {"name": name}, {}))
+        return text
+
+    def __str__(self) -> str:
+        return self.report() if self._book.experiments else repr(self)
+
+    def __repr__(self) -> str:
+        told = len(self._book.experiments)
+        return f"Campaign(preset={self.setup.preset!r}, seed={self.setup.seed}, experiments={told})"
+
+    @property
+    def history(self) -> tuple[Iteration, ...] | tuple[Lesson, ...]:
+        """One record for each turn of the loop; the last may be unfinished after an interruption."""
+        return self._method.history(self._book)
+
+    # Inside
+
+    def _chosen(self) -> Method:
+        options = self.setup.options
+        if isinstance(options, Options):
+            return Coevolution(self.setup, options, self._workers, self._report)
+        return IdentifyAndPlan(self.setup, options, self._workers, self._report)
+
+    def _learn(self) -> None:
+        if not self._book.experiments:
+            raise NotAvailable(
+                "Expected at least one experiment that was told, found none; first fly a controller you "
+                "trust: test = campaign.test(gains), then campaign.tell(test, system.run(test))."
+            )
+        before = self._method.memory
+        with self._interruptible():
+            self._method.learn(self._book, at_once=self.interrupted)
+            self._keep()
+        latest = self.history[-1] if self._method.memory is not before and self.history else None
+        if isinstance(latest, Lesson):
+            warn(latest.remarks, stacklevel=3)
+
+    def _error_so_far(self, alone: _core.SelectedTests) -> float | None:
+        """On a run that is being told, of the model that the last `ask` knew: a look must not change it."""
+        model = self._method.asked_model
+        return None if model is None else float(closed_loop([model], alone, self._workers)[0, 0])
+
+    @contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        try:
+            yield
+        except KeyboardInterrupt:
+            self.interrupted = True
+            self._keep()
+            raise
+
+    def _next(self, system: System, last: bool) -> Test:
+        waiting = self._book.waiting()
+        if waiting:
+            return waiting[0]
+        made = self._book.made()
+        if made is not None:
+            return made
+        if self._book.experiments:
+            return self.ask(last)
+        if self._book.failures:
+            raise NotAvailable(
+                "Campaign.run: expected a first test that has not failed, found none; make one with"
+                " campaign.test(gains), from another controller that you trust."
+            )
+        gains = getattr(system, "default_gains", None)
+        if gains is None:
+            raise NotAvailable(
+                "Campaign.run: expected a first test, found none and no `default_gains` of "
+                f"{type(system).__name__}; make one with campaign.test(gains), from a controller you trust."
+            )
+        return self.test(gains)
+
+    def _report(self, progress: Progress) -> None:
+        if self._keeping is not None:
+            self._keeping.checkpoint(self._method)
+        if self.progress is not None:
+            self.progress(progress)
+
+    def _report_experiment(self) -> None:
+        progress = Progress(
+            "experiment", self._method.iteration, 0, 0, len(self._book.experiments), (), (), (), 0, 0
+        )
+        self._report(progress)
+
+
+def _face(name: str) -> Any:
+    """What shows a campaign stands above it, and is loaded when something is shown."""
+    return import_module(f"twinloop.faces.{name}")
+
+
+def controller_to_fly(campaign: Campaign) -> tuple[Test | None, str]:
+    """The best test of a campaign, if there is any, and why there is none.
+
+    Args:
+        campaign: with at least one experiment.
+    """
+    try:
+        return campaign.best_test, ""
+    except NotAvailable as reason:
+        return None, str(reason)
+
+
+def available_threads() -> int:
+    """Processors that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,215 @@
+"""Campaign files: what a campaign is about, in TOML that a person fills in."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from twinloop.campaign import Campaign
+from twinloop.campaign.presets import PRESETS
+from twinloop.controllers import UnboundFamily
+from twinloop.errors import InvalidInput, unknown
+from twinloop.records import read
+from twinloop.signals import Command as Channel
+from twinloop.signals import RigidBody, Signals, State
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+MOST_BYTES = 10_000_000
+"""Of a campaign file."""
+SECTIONS = ("dt", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options")
+TASK = ("initial_state", "target_state", "duration")
+CAMPAIGN = ("preset", "seed", "goal", "quality")
+TEMPLATE = """\
+# A campaign of twinloop. Fill in what your system is, then: twinloop ask {store}
+# Units are SI and radians; names of states and commands become symbols in equations.
+
+dt = 0.05                        # period of the commands, s
+
+[states.angle]                   # one section a state, in the order of the state vector
+unit = "rad"
+scale = 3.14                     # its usual size; ten times that counts as diverged
+envelope = [-2.5, 2.5]           # where the system is safe; leave it out if it is everywhere
+
+[states.rate]
+unit = "rad/s"
+scale = 8.0
+derivative_of = "angle"
+envelope = [-12.0, 12.0]
+# noise = 0.01                   # standard deviation of the sensor, if it is known
+# periodic = false               # true: an angle that wraps
+
+[commands.torque]                # one section a command
+unit = "N m"
+bounds = [-2.0, 2.0]             # what is ever sent
+
+[controller]                     # one PID an axis: pairs of an angle and its rate, or an angle alone
+kind = "pid"
+axes = [["angle", "rate"]]
+
+[controller.gains]               # bounds [low, high] of each gain, or a number that fixes it
+"angle.kp" = [0.0, 6.0]
+"angle.ki" = [0.0, 6.0]
+"angle.kd" = [0.0, 1.0]
+
+[task]
+initial_state = [0.0, 0.0]       # where every test starts
+target_state = [1.0, 0.0]        # where every test should end
+duration = 1.0                   # of a test, s
+
+[first]                          # the first test: gains of a controller that you trust
+"angle.kp" = 2.0
+"angle.ki" = 2.0
+"angle.kd" = 0.3
+
+[campaign]
+preset = "default"               # or "paper"
+seed = 0
+# goal = "both"                  # "control", "model" or "both"
+# quality = "iae"                # "iae", "ise" or "final_distance"
+
+[options]                        # every option of the preset, at its default
+"""
+
+
+def template(store: str) -> str:
+    """A campaign file to fill in, with every default as a comment.
+
+    Args:
+        store: file in which the campaign will be kept, for the first line.
+    """
+    options = PRESETS["default"]
+    lines = [
+        f"# {field.name} = {_toml(getattr(options, field.name))}" for field in dataclasses.fields(options)
+    ]
+    return TEMPLATE.format(store=store) + "\n".join(lines) + "\n"
+
+
+@dataclasses.dataclass(frozen=True)
+class CampaignFile:
+    """What a campaign file says.
+
+    Args:
+        arguments: of the campaign.
+        first: gains of the first test, by name.
+    """
+
+    arguments: Mapping[str, Any]
+    first: Mapping[str, float]
+
+    def campaign(self, **others: Any) -> Campaign:
+        """The campaign.
+
+        Args:
+            others: arguments that no file holds, such as `store` or `threads`.
+        """
+        return Campaign(**self.arguments, **others)
+
+
+def read_file(path: str | Path) -> CampaignFile:
+    """Reads a campaign file.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        What it says.
+
+    Raises:
+        InvalidInput: no such file, no TOML, an unknown key, or a value that cannot be used.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InvalidInput(
+                f"File {path}: expected a campaign file, found one of more than {MOST_BYTES} bytes."
+            )
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as reason:
+        raise InvalidInput(
+            f"File {path}: expected a campaign file, found {reason.strerror}; check its name."
+        ) from reason
+    except (ValueError, RecursionError) as reason:
+        if isinstance(reason, InvalidInput):
+            raise
+        raise InvalidInput(f"File {path}: expected TOML, found: {reason}; mend that line.") from reason
+    _keys(found, SECTIONS, ("dt", "states", "commands", "controller", "task", "first"), str(path))
+    task = _section(found, "task", TASK, TASK)
+    rest = _section(found, "campaign", CAMPAIGN, ())
+    options = found.get("options", {})
+    signals = Signals(
+        states=_members(found, "states", State),
+        commands=_members(found, "commands", Channel),
+        dt=found["dt"],
+        kinematics=_tagged(found["kinematics"], RigidBody) if "kinematics" in found else None,
+    )
+    arguments = {
+        "signals": signals,
+        "controller": _controller(found["controller"]),
+        **task,
+        **rest,
+        "options": options,
+    }
+    return CampaignFile(arguments, _section(found, "first", None, ()))
+
+
+def _members(found: Mapping[str, Any], name: str, kind: type[State] | type[Channel]) -> list[Any]:
+    section = _section(found, name, None, ())
+    return [_tagged({"name": key, **_table(value, f"{name}.{key}")}, kind) for key, value in section.items()]
+
+
+def _tagged(table: Any, kind: Any) -> Any:
+    record = {"kind": kind.KIND, "version": kind.VERSION, **_table(table, kind.KIND)}
+    return kind.from_record(record)
+
+
+def _controller(table: Any) -> UnboundFamily:
+    found = {"version": 1, **_table(table, "controller")}
+    if isinstance(found.get("axes"), list):
+        found["axes"] = [
+            [*axis, None] if isinstance(axis, list) and len(axis) == 1 else axis for axis in found["axes"]
+        ]
+    if isinstance(found.get("output"), Mapping):
+        found["output"] = {"kind": "mixer", "version": 1, **found["output"]}
+    family: UnboundFamily = read(UnboundFamily, found, "controller")
+    return family
+
+
+def _section(
+    found: Mapping[str, Any], name: str, keys: tuple[str, ...] | None, needed: tuple[str, ...]
+) -> dict[str, Any]:
+    table = _table(found.get(name, {}), name)
+    if keys is not None:
+        _keys(table, keys, needed, f"[{name}]")
+    return table
+
+
+def _table(value: object, where: str) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InvalidInput(f"Campaign file, {where}: expected a section, found {value!r}; write [{where}].")
+    return dict(value)
+
+
+def _keys(table: Mapping[str, Any], keys: tuple[str, ...], needed: tuple[str, ...], where: str) -> None:
+    for key in table:
+        if key not in keys:
+            raise unknown(f"key in {where}", key, keys)
+    missing = [key for key in needed if key not in table]
+    if missing:
+        raise InvalidInput(f"Campaign file, {where}: expected {', '.join(missing)}, found none; add them.")
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, tuple):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    return repr(value)

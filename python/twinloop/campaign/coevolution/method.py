@@ -1,0 +1,189 @@
+"""The paper's way: models and tests coevolve (section III.C)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.coevolution.learning import Learner, Learning
+from twinloop.campaign.coevolution.search import chunks, committee, start_tests
+from twinloop.campaign.coevolution.written import WrittenMemory
+from twinloop.campaign.errors import errors
+from twinloop.campaign.history import Iteration, Progress
+from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.presets import Options
+from twinloop.campaign.setup import Setup
+from twinloop.law.twin import Twin
+from twinloop.objectives import final_distances
+from twinloop.records import Record
+from twinloop.test import Test
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What the preset `paper` remembers.
+
+    Args:
+        asked: what was learnt when the last test was asked for. Learning begins here, whoever looks in between.
+        latest: what was learnt last, or is being learnt; shown to whoever looks, and gone on with if it is of all that
+            was told.
+    """
+
+    asked: Learning | None = None
+    latest: Learning | None = None
+
+
+class Coevolution:
+    """The double loop of the preset `paper`.
+
+    Args:
+        setup: of the campaign.
+        options: of the preset.
+        workers: how the work is carried out.
+        report: called with a `Progress` after every chunk of work.
+    """
+
+    def __init__(
+        self, setup: Setup, options: Options, workers: _core.Workers, report: Callable[[Progress], None]
+    ) -> None:
+        self.setup = setup
+        self.options = options
+        self.workers = workers
+        self.report = report
+        self.memory = Memory()
+        self.learner = Learner(setup.signals, options, setup.seed, workers)
+        self._told = 0
+
+    def to_record(self) -> Record:
+        """What is remembered, as plain values; an iteration that is running too."""
+        return WrittenMemory.of(self.memory.asked, self.memory.latest).to_record()
+
+    def restore(self, record: object, book: Logbook) -> None:
+        """Remembers what a record holds."""
+        written = WrittenMemory.from_record(record)
+        self.memory = Memory(*written.restored(book, self.learner))
+
+    @property
+    def iteration(self) -> int:
+        """Of the model loop."""
+        latest = self.memory.latest
+        return 0 if latest is None else latest.iteration
+
+    def learn(self, book: Logbook, at_once: bool = False) -> None:
+        """One iteration on all that was told since the last test was asked for."""
+        self._told = told = len(book.experiments)
+        latest = self.memory.latest
+        if at_once and latest is not None:
+            return
+        if latest is None or len(latest.experiments) != told:
+            latest = self._begun(book)
+        if at_once:
+            self.memory = replace(self.memory, latest=latest)
+            return
+        for moved in self.learner.advanced(latest):
+            self.memory = replace(self.memory, latest=moved)
+            self._watch_models(moved)
+
+    def _begun(self, book: Logbook) -> Learning:
+        """The iteration that learns all that was told, at its beginning."""
+        known = self.memory.asked
+        if known is None:
+            return self.learner.started(book.selected, book.experiments)
+        if len(known.experiments) == len(book.experiments):
+            return known
+        return self.learner.renewed(known, book.selected, book.experiments)
+
+    def ask(self, book: Logbook, last: bool) -> Test:
+        """The test loop over the committee; that an experiment is the last means nothing to the paper."""
+        models = self.models
+        search = start_tests(
+            models,
+            self.setup.family,
+            self.setup.task,
+            self.options,
+            seed=self.setup.seed,
+            iteration=len(book.asked) + 1,
+            workers=self.workers,
+        )
+        total = self.options.generations_of_tests
+        for moved, left in chunks(search, lambda s, n: s.advance(n, self.workers), total):
+            search = moved
+            self._report("tests", total - left, total, search.archive_size, search.evaluations)
+        test = book.new_test(search.best_genes, predicted=self._predicted(search.best_genes))
+        book.enter_loop(self.iteration, test, search)
+        self.memory = replace(self.memory, asked=self.memory.latest)
+        return test
+
+    def best_test(self, book: Logbook) -> Test:
+        """The flown test that ended nearest to its target."""
+        best = book.best()
+        assert best is not None  # the paper learns tests only
+        best = best.quiet()
+        return best.judged(self._predicted(best.genes), book.measured(best.number))
+
+    def first_excitation(self, number: int) -> Floats | None:
+        """None: the paper adds none."""
+        return None
+
+    def twin(self, book: Logbook) -> Twin:
+        """The best trade-off."""
+        model = self.models.best_model
+        rows = errors(model, book, self.workers)
+        flights = [run.trajectory for run in book.experiments]
+        return Twin(model, self.setup.signals, rows, self.options.divergence_factor, flights=flights)
+
+    @property
+    def models(self) -> _core.ModelSearch:
+        """The model loop as a value."""
+        assert self.memory.latest is not None
+        return self.memory.latest.models
+
+    @property
+    def asked_model(self) -> _core.Model | None:
+        """The best trade-off when the last test was asked for."""
+        asked = self.memory.asked
+        return None if asked is None else asked.models.best_model
+
+    def history(self, book: Logbook) -> tuple[Iteration, ...]:
+        """One record for each iteration, from 0."""
+        latest = self.memory.latest
+        return () if latest is None else book.with_loops(latest.records(self.options.model_generations))
+
+    def committee(self) -> Sequence[_core.Model]:
+        """Members of the non-dominated set, the best trade-off first."""
+        return committee(self.models, self.options.committee_size)
+
+    def _predicted(self, genes: Floats) -> float:
+        factor = self.options.divergence_factor
+        task, row = self.setup.task, genes[np.newaxis]
+        distances = final_distances(
+            [self.models.best_model], self.setup.family, row, task, divergence_factor=factor
+        )
+        return float(distances[0, 0])
+
+    def _watch_models(self, latest: Learning) -> None:
+        models, total = latest.models, self.options.model_generations
+        self._report("models", total - latest.left, total, models.archive_size, models.evaluations)
+
+    def _report(
+        self, phase: str, generation: int, generations: int, archive_size: int, evaluations: int
+    ) -> None:
+        best = self.models.best_objectives.tolist()
+        self.report(
+            Progress(
+                phase=phase,
+                iteration=self.iteration,
+                generation=generation,
+                generations=generations,
+                told=self._told,
+                tests=() if self.memory.latest is None else self.memory.latest.tests,
+                open_loop=tuple(best[::2]),
+                closed_loop=tuple(best[1::2]),
+                archive_size=archive_size,
+                evaluations=evaluations,
+            )
+        )

@@ -1,0 +1,87 @@
+"""Calibration: by how much a committee was too sure of the flights that it predicted, and what exact readings leave."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment
+from twinloop.law.flight import fly
+from twinloop.law.twin import NINE_OF_TEN, Twin
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+FIRST = 2.0
+"""Factor on a committee's spread before any of its predictions was flown."""
+OF_PARTS = 1.5
+"""The same where parts of the only flight sit in it: they know more of what that leaves open than later ones know."""
+SMALLEST, LARGEST = 1.0, 30.0
+LAST = 3
+"""Flights that the factor is the median of."""
+
+
+def needed_factor(twin: Twin, test: Test, flown: Trajectory) -> float | None:
+    """Factor on the members' spread with which nine of ten readings would have been inside the band.
+
+    Args:
+        twin: before it learnt the flight.
+        test: that was flown.
+        flown: the flight.
+
+    Returns:
+        The factor; None where the twin has no committee.
+    """
+    spread = twin.spread(twin.as_flown(test, flown))
+    if spread is None or twin.noise is None:
+        return None
+    mean, variance = spread
+    rows = min(len(mean), len(flown.states))
+    if rows < 2:
+        return LARGEST
+    errors = twin.signals.difference(flown.states[1:rows], mean[1:rows])
+    squares = (errors / NINE_OF_TEN) ** 2 - twin.noise.sensors**2
+    smallest = 1e-12 * np.square([state.scale for state in twin.signals.states])
+    factors = np.sqrt(np.maximum(squares, 0.0) / np.maximum(variance[1:rows], smallest))
+    return float(np.clip(np.quantile(factors, 0.9), SMALLEST, LARGEST))
+
+
+def factor(needed: Sequence[float]) -> float:
+    """Factor to be used for the next flight.
+
+    Args:
+        needed: factors that the flights so far would have needed, in their order.
+
+    Returns:
+        The median of the last ones, with the first guess among them while there are few.
+    """
+    return float(np.median([FIRST, *needed][-LAST:]))
+
+
+def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergence_factor: float) -> Floats:
+    """What free runs of a model leave of flights that it was learnt from.
+
+    From one reading to the next, exact readings leave their own rounding; over a flight, that of the twin adds up, and
+    the more the wilder the flight is. What counts is what is left of the one in the middle.
+
+    Args:
+        model: that follows the flights to the end.
+        flights: at least one.
+        divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
+
+    Returns:
+        Standard deviations (n_x,) of normal numbers, nine of ten of which would be as small as nine of ten errors of a
+        flight, median over flights.
+    """
+    left = []
+    for flight in flights:
+        states = flight.trajectory.states
+        test = dataclasses.replace(flight.replayed, initial_state=states[0])
+        free = fly(model, test, divergence_factor=divergence_factor).states
+        rows = min(len(states), len(free))
+        errors = test.family.signals.difference(states[:rows], free[:rows])
+        left.append(np.quantile(np.abs(errors), 0.9, axis=0))
+    return np.asarray(np.median(left, axis=0) / NINE_OF_TEN, dtype=np.float64)

@@ -1,0 +1,167 @@
+"""Which controller to fly: gains tuned on a committee, the best ones flown, or none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.logbook import Logbook
+from twinloop.errors import NotAvailable
+from twinloop.planning.gains import nearby
+from twinloop.planning.judging import Committee, Judged, expected, risk
+from twinloop.planning.planner import Planner
+from twinloop.test import Test
+
+DOUBT = 3.0
+"""Standard deviations of predicted flights by which they may be worse than one that was measured."""
+UNKNOWN = "No controller to fly: "
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Chooses between gains that were tuned and the best ones flown.
+
+    Args:
+        planner: of the campaign.
+        committee: that judges.
+        book: what was told.
+        draws: of the sensors' noise.
+        confidence: share of members and draws that must find tuned gains better than the best flown.
+    """
+
+    planner: Planner
+    committee: Committee
+    book: Logbook
+    draws: int
+    confidence: float
+
+    def between(self, tuned: Floats, best: Test | None) -> Test:
+        """The controller to fly, without excitation, for the campaign's own task.
+
+        Args:
+            tuned: gains that are best on the committee (size,).
+            best: the best test flown; None if there is none.
+
+        Raises:
+            NotAvailable: neither can be answered for.
+        """
+        flown = best if best is not None and self.book.finishes(best.number) else None
+        genes = np.stack([tuned] if flown is None else [tuned, flown.genes])
+        members = self.planner.lasting(self.committee.members, genes)
+        judged = self._judge(members, genes)
+        recorded = self._judge(members, genes, measured=True).qualities
+        refused = self._refused(members, judged, tuned)
+        if flown is None:
+            if refused:
+                raise NotAvailable(
+                    f"{UNKNOWN}{refused}, and none is known to fly to the end. Fly another one that you trust."
+                )
+            reason = "Tuned on the twin, which sees them keep the envelope; none is known to fly to the end."
+            return self._tuned(tuned, judged, recorded, reason)
+        known = self.book.flies(flown.number)
+        new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
+        better = float((new < old).mean())
+        if known and not refused:
+            refused = self._not_preferred(members, recorded, tuned, flown, better)
+        if not refused:
+            share = f"{100 * better:.3g} %"
+            reason = f"Tuned on the twin, which prefers them to the best flown in {share} of its predictions."
+            if not known:
+                reason = (
+                    "Tuned on the twin: no model sees them leave the envelope, as the best gains flown did."
+                )
+            return self._tuned(tuned, judged, recorded, reason)
+        reason = f"The best gains flown: {refused}."
+        if not known:
+            reason += " They left the envelope when they flew."
+        return self._flown(flown, judged, recorded, reason)
+
+    # Inside
+
+    def _refused(self, members: Sequence[_core.Model], judged: Judged, tuned: Floats) -> str:
+        """Why tuned gains cannot be answered for; nothing if they can."""
+        if not self.committee.trusted:
+            return "the twin does not follow the runs that it was learnt from"
+        if nearby(self.planner.family, tuned[np.newaxis], self.book.unfit())[0]:
+            return "a flight with gains close to those that the twin prefers failed or was cut"
+        off = off_start(self.book)
+        elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
+        if max(float(flights.usages[:, :, 0].max()) for flights in (judged, elsewhere)) > 1.0:
+            return "a model sees those that the twin prefers leave the envelope"
+        return ""
+
+    def _not_preferred(
+        self, members: Sequence[_core.Model], recorded: Floats, tuned: Floats, flown: Test, better: float
+    ) -> str:
+        """Why the best gains flown are better than those tuned; nothing if they are not."""
+        if tuned.tobytes() == flown.genes.tobytes():
+            return "the twin knows no better ones"
+        measured = self.book.measured(flown.number) if self.book.on_task(flown) else None
+        if measured is not None and self._doubtful(members, flown, recorded, measured):
+            return (
+                "the twin expects worse of others than was measured of these, but of these it expects worse, too, and"
+                " so is not believed here"
+            )
+        if better < self.confidence:
+            share, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
+            return f"the twin prefers others in {share} of its predictions, and {asked} are asked for"
+        return ""
+
+    def _doubtful(
+        self, members: Sequence[_core.Model], flown: Test, recorded: Floats, measured: float
+    ) -> bool:
+        """Whether the twin expects less of its own gains than was measured of the best, and of that flight too."""
+        ends = flown.initial_state[np.newaxis], flown.target_state[np.newaxis]
+        excitation = None if flown.excitation is None else flown.excitation[np.newaxis]
+        again = self.planner.judge(
+            members, flown.genes[np.newaxis], self.committee.sds, self.draws, excitation, ends, measured=True
+        )
+        least = 1.01 * measured + DOUBT * again.scatter
+        return bool(recorded[:, :, 0].mean() > least and again.mean[0] > least)
+
+    def _tuned(self, genes: Floats, judged: Judged, recorded: Floats, reason: str) -> Test:
+        known = next((test for test in self.book.tests if test.genes.tobytes() == genes.tobytes()), None)
+        quiet = known is not None and known.excitation is None and self.book.on_task(known)
+        number = len(self.book.tests) if known is None else known.number
+        measured = self.book.measured(number) if quiet else None
+        return self._answer(self.book.of_task(genes, number), measured, judged, recorded, 0, reason)
+
+    def _flown(self, flown: Test, judged: Judged, recorded: Floats, reason: str) -> Test:
+        # That of another task says nothing of the campaign's own, and is none to be given back.
+        measured = self.book.measured(flown.number) if self.book.on_task(flown) else None
+        test = self.book.of_task(flown.genes, flown.number)
+        return self._answer(test, measured, judged, recorded, 1, reason)
+
+    def _answer(
+        self, test: Test, measured: float | None, judged: Judged, recorded: Floats, pick: int, reason: str
+    ) -> Test:
+        predicted, spread = expected(recorded[:, :, pick].mean(axis=1))
+        usages = judged.usages[:, :, pick]
+        return replace(test, predicted=predicted, measured=measured).explained(spread, risk(usages), reason)
+
+    def _judge(
+        self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None
+    ) -> Judged:
+        return self.planner.judge(members, genes, self.committee.sds, self.draws, measured=measured, off=off)
+
+
+def off_start(book: Logbook) -> Floats | None:
+    """How far flights began from where they were asked to, root mean square of the first readings (n_x,).
+
+    Args:
+        book: what was told.
+
+    Returns:
+        None where no test was flown.
+    """
+    difference = book.setup.signals.difference
+    off = [
+        difference(run.trajectory.states[0], run.test.initial_state)
+        for run in book.experiments
+        if run.test is not None
+    ]
+    return np.asarray(np.sqrt(np.square(off).mean(axis=0)), dtype=np.float64) if off else None

@@ -1,0 +1,254 @@
+"""Keeps a campaign in a store: opens it as its only writer, and commits what is new whenever something has changed."""
+
+from __future__ import annotations
+
+import platform
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import whole
+from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.method import Method
+from twinloop.campaign.setup import Setup
+from twinloop.errors import InvalidInput, unknown
+from twinloop.records import Record, Recorded
+from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened
+
+Answer = TypeVar("Answer")
+
+SECONDS = 30.0
+"""Between two checkpoints of a search that is under way, at most."""
+
+
+class Keeping:
+    """A campaign's way into its store.
+
+    Args:
+        where: a file, or the address of a server.
+        name: of the campaign in it; it is begun where there is none of that name.
+        setup: what the campaign is about.
+        identity: of the campaign, if it is new.
+        threads: of the engine, for the record of the session.
+
+    Raises:
+        InvalidInput: no store, or the name is that of a campaign with another setup.
+        NotAvailable: the packages of the extra `store` are missing.
+        StoreFailure: somebody else writes the campaign, or the store cannot be written.
+    """
+
+    def __init__(self, where: str | Path, name: str, setup: Setup, identity: str, threads: int) -> None:
+        _check_name(name)
+        asked = setup.to_record()
+        store = opened(where, create=True)
+        try:
+            self._keeper = Keeper(store, name, asked, identity)
+        except BaseException:
+            store.close()
+            raise
+        try:
+            held = found(store, name)
+            assert held is not None  # the keeper has entered it
+            known = Setup.from_record(held.setup).to_record()
+            _check_same(known, asked, f"Store {store.name}: expected the campaign {name!r}", "setup")
+            self._keeper.open_session(provenance(threads))
+        except BaseException:
+            self.close()
+            raise
+        self.kept: Kept = held
+        self._runs: int | None = held.runs
+        self._system: Record | None = held.system
+        self._flown: object = None
+        self._memory: object = None
+        self._saved = time.monotonic()
+
+    def keep(self, book: Logbook, method: Method) -> None:
+        """Commits what is new in the book, and what was learnt since.
+
+        Args:
+            book: of the campaign.
+            method: of the campaign.
+
+        Raises:
+            StoreFailure: the store cannot be written; nothing of it was kept.
+        """
+        memory = method.memory
+        record = None if memory is self._memory else method.to_record()
+        self._keeper.keep(book.entries(self._keeper.rows), record, self._count())
+        self._memory, self._saved = memory, time.monotonic()
+
+    def restored(self, memory: object) -> None:
+        """Says that what is remembered now is what the store holds."""
+        self._memory = memory
+
+    def checkpoint(self, method: Method) -> None:
+        """Commits a search that is under way, if the last time was a while ago.
+
+        Args:
+            method: of the campaign.
+
+        Raises:
+            StoreFailure: the store cannot be written.
+        """
+        if time.monotonic() - self._saved >= SECONDS and method.memory is not self._memory:
+            self._keeper.keep({}, method.to_record())
+            self._memory, self._saved = method.memory, time.monotonic()
+
+    def fly(self, system: object, experiments: int) -> None:
+        """Takes up a system where the campaign left it: one that counts its runs, as its noise depends on them.
+
+        Args:
+            system: that will be run.
+            experiments: runs on it in all.
+
+        Raises:
+            InvalidInput: it is another one than the campaign has flown so far.
+            StoreFailure: the store cannot be written.
+        """
+        record = system.to_record() if isinstance(system, Recorded) else None
+        if record is not None and self._system is not None:
+            what = f"Campaign.run, system: expected the one that {self.name} has flown so far,"
+            _check_same({**self._system, "runs": None}, {**record, "runs": None}, what, "system")
+            if self._runs is None:
+                self._runs = self._system.get("runs")
+        elif record is not None:
+            self._system = record
+        self._keeper.fly(self._system, experiments)
+        runs = getattr(system, "runs", None)
+        if not isinstance(runs, int) or isinstance(runs, bool):
+            self._flown = None
+            return
+        if self._flown is None and self._runs is not None and runs < self._runs:
+            setattr(system, "runs", self._runs)  # noqa: B010 - a system need not declare it
+        self._flown = system
+
+    @property
+    def store(self) -> str:
+        """The file, or the address without its password."""
+        return self._keeper.store.name
+
+    @property
+    def name(self) -> str:
+        """Of the campaign and its store, for errors."""
+        return f"the campaign {self._keeper.name!r} of {self._keeper.store.name}"
+
+    def close(self) -> None:
+        """Lets others write."""
+        self._keeper.close()
+
+    def _count(self) -> int | None:
+        if self._flown is not None:
+            self._runs = whole("System.runs", getattr(self._flown, "runs", None))
+        return self._runs
+
+
+def look(where: str | Path, name: str | None, read_only: bool) -> Kept:
+    """What a store holds of a campaign.
+
+    Args:
+        where: a file, or the address of a server.
+        name: of the campaign; None: the only one.
+        read_only: whether nothing will be written there.
+
+    Returns:
+        The campaign.
+
+    Raises:
+        InvalidInput: no store, or no such campaign in it.
+        NotAvailable: the packages of the extra `store` are missing.
+        StoreFailure: the store cannot be read.
+    """
+    return _of_store(where, name, read_only, found)
+
+
+def heading(where: str | Path, name: str | None) -> tuple[str, Record]:
+    """Name and setup of a campaign that is to be written on; the rest is read once nobody else can write it.
+
+    Args:
+        where: a file, or the address of a server.
+        name: of the campaign; None: the only one.
+
+    Returns:
+        Both.
+
+    Raises:
+        InvalidInput: no store, or no such campaign in it.
+        NotAvailable: the packages of the extra `store` are missing.
+        StoreFailure: the store cannot be read.
+    """
+    return _of_store(where, name, False, begun)
+
+
+def _of_store(
+    where: str | Path, name: str | None, read_only: bool, wanted: Callable[[Store, str | None], Answer | None]
+) -> Answer:
+    store = opened(where, read_only=read_only)
+    try:
+        answer, names = wanted(store, name), [row["name"] for row in kept(store)]
+    finally:
+        store.close()
+    if answer is None and name is not None and names:
+        raise unknown(f"campaign of the store {store.name}", name, names)
+    if answer is None:
+        raise InvalidInput(f"Store {store.name}: expected a campaign, found none; run one with store= first.")
+    return answer
+
+
+def provenance(threads: int) -> Record:
+    """What results may be traced back to: versions and processor.
+
+    Args:
+        threads: of the engine.
+    """
+    return {
+        "threads": threads,
+        "machine": platform.machine(),
+        "processor": _processor(),
+        "vectors": _core.vector_widths(),
+        "system": platform.platform(),
+        "command": list(sys.argv),
+        "versions": {
+            "twinloop": _core.__version__,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+        },
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def _check_name(name: object) -> None:
+    if not isinstance(name, str) or not 0 < len(name.strip()) <= 200:
+        raise InvalidInput(
+            f"Campaign, name: expected a text of 1 to 200 characters, found {name!r}; name it."
+        )
+
+
+def _check_same(known: Any, asked: Any, what: str, where: str) -> None:
+    """Refuses another setup or system than the one that is known, and says where they differ."""
+    if known == asked:
+        return
+    if isinstance(known, dict) and isinstance(asked, dict) and set(known) == set(asked):
+        for key in known:
+            _check_same(known[key], asked[key], what, f"{where}.{key}")
+    raise InvalidInput(
+        f"{what} with {where} = {_short(known)}, found {_short(asked)}; use another store or another name, or the same"
+        " arguments as before."
+    )
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:60]}…"

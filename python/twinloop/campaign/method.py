@@ -1,0 +1,90 @@
+"""What a campaign needs of a method: to learn what was told, to pick the next test, to name the controller to fly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Iteration, Lesson
+from twinloop.campaign.logbook import Logbook
+from twinloop.law.twin import Twin
+from twinloop.records import Record
+from twinloop.test import Test
+
+
+class Method(Protocol):
+    """One way through the double loop."""
+
+    memory: Any
+    """All that it remembers: one value that never changes, so that a copy of a campaign may share it."""
+
+    def to_record(self) -> Record:
+        """What it remembers, as numbers, texts, lists and dicts."""
+        ...
+
+    def restore(self, record: object, book: Logbook) -> None:
+        """Remembers what a record holds.
+
+        Args:
+            record: such as `to_record` gives, or JSON gives back.
+            book: with all that was told when it was written.
+
+        Raises:
+            InvalidInput: no such record, or one of another campaign; what was remembered is so still.
+        """
+        ...
+
+    @property
+    def iteration(self) -> int:
+        """Number of the turn of the loop that is running or was the last."""
+        ...
+
+    def learn(self, book: Logbook, at_once: bool = False) -> None:
+        """Learns all that was told, beginning with what was known when the last test was asked for.
+
+        What is learnt is thus a function of what was asked and told, not of who looked at it in between.
+
+        Args:
+            book: with at least one experiment.
+            at_once: whether what is known so far is enough, after an interruption.
+
+        Raises:
+            KeyboardInterrupt: what was known before is still known; calling again goes on.
+        """
+        ...
+
+    def ask(self, book: Logbook, last: bool) -> Test:
+        """Picks a test and enters it; everything told is learnt.
+
+        Args:
+            book: where it is entered.
+            last: whether no other experiment will follow.
+        """
+        ...
+
+    def best_test(self, book: Logbook) -> Test:
+        """The controller to fly; everything told is learnt."""
+        ...
+
+    def first_excitation(self, number: int) -> Floats | None:
+        """What is added to the commands of a test with gains of the user's own, where nothing else is asked for."""
+        ...
+
+    def twin(self, book: Logbook) -> Twin:
+        """The best model with its errors; everything told is learnt."""
+        ...
+
+    @property
+    def asked_model(self) -> _core.Model | None:
+        """The best model when the last test was asked for; None before."""
+        ...
+
+    def history(self, book: Logbook) -> tuple[Iteration, ...] | tuple[Lesson, ...]:
+        """A record of each turn."""
+        ...
+
+    def committee(self) -> Sequence[_core.Model]:
+        """Models that judge tests, the best first."""
+        ...

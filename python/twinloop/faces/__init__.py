@@ -1,0 +1,1 @@
+"""Faces: what people see; they show what is known and compute nothing."""

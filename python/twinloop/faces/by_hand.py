@@ -1,0 +1,203 @@
+"""The commands for people who fly their system themselves: new, ask, tell, attach, abandon."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import click
+import numpy as np
+
+from twinloop.campaign import Campaign
+from twinloop.campaign.campaign_file import read_file, template
+from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.files import check_writable, write_text
+from twinloop.faces.result import to_json
+from twinloop.faces.text import table
+from twinloop.logs import TIME, load, write_columns
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+
+@click.command()
+@click.argument("file", type=Path)
+def new(file: Path) -> None:
+    """Write a commented campaign FILE.toml to fill in for a system of your own."""
+    check_writable(file, [".toml"])
+    if file.exists():
+        raise InvalidInput(f"File {file}: expected none there, found one; choose another name, or remove it.")
+    store = file.with_suffix(".db")
+    write_text(file, template(str(store)))
+    click.echo(f"Wrote {file}: fill it in, then ask for the first test: twinloop ask {store}")
+
+
+@click.command()
+@click.argument("store", type=Path)
+@click.option("--last", is_flag=True, help="No other test will follow: fly the best gains that are known.")
+@click.option("--again", is_flag=True, help="Another test, though one is waiting.")
+@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+def ask(store: Path, last: bool, again: bool, threads: int | None, as_json: bool) -> None:
+    """Say what to fly next: a test sheet, and a file with the excitation and the predicted run.
+
+    A campaign that is not in STORE.db yet is begun from STORE.toml beside it. A test that is waiting is shown again.
+    """
+    with closing(_campaign(store, threads)) as campaign:
+        waiting = campaign.waiting
+        if not campaign.experiments and not campaign.failures:
+            test = next(iter(campaign.tests), None) or campaign.test(_first(store))
+        else:
+            test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
+        predicted = campaign.twin.simulate(test) if campaign.experiments else None
+        file = store.with_name(f"{store.stem}-test-{test.number}.csv")
+        write_columns(file, _columns(test, predicted))
+        click.echo(to_json(_facts(test, file)) if as_json else _sheet(store, test, predicted, file), nl=False)
+
+
+@click.command()
+@click.argument("store", type=Path)
+@click.argument("test", type=int)
+@click.argument("flight", type=Path, required=False)
+@click.option(
+    "--failed", metavar="REASON", help="The test failed; FLIGHT is what was recorded, if anything was."
+)
+@click.option("--aborted", metavar="REASON", help="The test was stopped before its end.")
+def tell(store: Path, test: int, flight: Path | None, failed: str | None, aborted: str | None) -> None:
+    """Tell what happened to a TEST: a FLIGHT as CSV or .npz, or why there is none."""
+    if failed is not None and aborted is not None:
+        raise InvalidInput("twinloop tell: expected --failed or --aborted, found both; leave one out.")
+    if failed is None and flight is None:
+        raise InvalidInput(
+            "twinloop tell: expected a flight, found none; name its file, or say --failed REASON."
+        )
+    with closing(_campaign(store)) as campaign:
+        known = _numbered(campaign, test)
+        ended = "completed" if aborted is None and failed is None else "aborted"
+        run = (
+            None
+            if flight is None
+            else load(flight, campaign.signals, ended=ended, reason=aborted or failed or "")
+        )
+        if failed is not None:
+            campaign.tell_failed(known, failed, run)
+        else:
+            assert run is not None  # refused above
+            if aborted is None and run.steps < known.steps:
+                raise InvalidInput(
+                    f"Log {flight}: expected the {known.steps} steps of test {test}, found {run.steps}; record it"
+                    " whole, or say why it was stopped: --aborted REASON."
+                )
+            campaign.tell(known, run)
+        click.echo(
+            f"Kept: test {test} {campaign.status(known)}; {len(campaign.experiments)} experiments in {store}."
+        )
+
+
+@click.command()
+@click.argument("store", type=Path)
+@click.argument("flight", type=Path)
+def attach(store: Path, flight: Path) -> None:
+    """Add a FLIGHT that nobody asked for, as CSV or .npz, to what is learnt."""
+    with closing(_campaign(store)) as campaign:
+        campaign.attach(load(flight, campaign.signals))
+        click.echo(f"Kept: {flight}; {len(campaign.experiments)} experiments in {store}.")
+
+
+@click.command()
+@click.argument("store", type=Path)
+@click.argument("test", type=int)
+def abandon(store: Path, test: int) -> None:
+    """Say that a TEST will not be flown."""
+    with closing(_campaign(store)) as campaign:
+        campaign.abandon(_numbered(campaign, test))
+        click.echo(f"Kept: test {test} abandoned in {store}.")
+
+
+def _campaign(store: Path, threads: int | None = None) -> Campaign:
+    """The campaign of a store; it is begun from the file beside it where there is none."""
+    file = store.with_suffix(".toml")
+    if file.exists():
+        return read_file(file).campaign(store=store, threads=threads)
+    if store.exists():
+        return Campaign.load(store, threads=threads)
+    raise InvalidInput(
+        f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
+        f" twinloop new {file}."
+    )
+
+
+def _first(store: Path) -> dict[str, float]:
+    file = store.with_suffix(".toml")
+    if not file.exists():
+        raise NotAvailable(
+            f"twinloop ask: expected the gains of the first test in {file}, found no such file; add it."
+        )
+    return dict(read_file(file).first)
+
+
+def _numbered(campaign: Campaign, number: int) -> Test:
+    if not 0 <= number < len(campaign.tests):
+        last = len(campaign.tests) - 1
+        raise InvalidInput(f"Test: expected a number from 0 to {last}, found {number}; ask for one first.")
+    return campaign.tests[number]
+
+
+def _columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
+    """What is added to each command, and the predicted run with its band."""
+    signals = test.family.signals
+    columns = {TIME: signals.dt * np.arange(test.steps + 1)}
+    if test.excitation is not None:
+        columns |= {f"excitation_{n}": test.excitation[:, i] for i, n in enumerate(signals.command_names)}
+    if predicted is not None:
+        for i, name in enumerate(signals.state_names):
+            columns[f"predicted_{name}"] = predicted.states[:, i]
+            if predicted.band is not None:
+                columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
+    return columns
+
+
+def _facts(test: Test, file: Path) -> dict[str, object]:
+    signals = test.family.signals
+    return {
+        "test": test.number,
+        "gains": test.parameters,
+        "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
+        "target_state": dict(zip(signals.state_names, test.target_state.tolist(), strict=True)),
+        "steps": test.steps,
+        "dt": signals.dt,
+        "excited": test.excitation is not None,
+        "predicted": test.predicted,
+        "spread": test.spread,
+        "risk": test.risk,
+        "why": test.reason,
+        "file": str(file),
+    }
+
+
+def _sheet(store: Path, test: Test, predicted: Trajectory | None, file: Path) -> str:
+    """The test sheet, to be printed."""
+    signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.gains}
+    gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
+    ends = zip(signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True)
+    states = [[state.name, start, target, state.unit] for state, start, target in ends]
+    added = "none" if test.excitation is None else f"a row a period in {file}, added before the bounds"
+    lines = [
+        f"TEST {test.number} of {store}: {test.steps} periods of {signals.dt:g} s",
+        "",
+        table(["set this gain", "to", "unit"], gains),
+        "",
+        table(["state", "start", "target", "unit"], states),
+        "",
+        f"Excitation of the commands: {added}.",
+    ]
+    if test.predicted is not None and predicted is not None:
+        spread = "" if test.spread is None else f" ± {test.spread:.3g}"
+        lines.append(
+            f"Predicted quality: {test.predicted:.4g}{spread}; the predicted run with its band: {file}."
+        )
+    if test.risk is not None:
+        lines.append(f"Risk of leaving the envelope: {100 * test.risk:.2g} %.")
+    lines += [test.reason] if test.reason else []
+    lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")
+    lines.append(f"  twinloop tell {store} {test.number} FLIGHT.csv")
+    return "\n".join(lines) + "\n"

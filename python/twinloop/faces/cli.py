@@ -1,0 +1,205 @@
+"""The command `twinloop`: checks what it was asked before it works, and exits 0, 1 or 2."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import click
+
+from twinloop import __version__
+from twinloop.campaign import Campaign
+from twinloop.campaign.presets import PRESETS, options_of, parsed
+from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
+from twinloop.faces.by_hand import abandon, ask, attach, new, tell
+from twinloop.faces.console import Watch
+from twinloop.faces.exporting import export
+from twinloop.faces.stored import resume, show
+from twinloop.faces.terminal import prepared
+from twinloop.faces.working import answers, check_answer, work
+from twinloop.planning.planner import GOALS
+from twinloop.planning.quality import KINDS
+from twinloop.systems import BUILT_IN, Quadrotor
+
+STUDIES = {"bench": "twinloop.exam.command", "reproduce": "twinloop.reproduce.command"}
+"""Verbs that are loaded when they are called, by the module that holds each."""
+
+
+class OneSentence(click.Group):
+    """A group of commands that says what went wrong in one sentence, and exits 1 or 2."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        """All verbs, those of studies among them."""
+        return sorted([*super().list_commands(context), *STUDIES])
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        """A verb by its name."""
+        if name in STUDIES:
+            verb: click.Command = getattr(import_module(STUDIES[name]), name)
+            return verb
+        return super().get_command(context, name)
+
+    def main(self, args: Any = None, prog_name: str | None = None, **extra: Any) -> Any:  # type: ignore[override]
+        """Runs the command line; see `click.Command.main`."""
+        if not extra.pop("standalone_mode", True):
+            return super().main(args, prog_name, standalone_mode=False, **extra)
+        try:
+            with warnings.catch_warnings(), prepared():
+                code = super().main(args, prog_name, standalone_mode=False, **extra)
+        except click.ClickException as misuse:
+            _fail(misuse.format_message(), misuse.exit_code)
+        except (InvalidInput, NotAvailable) as misuse:
+            _fail(str(misuse), 2)
+        except TwinloopError as failure:
+            _fail(str(failure), 1)
+        except (click.Abort, KeyboardInterrupt):
+            _fail("Interrupted before there was a result.", 130)
+        except OSError as failure:
+            _fail(f"The system refused: {failure}.", 1)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+@click.group(
+    cls=OneSentence, context_settings={"help_option_names": ["-h", "--help"]}, invoke_without_command=True
+)
+@click.version_option(__version__, prog_name="twinloop", message="%(prog)s %(version)s")
+@click.pass_context
+def main(context: click.Context) -> None:
+    """From a handful of experiments to a twin made of readable equations and a tuned controller."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+@main.command()
+@click.argument("system")
+@click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
+@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--preset", default="default", show_default=True, help=f"Set of options: {', '.join(PRESETS)}.")
+@click.option(
+    "--experiments", type=int, default=4, show_default=True, help="Runs on the system, the first included."
+)
+@click.option("--goal", help=f"What flights are for: {', '.join(GOALS)}; by default both.")
+@click.option("--quality", help=f"What is minimised: {', '.join(KINDS)}; by default the preset's.")
+@click.option("--generations", type=int, help="Preset paper: of the model loop, in each iteration.")
+@click.option(
+    "--test-generations",
+    type=int,
+    help="Preset paper: of the test loop; by default a share of --generations.",
+)
+@click.option("--noise", type=float, help="Of the sensors, rad; five times in rad/s.  [default: 0]")
+@click.option(
+    "--gyroscopic", default="physical", show_default=True, help="Signs of the rotor terms: physical, print."
+)
+@click.option("--harsh", is_flag=True, help="The same vehicle with drag, slow motors, gusts and noise 0.001.")
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Any other option of the preset.")
+@click.option(
+    "--store", metavar="FILE.db|URL", help="Keep the campaign there; go on with the one that is there."
+)
+@click.option("--name", default="campaign", show_default=True, help="Of the campaign in its store.")
+@answers
+@click.pass_context
+def run(
+    context: click.Context,
+    system: str,
+    seed: int,
+    threads: int | None,
+    preset: str,
+    experiments: int,
+    goal: str | None,
+    quality: str | None,
+    generations: int | None,
+    test_generations: int | None,
+    noise: float | None,
+    gyroscopic: str,
+    harsh: bool,
+    changes: tuple[str, ...],
+    store: str | None,
+    name: str,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Experiment on a built-in SYSTEM (quadrotor): learn its twin, tune its controller."""
+    if system not in BUILT_IN:
+        raise unknown("system", system, BUILT_IN)
+    if experiments < 1:
+        raise InvalidInput(
+            f"--experiments: expected at least 1, found {experiments}; the first flight counts."
+        )
+    options = dict(_change(preset, change) for change in changes)
+    options |= _generations(preset, generations, test_generations)
+    rig = _vehicle(system, noise, seed, gyroscopic, harsh)
+    watch = Watch(options_of(preset, options), experiments, system)
+    check_answer(output, plot)
+    campaign = Campaign(
+        rig.signals,
+        controller=rig.controller,
+        initial_state=rig.initial_state,
+        target_state=rig.target_state,
+        duration=rig.duration,
+        preset=preset,
+        seed=seed,
+        options=options,
+        goal=goal,
+        quality=quality,
+        threads=threads,
+        progress=watch,
+        store=store,
+        name=name,
+    )
+    context.exit(work(campaign, rig, watch, experiments, output, plot, as_json))
+
+
+for command in (new, ask, tell, attach, abandon):
+    main.add_command(command)
+main.add_command(resume)
+main.add_command(show)
+main.add_command(export)
+
+
+def _change(preset: str, text: str) -> tuple[str, object]:
+    name, separator, value = (part.strip() for part in text.partition("="))
+    if not separator:
+        example = "pages=3" if preset == "paper" else "lags=false"
+        raise InvalidInput(f"--set: expected NAME=VALUE, found {text!r}; such as --set {example}.")
+    if preset in PRESETS and not hasattr(PRESETS[preset], name):
+        for other, options in PRESETS.items():
+            if hasattr(options, name):
+                raise InvalidInput(
+                    f"--set: expected an option of the preset {preset!r}, found {name!r}, which is one of the preset"
+                    f" {other!r}; leave it out, or choose --preset {other}."
+                )
+    return name, parsed(preset, name, value)
+
+
+def _generations(preset: str, models: int | None, tests: int | None) -> dict[str, object]:
+    given = {"model_generations": models, "test_generations": tests}
+    options: dict[str, object] = {name: value for name, value in given.items() if value is not None}
+    if options and preset == "default":
+        raise InvalidInput(
+            "--generations, --test-generations: expected the preset 'paper', found 'default', which identifies instead"
+            " of evolving whole models; leave them out, or choose --preset paper."
+        )
+    return options
+
+
+def _vehicle(system: str, noise: float | None, seed: int, gyroscopic: str, harsh: bool) -> Quadrotor:
+    if not harsh:
+        return BUILT_IN[system](noise=0.0 if noise is None else noise, seed=seed, gyroscopic=gyroscopic)
+    if gyroscopic != "physical":
+        raise InvalidInput(
+            f"--harsh: expected --gyroscopic physical, found {gyroscopic!r}; leave one of the two out."
+        )
+    return BUILT_IN[system].harsh(noise=1e-3 if noise is None else noise, seed=seed)
+
+
+def _fail(sentence: str, code: int) -> None:
+    click.echo(f"twinloop: {sentence}", err=True)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,320 @@
+"""Progress on standard error: a live table on a terminal, a plain line every few seconds elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import Protocol
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from twinloop.campaign.history import Progress
+from twinloop.campaign.presets import AnyOptions, DefaultOptions, Options
+
+LINE_SECONDS = 5.0
+"""Between two plain lines."""
+STEPS = {
+    "noise": ("estimating the noise", 0.2),
+    "actuators": ("searching lags and delays", 4.0),
+    "hidden": ("searching a hidden state", 1.0),
+    "terms": ("selecting terms", 1.2),
+    "evolution": ("growing terms", 0.7),
+    "smoothed": ("selecting again, on smoothed states", 0.5),
+    "parts": ("learning from parts of the flight", 0.8),
+    "committee": ("drawing a committee", 0.2),
+    "gains": ("tuning gains", 0.3),
+    "candidates": ("choosing the next flight", 0.1),
+}
+"""What the preset `default` does after each experiment, in order: for a person, and its usual share of the time."""
+
+
+class Remaining(Protocol):
+    """Estimates the time that is left."""
+
+    later: int
+    """Campaigns that are still to come."""
+
+    def remaining(self, progress: Progress) -> float | None:
+        """Seconds that are left; None as long as nothing is known."""
+        ...
+
+
+class Estimate:
+    """Time left of a campaign of the preset `paper`, from the work done so far.
+
+    Args:
+        options: of the campaign.
+        experiments: that it will make.
+        later: campaigns like it that are still to come.
+    """
+
+    def __init__(self, options: Options, experiments: int, later: int = 0) -> None:
+        self.options = options
+        self.experiments = experiments
+        self.later = later
+        self._seconds = {"models": 0.0, "tests": 0.0}
+        self._work = {"models": 0.0, "tests": 0.0}
+        self._at: tuple[str, int, int] | None = None
+        self._clock = time.monotonic()
+
+    def remaining(self, progress: Progress) -> float | None:
+        """Seconds that are left; None as long as nothing is known.
+
+        Args:
+            progress: where the campaign is.
+        """
+        now = time.monotonic()
+        at = (progress.phase, progress.iteration, progress.generation)
+        if progress.phase in self._work:
+            before = self._at[2] if self._at is not None and self._at[:2] == at[:2] else 0
+            self._work[progress.phase] += (progress.generation - before) * self._weight(
+                progress.phase, progress.iteration
+            )
+            self._seconds[progress.phase] += now - self._clock
+        self._at, self._clock = at, now
+        rates = [self._seconds[phase] / work for phase, work in self._work.items() if work > 0.0]
+        if not rates:
+            return None
+        return sum(
+            left * (self._seconds[phase] / self._work[phase] if self._work[phase] > 0.0 else max(rates))
+            for phase, left in self._left(progress).items()
+        )
+
+    def _weight(self, phase: str, iteration: int) -> float:
+        """Roll-outs of a generation, more or less."""
+        options = self.options
+        if phase == "models":
+            return 2.0 * options.model_population * max(1, iteration)
+        return float(options.test_population * (options.committee_size + options.mutants))
+
+    def _left(self, progress: Progress) -> dict[str, float]:
+        left = {"models": 0.0, "tests": 0.0}
+        for iteration in range(progress.iteration + 1, self.experiments + 1):
+            left["models"] += self.options.model_generations * self._weight("models", iteration)
+        loops = self.experiments - 1 - progress.iteration + (progress.phase == "models")
+        left["tests"] += max(0, loops) * self.options.generations_of_tests * self._weight("tests", 0)
+        if progress.phase in left:
+            missing = progress.generations - progress.generation
+            left[progress.phase] += missing * self._weight(progress.phase, progress.iteration)
+        for iteration in range(1, self.experiments + 1):
+            left["models"] += self.later * self.options.model_generations * self._weight("models", iteration)
+        loops = self.later * (self.experiments - 1)
+        left["tests"] += loops * self.options.generations_of_tests * self._weight("tests", 0)
+        return left
+
+
+class StepEstimate:
+    """Time left of a campaign of the preset `default`, from how long each step took so far.
+
+    A step takes longer the more experiments are learnt; one that was not seen yet is believed to have its usual share.
+
+    Args:
+        experiments: that the campaign will make.
+        later: campaigns like it that are still to come.
+    """
+
+    def __init__(self, experiments: int, later: int = 0) -> None:
+        self.experiments = experiments
+        self.later = later
+        self._seconds = dict.fromkeys(STEPS, 0.0)
+        self._work = dict.fromkeys(STEPS, 0.0)
+        self._running: tuple[str, int] | None = None
+        self._since = time.monotonic()
+
+    def remaining(self, progress: Progress) -> float | None:
+        """Seconds that are left; None as long as nothing is known.
+
+        Args:
+            progress: where the campaign is.
+        """
+        now = time.monotonic()
+        if self._running != (progress.phase, progress.told):
+            if self._running is not None and self._running[0] in STEPS:
+                step, told = self._running
+                self._seconds[step] += now - self._since
+                self._work[step] += _work(told)
+            self._running, self._since = (progress.phase, progress.told), now
+        usual = sum(STEPS[step][1] * work for step, work in self._work.items())
+        if usual <= 0.0:
+            return None
+        pace = sum(self._seconds.values()) / usual
+        rates = {
+            step: self._seconds[step] / work if work > 0.0 else pace * STEPS[step][1]
+            for step, work in self._work.items()
+        }
+        return max(0.0, self._left(progress, rates, now - self._since))
+
+    def _left(self, progress: Progress, rates: dict[str, float], running: float) -> float:
+        names = list(STEPS)
+        left = 0.0
+        for told in range(1, self.experiments + 1):
+            last = told == self.experiments
+            steps = [name for name in names if not (last and name == "candidates")]
+            whole = sum(rates[step] for step in steps) * _work(told)
+            left += whole * self.later
+            if told > progress.told:
+                left += whole
+            elif told == progress.told and progress.phase in steps:
+                after = steps[names.index(progress.phase) + 1 :]
+                left += max(0.0, rates[progress.phase] * _work(told) - running)
+                left += sum(rates[step] for step in after) * _work(told)
+        return left
+
+
+def _work(told: int) -> float:
+    """How much there is to do after so many experiments, more or less."""
+    return 1.0 + told
+
+
+class Watch:
+    """Shows the progress of campaigns; use it as a context, and as the campaigns' progress callback.
+
+    Args:
+        options: of the campaigns.
+        experiments: that each will make.
+        name: what is being run.
+        campaigns: how many there will be, one after the other.
+    """
+
+    def __init__(self, options: AnyOptions, experiments: int, name: str, campaigns: int = 1) -> None:
+        self.experiments = experiments
+        self.label = name
+        self._name, self._campaigns = name, campaigns
+        self._in_steps = isinstance(options, DefaultOptions)
+        self._estimate: Remaining = (
+            Estimate(options, experiments, campaigns - 1)
+            if isinstance(options, Options)
+            else StepEstimate(experiments, campaigns - 1)
+        )
+        self._console = Console(stderr=True)
+        self._lock = threading.Lock()
+        self._seen: Progress | None = None
+        self._started = time.monotonic()
+        self._live = self._table_on_terminal() if sys.stderr.isatty() else None
+        self._phase: tuple[str, int] | None = None
+        self._phase_start = (0.0, 0)
+        self._last_line = -LINE_SECONDS
+
+    def _table_on_terminal(self) -> Live:
+        if self._in_steps:  # a step may take seconds: the clock goes on within it
+            return Live(console=self._console, get_renderable=self._now, refresh_per_second=4, transient=True)
+        return Live(console=self._console, auto_refresh=False, transient=True)
+
+    def __enter__(self) -> Watch:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def begin(self, campaign: int) -> None:
+        """Says that a campaign begins.
+
+        Args:
+            campaign: its number, from 0.
+        """
+        self.label = f"{self._name}, run {campaign + 1} of {self._campaigns}"
+        self._estimate.later = self._campaigns - 1 - campaign
+
+    def __call__(self, progress: Progress) -> None:
+        """Shows where the campaign is."""
+        now = time.monotonic()
+        if self._phase != (progress.phase, progress.iteration):
+            self._phase = (progress.phase, progress.iteration)
+            self._phase_start = (now, progress.evaluations)
+        elapsed = now - self._phase_start[0]
+        rate = (progress.evaluations - self._phase_start[1]) / elapsed if elapsed > 0.0 else None
+        with self._lock:
+            self._seen = progress
+            left = self._estimate.remaining(progress)
+        if self._live is not None:
+            if not self._in_steps:
+                self._live.update(self._table(progress, rate, left), refresh=True)
+        elif now - self._last_line >= LINE_SECONDS:
+            self._last_line = now
+            self._console.print(
+                self._line(progress, rate, left), highlight=False, soft_wrap=True, markup=False
+            )
+
+    def _now(self) -> Table:
+        """The table as it is at this moment; called from the thread that redraws it."""
+        with self._lock:
+            progress = self._seen
+            left = None if progress is None else self._estimate.remaining(progress)
+        if progress is None:
+            table = Table.grid()
+            table.add_row(self.label, style="bold")
+            return table
+        return self._table(progress, None, left)
+
+    def _headline(self, progress: Progress, rate: float | None, left: float | None) -> list[tuple[str, str]]:
+        if progress.phase == "experiment":
+            return [("flying experiment", f"{progress.told + 1} of {self.experiments}")]
+        facts = [("experiments", f"{progress.told} of {self.experiments}")]
+        if progress.phase in STEPS:
+            facts.append(
+                ("step", f"{progress.generation} of {progress.generations}, {STEPS[progress.phase][0]}")
+            )
+            if progress.archive_size:
+                facts.append(("committee", str(progress.archive_size)))
+            facts.append(("elapsed", duration(time.monotonic() - self._started)))
+        else:
+            facts += [
+                ("iteration", str(progress.iteration)),
+                (f"generation of {progress.phase}", f"{progress.generation} of {progress.generations}"),
+                ("non-dominated", str(progress.archive_size)),
+                ("evaluations/s", "–" if rate is None else f"{rate:.0f}"),
+            ]
+        return [*facts, ("left", "–" if left is None else duration(left))]
+
+    def _line(self, progress: Progress, rate: float | None, left: float | None) -> str:
+        errors = ", ".join(
+            f"{test}: {free:.3g}" for test, free in zip(progress.tests, progress.closed_loop, strict=False)
+        )
+        parts = [f"{name} {value}" for name, value in self._headline(progress, rate, left)]
+        if errors:
+            parts.append(f"closed loop of test {errors}")
+        return f"{self.label}: {'; '.join(parts)}"
+
+    def _table(self, progress: Progress, rate: float | None, left: float | None) -> Table:
+        outer = Table.grid(padding=(0, 3))
+        facts = Table.grid(padding=(0, 2))
+        facts.add_row(self.label, style="bold")
+        for name, value in self._headline(progress, rate, left):
+            facts.add_row(name, value)
+        if not progress.closed_loop:
+            outer.add_row(facts)
+            return outer
+        steps = progress.open_loop or (None,) * len(progress.closed_loop)
+        columns = ["test", "open loop", "closed loop"] if progress.open_loop else ["test", "closed loop"]
+        errors = Table(*columns, box=None, header_style="bold")
+        for test, step, free in zip(progress.tests, steps, progress.closed_loop, strict=False):
+            numbers = [free] if step is None else [step, free]
+            errors.add_row(str(test), *(f"{number:.3g}" for number in numbers))
+        outer.add_row(facts, errors)
+        return outer
+
+
+def duration(seconds: float) -> str:
+    """A length of time, for a person.
+
+    Args:
+        seconds: s.
+
+    Returns:
+        Such as "42 s", "3 min 05 s" or "2 h 10 min".
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"

@@ -1,0 +1,72 @@
+"""`twinloop export`: the twin or the controller of a stored campaign, for use elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from twinloop.campaign import Campaign
+from twinloop.errors import InvalidInput, unknown
+from twinloop.law.exports.export import PRECISIONS, SUFFIXES
+from twinloop.law.twin import load_twin
+
+WHAT = ("twin", "controller")
+"""What a campaign has to be taken away."""
+
+
+@click.command("export")
+@click.argument("source", type=click.Path(path_type=Path))
+@click.argument("what", default="twin")
+@click.option("--to", "kind", help=f"Kind: {', '.join(SUFFIXES)}; for a controller python or c.")
+@click.option("--output", type=click.Path(path_type=Path), help="File to write; without it, standard output.")
+@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option("--precision", default="double", show_default=True, help=f"Of C: {' or '.join(PRECISIONS)}.")
+@click.option(
+    "--force", is_flag=True, help="Also a twin that does not follow its flights, and without the check."
+)
+def export(
+    source: Path,
+    what: str,
+    kind: str | None,
+    output: Path | None,
+    name: str | None,
+    precision: str,
+    force: bool,
+) -> None:
+    """Exports the TWIN (or the CONTROLLER) of SOURCE: a store with a campaign, or a twin as JSON.
+
+    What is exported is run on the campaign's own flights and compared before it is written.
+    """
+    if what not in WHAT:
+        raise unknown("thing to export", what, WHAT)
+    if kind is None and output is None:
+        raise InvalidInput(
+            f"Export: expected --to {'|'.join(SUFFIXES)} or --output FILE, found neither; add one."
+        )
+    if not source.exists():
+        raise InvalidInput(
+            f"Export: expected a store or a twin as JSON, found no file {str(source)!r}; run with --store."
+        )
+    to: str | Path = output if output is not None else str(kind)
+    if what == "twin":
+        twin = load_twin(source) if source.suffix == ".json" else _campaign(source, name).twin
+        made = twin.export(to, kind=kind if output is not None else None, precision=precision, force=force)
+    else:
+        if source.suffix == ".json":
+            raise InvalidInput(
+                "Export: expected a store with a campaign, found JSON, which holds a twin alone."
+            )
+        if output is not None and kind is not None and SUFFIXES.get(kind) != output.suffix:
+            raise InvalidInput(
+                f"Export: expected {str(output)!r} to end in {SUFFIXES.get(kind)!r}; change one of them."
+            )
+        made = _campaign(source, name).export_controller(to, precision=precision, force=force)
+    if isinstance(made, str):
+        click.echo(made, nl=False)
+    else:
+        click.echo(f"Wrote {', '.join(str(path) for path in made)}.")
+
+
+def _campaign(store: Path, name: str | None) -> Campaign:
+    return Campaign.load(store, name, read_only=True)

@@ -1,0 +1,307 @@
+"""A campaign as one plain dictionary: what every face shows, and what `--json` and `--output` write."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign.assessment import expected_quality
+from twinloop.campaign.history import Experiment, Lesson
+from twinloop.campaign.presets import DefaultOptions
+from twinloop.controllers import Gain
+from twinloop.identification.sensors.noise import exact
+from twinloop.law.accuracy import TestErrors
+from twinloop.law.twin import Twin
+from twinloop.objectives import normalised_error
+from twinloop.planning.quality import Quality
+from twinloop.test import Test
+
+Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
+Result = dict[str, Value]
+
+
+def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[str, object]) -> Result:
+    """What a campaign found.
+
+    Args:
+        campaign: with at least one experiment told; what it has not learnt yet is learnt now.
+        system: what was experimented on: its name and settings.
+        run_info: all that may differ between equal runs: times, threads, host, command line, versions.
+
+    Returns:
+        A dictionary of numbers, texts, lists and dictionaries; a number that is not finite is None.
+
+    Raises:
+        KeyboardInterrupt: while learning; calling again gives the best so far.
+        NotAvailable: nothing was told.
+    """
+    twin, (best, why) = campaign.twin, controller_to_fly(campaign)
+    identified = isinstance(campaign.options, DefaultOptions)
+    result: dict[str, object] = {
+        "system": dict(system),
+        "preset": campaign.setup.preset,
+        "options": dataclasses.asdict(campaign.options),
+        "goal": campaign.setup.goal,
+        "quality": {"kind": campaign.setup.quality.kind, "unit": quality_unit(campaign.setup.quality)},
+        "seed": campaign.setup.seed,
+        "interrupted": campaign.interrupted,
+        "task": {
+            "initial_state": campaign.setup.initial_state.tolist(),
+            "target_state": campaign.setup.target_state.tolist(),
+            "steps": campaign.setup.steps,
+            "dt": campaign.signals.dt,
+            "distance": float(
+                np.linalg.norm(
+                    campaign.signals.difference(campaign.setup.final_target, campaign.setup.initial_state)
+                )
+            ),
+        },
+        "signals": {
+            "states": [dataclasses.asdict(state) for state in campaign.signals.states],
+            "commands": [dataclasses.asdict(command) for command in campaign.signals.commands],
+        },
+        "experiments": [
+            {**_experiment(run, row, identified), "series": _series(run, twin)}
+            for run, row in zip(campaign.experiments, twin.errors, strict=True)
+        ],
+        "iterations": [dataclasses.asdict(iteration) for iteration in campaign.history],
+        "twin": {
+            "form": twin.model.form,
+            "equations": twin.equations().splitlines(),
+            "exact_equations": twin.equations(digits=17).splitlines(),
+            "program": str(twin.model.program).splitlines(),
+            "intron_share": twin.model.program.intron_share,
+        },
+        "failures": [
+            {"test": failure.test.number, "gains": failure.test.parameters, "reason": failure.reason}
+            for failure in campaign.failures
+        ],
+        "controller": None if best is None else _controller(campaign, best, identified),
+        "no_controller": why or None,
+        "first_controller": _first_controller(campaign, twin, identified),
+        "run_info": dict(run_info),
+    }
+    if identified:
+        _add_identified(result, campaign)
+    return plain_dict(result)
+
+
+def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, object]:
+    found: dict[str, object] = {
+        "test": best.number,
+        "gains": [
+            {
+                "name": gain.name,
+                "value": best.parameters[gain.name],
+                "unit": gain.unit,
+                "low": gain.low if isinstance(gain, Gain) else None,
+                "high": gain.high if isinstance(gain, Gain) else None,
+            }
+            for gain in campaign.family.law_gains
+        ],
+        "predicted": best.predicted,
+        "measured": best.measured,
+    }
+    if identified:
+        flown = any(run.number == best.number for run in campaign.experiments)
+        found |= {"spread": best.spread, "risk": best.risk, "why": best.reason, "flown": flown}
+    return found
+
+
+def _first_controller(campaign: Campaign, twin: Twin, identified: bool) -> dict[str, object] | None:
+    """Of the first test that was flown; None where none was."""
+    for run in campaign.experiments:
+        if run.test is not None:
+            found: dict[str, object] = {
+                "test": run.test.number,
+                "gains": run.test.parameters,
+                "measured": run.quality if identified else run.final_distance,
+            }
+            return found | (
+                {"predicted": expected_quality(twin, campaign.setup, run.test.quiet())} if identified else {}
+            )
+    return None
+
+
+def quality_unit(quality: Quality) -> str:
+    """Unit of a quality, where it has one: "" where states of several units, or commands, are weighed together.
+
+    Args:
+        quality: of a campaign.
+    """
+    counted = [
+        (state, weight)
+        for state, weight in zip(quality.signals.states, quality.weights.tolist(), strict=True)
+        if weight != 0.0
+    ]
+    units = {state.unit for state, _ in counted}
+    if (
+        len(units) != 1
+        or any(weight != 1.0 for _, weight in counted)
+        or quality.effort
+        or quality.effort_rate
+    ):
+        return ""
+    unit = units.pop()
+    return {"iae": f"{unit} s", "ise": f"{unit}² s"}.get(quality.kind, unit)
+
+
+def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str, object]:
+    test = run.test
+    predicted = None if test is None else test.predicted
+    found: dict[str, object] = {
+        "test": run.number,
+        "gains": None if test is None else test.parameters,
+        "ended": run.trajectory.ended,
+        "reason": run.trajectory.reason,
+        "steps": run.trajectory.steps,
+        "predicted": predicted,
+        "measured": run.quality if identified else run.final_distance,
+        **{key: value for key, value in dataclasses.asdict(row).items() if key != "test"},
+        "frozen": run.frozen,
+    }
+    if identified:
+        both = predicted is not None and run.quality is not None
+        found |= {
+            "spread": None if test is None else test.spread,
+            "predicted_minus_measured": predicted - run.quality if both else None,  # type: ignore[operator]
+            "risk": None if test is None else test.risk,
+            "why": "" if test is None else test.reason,
+            "excited": test is not None and test.excitation is not None,
+            "final_distance": run.final_distance,
+            "normalised_before": None if row.before is None else normalised_error(row.before, run.frozen),
+        }
+    return found
+
+
+def _series(run: Experiment, twin: Twin) -> dict[str, object]:
+    """A flight and what the twin makes of it: times, states, commands; a band where a committee stands behind it."""
+    predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
+    return {
+        "t": run.trajectory.t,
+        "states": run.trajectory.states,
+        "commands": run.trajectory.commands,
+        "simulated": predicted.states,
+        "band": predicted.band,
+    }
+
+
+def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
+    """What only the preset `default` knows: noise, actuators, what is left, what another experiment would bring."""
+    twin, lesson = campaign.twin, campaign.history[-1]
+    assert isinstance(lesson, Lesson)
+    result["twin"] |= {
+        "terms": lesson.terms,
+        "misfit": lesson.misfit,
+        "readings": lesson.readings,
+        "ignored": lesson.ignored,
+        "committee": len(campaign.committee),
+        "states": [
+            {"name": state.name, "unit": state.unit, "error": error, "sensor": sensor, "offset": offset}
+            for state, error, sensor, offset in zip(
+                campaign.signals.states,
+                campaign.rmse.tolist(),
+                lesson.sensors,
+                lesson.offsets,
+                strict=True,
+            )
+        ],
+        "actuators": [
+            {"name": command.name, "lag": lag, "delay": delay}
+            for command, lag, delay in zip(campaign.signals.commands, lesson.lags, lesson.delays, strict=True)
+        ],
+        "hidden": [
+            {
+                "commands": [campaign.signals.commands[i].name for i in commands],
+                "squared": squared,
+                "rest": rest,
+                "time": time,
+            }
+            for commands, squared, rest, time in lesson.hidden
+        ],
+        "disturbances": _disturbances(campaign, twin, lesson),
+        "remarks": [
+            {"code": remark.code, "severity": remark.severity, "sentence": remark.sentence}
+            for remark in twin.remarks
+        ],
+    }
+    assert campaign.advice is not None
+    result["advice"] = dataclasses.asdict(campaign.advice)
+
+
+def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[str, object]]:
+    """What moves the states beside the commands: white, and lasting with a memory; those that are felt at all."""
+    # By exact readings none is told: the least that is believed was held.
+    if twin.noise is None or exact(lesson.misfit):
+        return []
+    lasting = {each.states[0]: (each.sd, each.memory) for each in twin.noise.lasting}
+    found: list[dict[str, object]] = []
+    for i, (state, white) in enumerate(zip(campaign.signals.states, twin.noise.moves.tolist(), strict=True)):
+        size, memory = lasting.get(i, (0.0, 0.0))
+        # What is far below the sensor's noise, estimated beside it, within its memory cannot be told from nothing.
+        least = 0.01 * lesson.sensors[i]
+        white = white if white > least else 0.0
+        size = size if size * max(memory, campaign.signals.dt) > least else 0.0
+        if white or size:
+            found.append(
+                {"name": state.name, "unit": state.unit, "white": white, "lasting": size, "memory": memory}
+            )
+    return found
+
+
+def plain_dict(values: Mapping[str, object]) -> Result:
+    """A dictionary that JSON can hold.
+
+    Args:
+        values: anything that `plain` takes, by name.
+
+    Returns:
+        The same, plain.
+    """
+    return {str(key): plain(value) for key, value in values.items()}
+
+
+def plain(value: object) -> Value:
+    """A value that JSON can hold.
+
+    Args:
+        value: numbers, texts, arrays, sequences and mappings of them.
+
+    Returns:
+        The same in Python's own types; None for a number that is not finite.
+
+    Raises:
+        TypeError: a value of another type.
+    """
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Mapping):
+        return plain_dict(value)
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    raise TypeError(f"expected numbers, texts, lists and dicts, found {type(value).__name__}")
+
+
+def to_json(result: Mapping[str, object], ascii_only: bool = False) -> str:
+    """One JSON object, two spaces deep, with a last line break.
+
+    Args:
+        result: a plain dictionary.
+        ascii_only: whether all other letters are written as escapes.
+
+    Returns:
+        The text.
+    """
+    return json.dumps(plain_dict(result), indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n"

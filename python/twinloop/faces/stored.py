@@ -1,0 +1,142 @@
+"""The commands for campaigns in a store: `twinloop resume` and `twinloop show`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from twinloop.campaign import Campaign
+from twinloop.campaign.history import Iteration
+from twinloop.campaign.keeping import look
+from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.console import Watch
+from twinloop.faces.result import summary, to_json
+from twinloop.faces.run_info import Stopwatch
+from twinloop.faces.terminal import is_utf_8
+from twinloop.faces.text import render, table
+from twinloop.faces.working import answers, check_answer, described, knows_nothing, work
+from twinloop.store import Kept, kept, opened
+from twinloop.systems import BUILT_IN, Quadrotor
+
+
+@click.command()
+@click.argument("store")
+@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option("--experiments", type=int, help="Runs in all; by default as many as were asked for.")
+@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@answers
+@click.pass_context
+def resume(
+    context: click.Context,
+    store: str,
+    name: str | None,
+    experiments: int | None,
+    threads: int | None,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Go on with a campaign of STORE on a built-in system, with the same bits."""
+    check_answer(output, plot)
+    held = look(store, name, read_only=False)
+    rig = _system(held)
+    budget = held.experiments if experiments is None else experiments
+    assert budget is not None  # it stands beside the system
+    campaign = Campaign.load(store, held.name, threads=threads)
+    watch = Watch(campaign.options, budget, "quadrotor")
+    campaign.progress = watch
+    context.exit(work(campaign, rig, watch, budget, output, plot, as_json))
+
+
+@click.command()
+@click.argument("store")
+@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+def show(store: str, name: str | None, as_json: bool) -> None:
+    """Show what STORE holds, as it was written last; nothing is learnt or changed, and a writer is not held up."""
+    campaigns = _campaigns(store)
+    if name is None and len(campaigns) != 1:
+        rows = [[row["name"], row["created"], row["tests"], row["experiments"]] for row in campaigns]
+        text = table(["campaign", "begun", "tests", "experiments"], rows) + "\n"
+        _print({"campaigns": campaigns}, text, as_json)
+        return
+    held = look(store, name, read_only=True)
+    campaign = Campaign.load(store, held.name, read_only=True)
+    facts = _facts(held, campaign)
+    campaign.interrupted = True  # what was learnt so far is enough
+    known = bool(campaign.experiments) and held.memory is not None and not knows_nothing(campaign)
+    result = _result(campaign, held) if known else None
+    text = _sentences(store, facts) + ("" if result is None else f"\n{render(result)}")
+    _print({"store": facts, "result": result}, text, as_json)
+
+
+def _result(campaign: Campaign, held: Kept) -> dict[str, Any]:
+    """What was learnt when the store was written last; `interrupted` where that is not all that was told."""
+    result: dict[str, Any] = summary(campaign, _named(held), Stopwatch(campaign.threads).info())
+    last = campaign.history[-1]
+    running = isinstance(last, Iteration) and last.generations < held.setup["options"]["model_generations"]
+    result["interrupted"] = running or len(last.tests) < len(campaign.experiments)
+    return result
+
+
+def _campaigns(store: str) -> list[dict[str, Any]]:
+    source = opened(store, read_only=True)
+    try:
+        return kept(source)
+    finally:
+        source.close()
+
+
+def _system(held: Kept) -> Quadrotor:
+    """The system that a campaign flies, if it is a built-in one."""
+    kind = None if held.system is None else held.system["kind"]
+    if kind not in BUILT_IN:
+        raise NotAvailable(
+            "twinloop resume: expected a campaign that flies a built-in system, found"
+            f" {'another one' if kind is None else repr(kind)}; go on from Python, with the same arguments and store=."
+        )
+    return BUILT_IN[kind].from_record(held.system)
+
+
+def _named(held: Kept) -> dict[str, object]:
+    try:
+        system = _system(held)
+    except (NotAvailable, InvalidInput):
+        return {"name": "a system of your own"}
+    return described("quadrotor", system)
+
+
+def _facts(held: Kept, campaign: Campaign) -> dict[str, object]:
+    return {
+        "name": held.name,
+        "created": held.created,
+        "preset": campaign.setup.preset,
+        "seed": campaign.setup.seed,
+        "tests": len(held.logbook["tests"]),
+        "told": len(campaign.experiments),
+        "experiments": held.experiments,
+        "waiting": [test.number for test in campaign.waiting],
+        "failed": [failure.test.number for failure in campaign.failures],
+        "sessions": list(held.sessions),
+    }
+
+
+def _sentences(store: str, facts: dict[str, Any]) -> str:
+    of = "" if facts["experiments"] is None else f" of {facts['experiments']}"
+    lines = [
+        f"{store}: campaign {facts['name']!r}, begun {facts['created']}.",
+        f"Preset {facts['preset']}, seed {facts['seed']}.",
+        f"{facts['told']}{of} experiments told, {facts['tests']} tests made.",
+    ]
+    for key, words in (("waiting", "waiting to be flown"), ("failed", "failed")):
+        if facts[key]:
+            numbers = ", ".join(str(number) for number in facts[key])
+            lines.append(f"Tests {words}: {numbers}.")
+    return "\n".join(lines) + "\n"
+
+
+def _print(result: Mapping[str, object], text: str, as_json: bool) -> None:
+    click.echo(to_json(result, ascii_only=not is_utf_8()) if as_json else text, nl=False)

@@ -1,0 +1,159 @@
+"""A campaign from the command line: checked, watched while it flies, and answered for at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign.presets import DefaultOptions
+from twinloop.errors import InvalidInput
+from twinloop.faces.console import Watch
+from twinloop.faces.files import check_picture, check_writable, write_text
+from twinloop.faces.result import Result, summary, to_json
+from twinloop.faces.run_info import Stopwatch
+from twinloop.faces.terminal import is_closed, is_utf_8
+from twinloop.faces.text import render
+from twinloop.systems import Quadrotor
+
+Answer = TypeVar("Answer")
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def answers(command: Command) -> Command:
+    """Options of a command that answers with the result of a campaign: `output`, `plot` and `as_json`.
+
+    Args:
+        command: of click.
+    """
+    for option in (
+        click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object."),
+        click.option("--plot", type=Path, metavar="FILE.svg|png", help="Also draw the runs and the errors."),
+        click.option(
+            "--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def check_answer(output: Path | None, plot: Path | None) -> None:
+    """Refuses files that cannot be written, before any work is done.
+
+    Args:
+        output: for the result; None: none.
+        plot: for the picture; None: none.
+
+    Raises:
+        InvalidInput: a file cannot be written, or there is nowhere to print to.
+        NotAvailable: matplotlib is missing.
+    """
+    if output is not None:
+        check_writable(output, [".json"])
+    elif is_closed():
+        raise InvalidInput(
+            "Standard output: expected somewhere to print the result, found it closed; open it, or pass --output."
+        )
+    if plot is not None:
+        check_picture(plot)
+
+
+def work(
+    campaign: Campaign,
+    rig: Quadrotor,
+    watch: Watch,
+    experiments: int,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> int:
+    """Flies a campaign to its end, and shows what came out.
+
+    Args:
+        campaign: to be run.
+        rig: that it flies.
+        watch: that shows its progress.
+        experiments: runs in all.
+        output: for the result; None: none.
+        plot: for the picture; None: none.
+        as_json: whether the result is printed as JSON.
+
+    Returns:
+        The exit code: 130 after an interruption, 1 where no controller is fit to fly.
+
+    Raises:
+        KeyboardInterrupt: an interruption before there was a result.
+    """
+    clock = Stopwatch(campaign.threads)
+    try:
+        with watch, suppress(KeyboardInterrupt):
+            campaign.run(rig, experiments)
+            controller_to_fly(campaign)  # learns the last flight
+        if campaign.interrupted and campaign.store is not None:
+            click.echo(f"Kept: twinloop resume {campaign.store} goes on from here.", err=True)
+        if not campaign.experiments or knows_nothing(campaign):
+            raise KeyboardInterrupt
+        result = _uninterrupted(lambda: summary(campaign, described("quadrotor", rig), clock.info()))
+    finally:
+        campaign.close()
+    try:
+        if output is not None:
+            write_text(output, to_json(result))
+            click.echo(f"Result: {output}", err=True)
+    finally:  # a full disk must not take the result with it
+        show_result(result, as_json)
+    if plot is not None:
+        _uninterrupted(lambda: campaign.plot(plot))
+        click.echo(f"Picture: {plot}", err=True)
+    return 130 if campaign.interrupted else 1 if result["controller"] is None else 0
+
+
+def show_result(result: Result, as_json: bool) -> None:
+    """Prints a result.
+
+    Args:
+        result: a `twinloop.faces.result.summary`.
+        as_json: whether as JSON.
+    """
+    text = to_json(result, ascii_only=not is_utf_8()) if as_json else render(result)
+    click.echo(text, nl=False)
+
+
+def knows_nothing(campaign: Campaign) -> bool:
+    """Whether nothing was ever learnt to its end: there is nothing to show then.
+
+    Args:
+        campaign: with or without experiments.
+    """
+    return isinstance(campaign.options, DefaultOptions) and not campaign.history
+
+
+def described(name: str, rig: Quadrotor) -> dict[str, object]:
+    """What a result says of a built-in system.
+
+    Args:
+        name: of the system.
+        rig: the system.
+    """
+    return {
+        "name": name,
+        "noise": rig.noise,
+        "gyroscopic": rig.gyroscopic,
+        "inertia": rig.inertia.tolist(),
+        "natural_frequency": rig.natural_frequency,
+        "drag": rig.drag.tolist(),
+        "motor_lag": rig.motor_lag,
+        "gusts": rig.gusts,
+    }
+
+
+def _uninterrupted(work: Callable[[], Answer]) -> Answer:
+    """Does short work to its end, even if Ctrl-C is pressed once more."""
+    try:
+        return work()
+    except KeyboardInterrupt:
+        return work()

@@ -1,0 +1,1 @@
+"""Fit: constants tuned on predictions, and what the runs leave open of them."""

@@ -1,0 +1,1 @@
+"""Inputs: what a law sees of commands, through actuators and hidden states."""

@@ -1,0 +1,1 @@
+"""Search: which terms drive each chain, by description length on whitened readings."""

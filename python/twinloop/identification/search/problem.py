@@ -1,0 +1,117 @@
+"""The problem of one identification: readings of all runs, and what terms make of the inputs within each period."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.identification.records import Run, Stages
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.terms.pool import Pool
+from twinloop.identification.terms.priors import Told
+from twinloop.signals import Bounds
+
+
+class Problem:
+    """Readings of all runs and the inputs within each period; makes regressions of terms.
+
+    Args:
+        pool: of all expressions.
+        runs: recorded.
+        stages: their inputs within each period.
+        dt: period, s.
+        workers: how the work is carried out.
+        told: what is known of the law.
+    """
+
+    def __init__(
+        self,
+        pool: Pool,
+        runs: Sequence[Run],
+        stages: Stages,
+        dt: float,
+        workers: _core.Workers,
+        told: Told,
+    ) -> None:
+        self.told = told
+        self.pool = pool
+        self.runs = runs
+        self.stages = stages
+        self.dt = dt
+        self.workers = workers
+        self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
+        self._feedthrough: dict[tuple[int, int], Floats] = {}
+        self._usable: set[int] = set()
+
+    def usable(self, terms: Sequence[int]) -> list[int]:
+        """Terms whose values are finite on all rows, evaluated; none of a hidden state where there is none."""
+        new = [term for term in terms if term not in self._values]
+        if self.stages.start.shape[1] == self.pool.inputs:
+            new = [term for term in new if not self.pool.is_hidden(term)]
+        if new:
+            stages = [
+                self.pool.values(new, s) for s in (self.stages.start, self.stages.middle, self.stages.end)
+            ]
+            for i, term in enumerate(new):
+                columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
+                self._values[term] = columns  # type: ignore[assignment]
+                if all(np.abs(column).max() < 1e100 for column in columns):
+                    self._usable.add(term)
+        return [term for term in terms if term in self._usable]
+
+    def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
+        """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
+        known = self.usable(self.told.fixed.get(chain.states[0], ()))
+        readings = [run.states[:, list(chain.states)] for run in self.runs]
+        if known:
+            readings = self._of(chain, known, readings).residuals(np.ones(len(known)))
+        return self._of(chain, terms, readings)
+
+    def _of(self, chain: Chain, terms: Sequence[int], readings: Sequence[Floats]) -> _core.Regression:
+        none = np.empty((len(self.stages.start), 0))
+        start, middle, end = (
+            np.stack([self._values[term][s] for term in terms], axis=1) if terms else none for s in range(3)
+        )
+        states = list(chain.states)
+        records = [
+            (measured, run.weights[:, states], start[rows], middle[rows], end[rows])
+            for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
+        ]
+        with engine_input():
+            return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+    def feedthrough(self, chain: Chain, terms: Sequence[int]) -> Floats:
+        """How much of a reading's noise terms give back within the period that the reading ends.
+
+        Args:
+            chain: whose first state is read; it is the integral of the terms.
+            terms: that were found usable.
+
+        Returns:
+            Half a period times each term's derivative by that state at the end of every period (rows, terms).
+        """
+        state, end = chain.states[0], self.stages.end
+        new = [term for term in terms if (state, term) not in self._feedthrough]
+        if new:
+            # Of a state that never left 0 any step will do.
+            step = 1e-3 * (float(np.abs(end[:, state]).max()) or 1.0)
+            above, below = (end.copy() for _ in range(2))
+            above[:, state] += step
+            below[:, state] -= step
+            slopes = (self.pool.values(new, above) - self.pool.values(new, below)) / (2.0 * step)
+            for term, slope in zip(new, slopes.T, strict=True):
+                self._feedthrough[state, term] = 0.5 * self.dt * np.where(np.isfinite(slope), slope, 0.0)
+        return np.stack([self._feedthrough[state, term] for term in terms], axis=1)
+
+    def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
+        """Bounds of a chain's coefficients, by place among terms."""
+        bounds = self.told.bounds.get(chain.states[0], {})
+        return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
+
+    def readings(self, chain: Chain) -> int:
+        """Readings of a chain that count."""
+        return int(sum(run.weights[:, list(chain.states)].sum() for run in self.runs))

@@ -1,0 +1,356 @@
+"""Which terms drive each chain: a search over subsets on whitened features, up a ladder of libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.elementary import log, power
+from twinloop.errors import engine_input
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.noise import floor_of
+from twinloop.identification.terms.bounds import Limits, bounded_solution, excludes_zero
+from twinloop.identification.terms.pool import Pool
+from twinloop.records import Recorded
+from twinloop.streams import Purpose, Unit
+
+Weights = dict[int, float]
+"""Coefficients of a sum, by node."""
+Walked = Sequence[Sequence[tuple[Sequence[int], float]]]
+"""Subsets with their energies, the best first, for each chain."""
+Walk = Callable[[Sequence[_core.Gram], Sequence[Floats], int], Walked]
+"""Annealed walks: from inner products and prices, a pair for each chain, and the number of the walks."""
+Judged = tuple[tuple[int, ...], float, Floats]
+"""A subset of features, its energy, its coefficients."""
+NOISE_ROUNDS = 5
+"""Times at most that terms are searched and the noise that they leave is estimated."""
+FEW_RUNS = 5
+"""Runs up to which each is taken to tell something of its own."""
+RESEMBLANCE = 0.75
+"""Power with which prices rise from there on; with 1, no weak term that is true would be found by flying on."""
+GIVEN_BACK = 0.25
+"""Share of a reading's noise from which a law is taken to explain it with itself: nothing that can be flown grows by
+half, of itself, in a period."""
+GIVEN_BACK_PRICES = (1e2, 1e3, 1e4, 1e5, 1e6)
+"""What giving back all of a reading's noise is made to cost, a reading, in units of χ²."""
+RUNG = 20.0
+"""What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
+
+
+@dataclass(eq=False)
+class Sum(Recorded, kind="sum"):
+    """A sum of terms that drives a chain.
+
+    Args:
+        weights: coefficients by node.
+        energy: its description length: −2 log of the likelihood at `chain`'s noise, and the price of its terms.
+        chain: with the noise under which it was found.
+        others: other subsets that are nearly as good, with their energies above the best's.
+    """
+
+    weights: Weights
+    energy: float
+    chain: Chain
+    others: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
+
+
+def prices(
+    pool: Pool, terms: Sequence[int], readings: int, runs: int, favoured: Mapping[int, float] | None = None
+) -> Floats:
+    """What each term costs, in units of χ²: a coefficient, and the description of its expression.
+
+    Args:
+        pool: of the terms.
+        terms: to be priced.
+        readings: whose number gives a coefficient's precision.
+        runs: that they are of. Many resemble one another: what a law that is not quite right leaves on one it leaves on
+            all, and what explains it gains with each without being any truer. So prices rise with their number.
+        favoured: description lengths in nats of terms that are known from elsewhere.
+
+    Returns:
+        Prices (terms,).
+    """
+    lengths = [(favoured or {}).get(term, pool.length(term)) for term in terms]
+    costs: Floats = log(max(readings, 2)) + 2.0 * np.array(lengths)
+    return costs * power(max(1.0, runs / FEW_RUNS), RESEMBLANCE)
+
+
+def search(
+    problem: Problem,
+    chains: Sequence[Chain],
+    terms: Sequence[int],
+    known: Sequence[Sum | None],
+    scales: Floats,
+    *,
+    moves: int,
+    starts: int,
+    largest: int,
+    unit: Unit,
+    purpose: Purpose = "subsets",
+    favoured: Sequence[Mapping[int, float]] = (),
+    forbidden: Sequence[set[int]] = (),
+    fixed_noise: bool = False,
+) -> list[Sum]:
+    """The best sum of terms for each chain, with the noise estimated along.
+
+    Args:
+        problem: of all chains.
+        chains: with the noise to begin with.
+        terms: to choose from.
+        known: for each chain a sum that is already known, or None; the answer is never worse.
+        scales: of all states (n_x,).
+        moves: of each walk.
+        starts: walks for each chain.
+        largest: number of terms at most.
+        unit: of work; each round of walks is a part of it.
+        purpose: of the random numbers.
+        favoured: for each chain, description lengths in nats of terms that are known from elsewhere.
+        forbidden: for each chain, terms that it may not use.
+        fixed_noise: whether the chains' noise is to be believed.
+
+    Returns:
+        A sum for each chain.
+    """
+    usable = problem.usable(list(dict.fromkeys([*terms, *(t for s in known if s for t in s.weights)])))
+    known_elsewhere = favoured or [{}] * len(chains)
+    costs = [
+        prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere)
+        for chain, elsewhere in zip(chains, known_elsewhere, strict=True)
+    ]
+    place = {term: i for i, term in enumerate(usable)}
+    for cost, terms_out in zip(costs, forbidden or [set()] * len(costs), strict=True):
+        cost[[place[term] for term in terms_out if term in place]] = np.inf
+    regressions = [problem.regression(chain, usable) for chain in chains]
+    best: list[Sum] = []
+    current = list(chains)
+    for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
+        grams = [
+            r.gram(c.sensors, c.motion, problem.workers) for r, c in zip(regressions, current, strict=True)
+        ]
+        walk = partial(
+            _walked,
+            moves=moves if round_ == 0 else moves // 2,
+            largest=largest,
+            starts=starts if round_ == 0 else max(1, starts // 2),
+            unit=unit,
+            purpose=purpose,
+            round_=round_,
+            workers=problem.workers,
+        )
+        subsets = _chosen(problem, usable, place, chains, known, grams, costs, walk)
+        coefficients = [_spread(judged[0], len(usable)) for judged in subsets]
+        noisy, changed = current, False
+        if not fixed_noise:
+            used = [len(judged[0][0]) for judged in subsets]
+            noisy = _noisy(problem, regressions, coefficients, current, used, scales)
+            changed = any(_differ(*pair, scales, problem.dt) for pair in zip(noisy, current, strict=True))
+        best = []
+        for i, (judged, chain) in enumerate(zip(subsets, noisy, strict=True)):
+            subset, energy, weights = judged[0]
+            others = [(tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _ in judged[1:40]]
+            score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
+            rung = RUNG * problem.pool.rung(usable[j] for j in subset)
+            total = rung + score + float(costs[i][list(subset)].sum())
+            chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}
+            best.append(Sum(chosen, total, chain, others))
+        current = noisy
+        if not changed:
+            break
+    return best
+
+
+def _walked(
+    grams: Sequence[_core.Gram],
+    costs: Sequence[Floats],
+    number: int,
+    *,
+    moves: int,
+    largest: int,
+    starts: int,
+    unit: Unit,
+    purpose: Purpose,
+    round_: int,
+    workers: _core.Workers,
+) -> Walked:
+    """The walks of a number in a round; those of each number and round draw from a stream of their own."""
+    name = unit.part(number * NOISE_ROUNDS + round_).named(purpose)
+    return _core.search_subsets(
+        grams, costs, moves=moves, largest=largest, starts=starts, unit=name, workers=workers
+    )
+
+
+def _chosen(
+    problem: Problem,
+    usable: Sequence[int],
+    place: Mapping[int, int],
+    chains: Sequence[Chain],
+    known: Sequence[Sum | None],
+    grams: Sequence[_core.Gram],
+    costs: Sequence[Floats],
+    walk: Walk,
+) -> list[list[Judged]]:
+    """For each chain what walks find and what was known, the best first; none that gives a reading's noise back.
+
+    A law that gives a share J of a reading's noise back within the period that the reading ends leaves (1 − J) of it:
+    it explains the noise with itself. Runs under one and the same controller offer such laws, for their commands are
+    sums of readings, and what tells the sum of all readings from that of all but the last is the last. Where one is
+    found, walks are repeated in which J costs something, and more until they find laws without.
+    """
+    with engine_input():
+        walks = walk(grams, costs, 0)
+    posed = list(zip(chains, known, grams, walks, costs, strict=True))
+    subsets = [_best_subsets(problem, usable, place, *of_chain) for of_chain in posed]
+    for i, (chain, sum_, gram, _, cost) in enumerate(posed):
+        if not chain.integrated or _given_back(problem, chain, usable, subsets[i][0]) <= GIVEN_BACK:
+            continue
+        rows = problem.feedthrough(chain, usable)
+        for attempt, price in enumerate(GIVEN_BACK_PRICES):
+            with engine_input():
+                dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
+                (walked,) = walk([dear], [cost], 1 + i * len(GIVEN_BACK_PRICES) + attempt)
+            # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
+            found = [
+                law
+                for of in (gram, dear)
+                for law in _best_subsets(problem, usable, place, chain, sum_, of, walked, cost)
+                if _given_back(problem, chain, usable, law) <= GIVEN_BACK
+            ]
+            if found:
+                subsets[i] = found
+                break
+    return subsets
+
+
+def _given_back(problem: Problem, chain: Chain, usable: Sequence[int], judged: Judged) -> float:
+    """Share of a reading's noise that a law gives back within the period that the reading ends."""
+    subset, _, weights = judged
+    if not subset:
+        return 0.0
+    shares = problem.feedthrough(chain, [usable[j] for j in subset]).mean(axis=0)
+    return float((shares * weights).sum())
+
+
+def _best_subsets(
+    problem: Problem,
+    usable: Sequence[int],
+    place: Mapping[int, int],
+    chain: Chain,
+    known: Sum | None,
+    gram: _core.Gram,
+    walked: Sequence[tuple[Sequence[int], float]],
+    costs: Floats,
+) -> list[Judged]:
+    """What a chain's walks have found, and what was known of it, the best first."""
+    subsets = [tuple(subset) for subset, _ in walked]
+    if known is not None and all(term in place for term in known.weights):
+        subsets.append(tuple(sorted(place[term] for term in known.weights)))
+    limits = problem.limits(chain, usable)
+    subsets = _with_what_must_be(subsets, gram, costs, limits)
+    return sorted(
+        all_judged(gram, subsets, costs, limits),
+        key=lambda found: (found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]), found[0]),
+    )
+
+
+def _spread(judged: Judged, features: int) -> Floats:
+    """The coefficients of all features, 0 for those outside the subset."""
+    subset, _, weights = judged
+    coefficients = np.zeros(features)
+    coefficients[list(subset)] = weights
+    return coefficients
+
+
+def _noisy(
+    problem: Problem,
+    regressions: Sequence[_core.Regression],
+    coefficients: Sequence[Floats],
+    chains: Sequence[Chain],
+    used: Sequence[int],
+    scales: Floats,
+) -> list[Chain]:
+    """The chains with the noise under which what is left is most likely, and the freedom that was used given back."""
+    posed = [
+        (regression, found, chain.sensors, chain.motion, *floor_of(chain, scales, problem.dt))
+        for regression, found, chain in zip(regressions, coefficients, chains, strict=True)
+    ]
+    with engine_input():
+        noises = _core.most_likely_noises(posed, problem.workers)
+    noisy = []
+    for chain, terms, (sensors, motion, _) in zip(chains, used, noises, strict=True):
+        readings = problem.readings(chain)
+        noisy.append(chain.with_noise(sensors * readings / max(1.0, readings - terms), motion))
+    return noisy
+
+
+def _differ(new: Chain, old: Chain, scales: Floats, dt: float) -> bool:
+    """Whether a chain's noise is so much another one that its terms may be."""
+    _, slow = floor_of(old, scales, dt)
+    moved = (abs(log((new.motion[i] + slow[i]) / (old.motion[i] + slow[i]))) > 1.0 for i in range(2))
+    return bool(np.any(np.abs(log(new.sensors / old.sensors)) > 0.3)) or any(moved)
+
+
+def _with_what_must_be(
+    subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
+) -> list[tuple[int, ...]]:
+    """Subsets that hold every term whose bounds exclude 0, as far as the runs can tell those terms apart."""
+    told = (place for place, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[place]))
+    must = _told_apart(gram, told)
+    if not must:
+        return subsets
+    forced = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
+    if all(gram.solve(list(subset)) is None for subset in forced):
+        forced.append(tuple(sorted(must)))
+    return forced
+
+
+def all_judged(
+    gram: _core.Gram, subsets: Sequence[tuple[int, ...]], costs: Floats, limits: Limits
+) -> list[Judged]:
+    """Least squares on subsets; where rounding leaves none of them a solution, on the largest parts that have one.
+
+    Args:
+        gram: of the features.
+        subsets: of them.
+        costs: of each feature, in units of χ².
+        limits: bounds of coefficients, by feature.
+
+    Returns:
+        Those that have a solution.
+    """
+    found = [_judged(gram, subset, costs, limits) for subset in dict.fromkeys(subsets)]
+    if not any(found):
+        parts = dict.fromkeys(_told_apart(gram, subset) for subset in subsets)
+        found = [_judged(gram, subset, costs, limits) for subset in parts]
+    return [judged for judged in found if judged]
+
+
+def _told_apart(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]:
+    """The features of a subset, in order, that those before them do not already span."""
+    kept: list[int] = []
+    for feature in subset:
+        if gram.solve([*kept, feature]) is not None:
+            kept.append(feature)
+    return tuple(kept)
+
+
+def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Limits) -> Judged | None:
+    solved = bounded_solution(gram, subset, limits)
+    if solved is None:
+        return None
+    weights, left = solved
+    nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
+    if nothing and len(nothing) < len(subset):
+        # Held at 0 a term is none.
+        return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
+    return subset, left + float(costs[list(subset)].sum()), weights
+
+
+def total(sums: Sequence[Sum]) -> float:
+    """Description length of all sums."""
+    return sum(found.energy for found in sums)

@@ -1,0 +1,50 @@
+"""Coasting: what states do where nothing drives them, by their declared kinematics alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.identification.terms.pool import Pool
+from twinloop.signals import Signals
+
+
+def coasting(signals: Signals, dt: float) -> _core.Model:
+    """A model whose outputs are nothing.
+
+    Args:
+        signals: of the system.
+        dt: time that a step covers, s.
+
+    Returns:
+        The engine's model; states that are driven stay, those that others move go on.
+    """
+    outputs: list[dict[int, float]] = [{} for _ in signals.driven]
+    program = Pool(signals.n_x + signals.n_u).program_of_sums(outputs)
+    with engine_input():
+        return _core.Model(program, "acceleration", replace(signals, dt=dt).engine)
+
+
+def coasted(states: Floats, signals: Signals) -> Floats:
+    """What states become a period later by kinematics alone, under the mean of what moves them.
+
+    Args:
+        states: readings (n + 1, n_x).
+        signals: of the system.
+
+    Returns:
+        States after each of the first n readings (n, n_x).
+    """
+    body = signals.kinematics
+    moving = [
+        i
+        for i, state in enumerate(signals.states)
+        if state.derivative_of is not None or (body is not None and state.name in body.rates)
+    ]
+    begun = states[:-1].copy()
+    begun[:, moving] = 0.5 * (states[:-1, moving] + states[1:, moving])
+    return np.asarray(coasting(signals, signals.dt).step(begun, np.zeros((len(begun), signals.n_u))))

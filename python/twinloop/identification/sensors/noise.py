@@ -1,0 +1,159 @@
+"""The noise of a chain to begin with, from below and from above, and the least that is ever believed.
+
+From below, it is what a fit of all terms leaves; from above, everything that moves is disturbance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.identification.records import Run
+from twinloop.identification.search.description import shortest
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.sensors.chains import Chain, Motion
+from twinloop.identification.sensors.coasting import coasted
+from twinloop.signals import Signals
+
+GUSTS = (1e-3, 1e-1, 10.0)
+"""Variances of a lasting disturbance that are tried first, in units of what the sensor's noise looks like as one."""
+GUST = 1e-2
+"""The same where terms have explained what they can."""
+BEST_SENSOR = 0.1
+"""Share of its readings' roughness that a sensor's standard deviation is at least."""
+NOTHING = 0.01
+"""χ² a reading below which the noise was not estimated but held at the least that is believed: readings are exact."""
+FEW_READINGS = 20
+"""Below so many, the noise of an angle that body rates turn is not estimated."""
+OUTLYING = 6.0
+"""Medians of its residuals' size beyond which one counts no more."""
+RIDGE = 1e-9
+"""Added to the columns' unit lengths where all terms are fitted at once."""
+
+
+def exact(misfit: float) -> bool:
+    """Whether a χ² a reading says that they are exact: next to nothing is left by the least noise that is believed."""
+    return misfit < NOTHING
+
+
+def declared_noise(chain: Chain, signals: Signals) -> Chain:
+    """The chain with sensors as they are declared, as far as readings allow; the estimate begins there."""
+    sensors = chain.sensors.copy()
+    for i, state in enumerate(chain.states):
+        noise = signals.states[state].noise
+        if noise is not None:
+            sensors[i] = np.clip(noise * noise, BEST_SENSOR * BEST_SENSOR * chain.rough[i], chain.rough[i])
+    return chain.with_noise(sensors, chain.motion)
+
+
+def given_noise(chain: Chain, signals: Signals) -> Chain:
+    """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
+    sensors = declared_noise(chain, signals).sensors
+    return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
+
+
+def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chain:
+    """An angle that body rates turn, with its sensor's noise as kinematics show it.
+
+    A reading's error makes one increment too large and the next one too small: the covariance of neighbouring residuals
+    is minus its variance.
+
+    Args:
+        chain: of one angle that no output drives, with a first guess of its sensor's noise.
+        runs: as they would have been read had all sensors been read at once.
+        signals: of the system, which say how rates turn the angle.
+
+    Returns:
+        The chain with that noise; as it was where readings are too few.
+    """
+    (angle,) = chain.states
+    residuals = [(run.states[1:] - coasted(run.states, signals))[:, angle] for run in runs]
+    if sum(len(residual) for residual in residuals) < FEW_READINGS:
+        return chain
+    # A single wild reading must not be taken for noise.
+    most = OUTLYING * float(np.median(np.abs(np.concatenate(residuals))))
+    clipped = [np.clip(residual, -most, most) for residual in residuals]
+    products = np.concatenate([residual[1:] * residual[:-1] for residual in clipped])
+    least = 1e-7 * signals.states[angle].scale
+    sensors = np.array([max(least * least, min(-float(products.mean()), float(chain.rough[0])))])
+    return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
+
+
+def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:
+    """Variances below which noise is not believed: rounding and integration leave that much.
+
+    Disturbances could explain every reading exactly. Sensors are therefore never taken to be much better than their
+    own roughness says, which is all noise of theirs or less.
+    """
+    sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR * BEST_SENSOR * chain.rough)
+    period = dt if chain.integrated else 1.0
+    return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / (period * period), dt)
+
+
+def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = True) -> Chain:
+    """The noise from above: what would have to disturb the motion if no term drove the chain.
+
+    Args:
+        problem: of the chain.
+        chain: with a first guess of its sensors' noise.
+        scales: of all states (n_x,).
+        gusts: whether disturbances may last.
+
+    Returns:
+        The chain with that noise.
+    """
+    regression = problem.regression(chain, problem.usable([problem.pool.one]))
+    low, slow = floor_of(chain, scales, problem.dt)
+    # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
+    begun = [_begun(chain, low, slow, problem.dt, size) for size in (GUSTS if gusts else (0.0,))]
+    with engine_input():
+        found = _core.most_likely_noises(
+            [(regression, [0.0], *start, low, slow) for start in begun], problem.workers
+        )
+    sensors, motion, _ = shortest(found, lambda answer: answer[2])
+    return chain.with_noise(sensors, motion)
+
+
+def first_noise(
+    problem: Problem, chain: Chain, terms: Sequence[int], scales: Floats, gusts: bool = True
+) -> Chain:
+    """The noise that a fit of all terms leaves, with the freedom that it used up given back.
+
+    Args:
+        problem: of the chain.
+        chain: with a first guess of its sensors' noise.
+        terms: usable ones.
+        scales: of all states (n_x,).
+        gusts: whether disturbances may last.
+
+    Returns:
+        The chain with its noise estimated.
+    """
+    regression = problem.regression(chain, terms)
+    low, slow = floor_of(chain, scales, problem.dt)
+    sensors, motion = _begun(chain, low, slow, problem.dt, GUST if gusts else 0.0)
+    readings = problem.readings(chain)
+    for _ in range(2):
+        gram = regression.gram(sensors, motion, problem.workers)
+        solved = gram.solve(list(range(len(terms))), RIDGE)
+        if solved is None:
+            break
+        with engine_input():
+            ((sensors, motion, _),) = _core.most_likely_noises(
+                [(regression, solved[0], sensors, motion, low, slow)], problem.workers
+            )
+        used = min(len(terms), 0.7 * readings)
+        sensors = sensors * readings / (readings - used)
+    return chain.with_noise(sensors, motion)
+
+
+def _begun(chain: Chain, low: Floats, slow: Motion, dt: float, gust: float) -> tuple[Floats, Motion]:
+    """Where a search for the noise begins, with a gust of some size."""
+    sensors = np.maximum(chain.sensors, low)
+    period = dt if chain.integrated else 1.0
+    first = float(sensors[0])
+    return sensors, (max(1e-3 * first / period, slow[0]), gust * first / (period * period), 10.0 * dt)

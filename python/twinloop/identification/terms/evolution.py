@@ -1,0 +1,134 @@
+"""Evolved features: a linear program of which every register is a feature; what read-outs use survives.
+
+Where no library holds the law, expressions are grown from what was useful so far: products and other operations of
+inputs and survivors. A found expression, up to the whole sum that drives another output, is one node and costs one
+term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.elementary import log
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.structure import Sum, search
+from twinloop.identification.terms.pool import Pool
+from twinloop.law.expressions import UNARY
+from twinloop.streams import Unit
+
+PRODUCTS = 0.5
+"""Share of new nodes that are products: most laws of machines are made of them."""
+CONSTANTS = 0.15
+"""Share of new nodes that hold a constant of their own."""
+
+
+def evolve(
+    problem: Problem,
+    known: Sequence[Sum],
+    terms: Sequence[int],
+    scales: Floats,
+    *,
+    operators: Sequence[str],
+    generations: int,
+    population: int,
+    longest: float,
+    moves: int,
+    largest: int,
+    unit: Unit,
+) -> list[Sum]:
+    """Grows terms for a number of generations.
+
+    Args:
+        problem: of all chains.
+        known: the best sum of each chain so far, with the noise to begin with.
+        terms: the nodes to begin with.
+        scales: of all states (n_x,).
+        operators: that new nodes may use.
+        generations: how often new nodes are drawn.
+        population: nodes that are judged at once.
+        longest: description length, in nats, of an expression at most.
+        moves: of each search over subsets.
+        largest: number of terms of a sum at most.
+        unit: of work, for its random numbers.
+
+    Returns:
+        The best sum of each chain, never worse than the known one.
+    """
+    pool = problem.pool
+    draw = unit.stream("terms")
+    best = list(known)
+    survivors: dict[int, int] = dict.fromkeys(terms, 0)
+    taken: set[int] = set()
+    for generation in range(generations):
+        parents = list(survivors)
+        candidates = dict.fromkeys(parents)
+        tries = 0
+        while len(candidates) < population and tries < 20 * population:
+            tries += 1
+            node = _drawn(pool, parents, operators, draw)
+            if node is not None and pool.length(node) <= longest:
+                candidates.setdefault(node)
+        wholes = [_whole(pool, found, taken) for found in best]
+        # A chain may use what drives another one; its own sum would be a law that nobody has paid for, and so would
+        # sums that use each other.
+        favoured = [
+            {node: length for j, whole in enumerate(wholes) if j != i for node, length in whole.items()}
+            for i in range(len(wholes))
+        ]
+        usable = problem.usable([*candidates, *(node for whole in wholes for node in whole)])
+        best = search(
+            problem, [found.chain for found in best], usable, best, scales,
+            moves=moves, starts=2, largest=largest, unit=unit.part(generation),
+            favoured=favoured, forbidden=[set(whole) for whole in wholes],
+            fixed_noise=generation % 4 != 0 and generation != generations - 1,
+        )  # fmt: skip
+        # A node survives where a good subset uses it, and a few generations after that.
+        used: set[int] = set()
+        for found in best:
+            used.update(found.weights)
+            for subset, above in found.others:
+                if above < 10.0:
+                    used.update(subset)
+        aged = {term: age + 1 for term, age in survivors.items() if age < 3 and term not in used}
+        kept = dict.fromkeys(sorted(used), 0) | dict(list(aged.items())[: population // 4])
+        survivors = dict.fromkeys(range(pool.inputs), 0) | {pool.one: 0} | kept
+    return best
+
+
+def _drawn(pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _core.Stream) -> int | None:
+    """A new node of inputs and parents; None where it makes no sense."""
+
+    def pick() -> int:
+        if draw.uniform() < 0.5:
+            return draw.below(pool.inputs)
+        return parents[draw.below(len(parents))]
+
+    a, b = pick(), pick()
+    if "*" in operators and draw.uniform() < PRODUCTS:
+        return None if pool.one in (a, b) else pool.product(a, b)
+    operation = operators[draw.below(len(operators))]
+    if draw.uniform() < CONSTANTS:
+        size = draw.log_uniform(0.1, 10.0)
+        a = pool.add("+" if draw.uniform() < 0.5 else "*", a, size if draw.uniform() < 0.5 else -size)
+    if a == pool.one:
+        return None
+    if operation in UNARY:
+        return pool.add(operation, a)
+    if b == pool.one or (operation in ("-", "/", "min", "max") and a == b):
+        return None
+    return pool.add(operation, a, b)
+
+
+def _whole(pool: Pool, found: Sum, taken: set[int]) -> dict[int, float]:
+    """The sum that drives another output, as one node at the price of one choice; none if it uses such a node."""
+    if len(found.weights) < 2 or taken.intersection(pool.needed(found.weights)):
+        return {}
+    node: int | None = None
+    for term, weight in found.weights.items():
+        part = pool.add("*", term, weight)
+        node = part if node is None else pool.add("+", node, part)
+    assert node is not None
+    taken.add(node)
+    return {node: float(log(pool.inputs + 1))}

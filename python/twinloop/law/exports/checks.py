@@ -1,0 +1,273 @@
+"""Whether what was exported gives the numbers of the twin, on the flights that it was learnt from."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.controllers import Family
+from twinloop.errors import NotAvailable
+from twinloop.law.exports.python_source import equation_roots
+from twinloop.law.law import Law
+from twinloop.trajectory import Trajectory
+
+CLOSE = {"double": 1e-9, "float": 1e-3}
+"""Largest difference, as a share of a state's scale, or of the state where that is larger."""
+MOST_REMEMBERED = 10_000
+"""Numbers that a controller remembers at most."""
+Commanding = Callable[[Floats, Floats], Floats]
+"""Commands (n, n_u) on states (n, n_x), one period after the other, for a target (n_x,)."""
+Simulation = Callable[[Floats, Floats], Floats]
+"""The states (n + 1, n_x) of a free run from a state (n_x,) under commands (n, n_u)."""
+
+
+def check_simulation(
+    what: str, found: Simulation, twin: Simulation, law: Law, flights: Sequence[Trajectory], precision: str
+) -> None:
+    """Compares free runs under the commands of all flights, as long as the twin's own last.
+
+    Args:
+        what: was exported.
+        found: what it simulates.
+        twin: what the twin simulates.
+        law: of the twin.
+        flights: to compare on.
+        precision: "double" or "float".
+
+    Raises:
+        NotAvailable: they differ.
+    """
+    scales = np.array([state.scale for state in law.signals.states])
+    for number, flight in enumerate(flights):
+        expected = twin(flight.states[0], flight.commands)
+        given = found(flight.states[0], flight.commands[: len(expected) - 1])
+        off = np.abs(given - expected) / np.maximum(scales, np.abs(expected))
+        if not (off <= CLOSE[precision]).all():
+            raise NotAvailable(
+                f"Export, {what}: expected the twin's own numbers to {CLOSE[precision]:g}, found a difference of"
+                f" {float(np.max(off)):.3g} of a state's scale on flight {number}; the twin multiplies rounding there."
+                " Pass force=True to have it all the same."
+            )
+
+
+def python_simulation(source: str) -> Simulation:
+    """What an exported Python module simulates.
+
+    Args:
+        source: of the module, written by us.
+    """
+    names: dict[str, Any] = {}
+    exec(compile(source, "exported twin", "exec"), names)
+    return lambda state, commands: np.array(names["simulate"](state.tolist(), commands.tolist()))
+
+
+def c_simulation(header: str, source: str, name: str, law: Law, precision: str) -> Simulation:
+    """What exported C simulates, compiled by the C compiler of this machine.
+
+    Args:
+        header: of it.
+        source: of it.
+        name: what its functions begin with.
+        law: of the twin.
+        precision: "double" or "float".
+
+    Raises:
+        NotAvailable: no C compiler, or it refuses.
+    """
+    library = _compiled(header, source, name)
+    real = ctypes.c_double if precision == "double" else ctypes.c_float
+    dtype = np.float64 if precision == "double" else np.float32
+    n_x = law.signals.n_x
+    # The struct's own size is the compiler's business: nothing of it is larger than these.
+    held = 16 + 8 * (law.signals.n_u + sum(a.delay for a in law.actuation.actuators) + 2 * law.inputs + 4)
+
+    def simulate(state: Floats, commands: Floats) -> Floats:
+        memory = ctypes.create_string_buffer(held)
+        pointer = ctypes.POINTER(real)
+        getattr(library, f"{name}_reset")(memory)
+        states = np.zeros((len(commands) + 1, n_x), dtype=dtype)
+        states[0] = state
+        for k, command in enumerate(np.array(commands, dtype=dtype)):
+            getattr(library, f"{name}_clip")(command.ctypes.data_as(pointer))
+            getattr(library, f"{name}_step")(
+                memory,
+                states[k].ctypes.data_as(pointer),
+                command.ctypes.data_as(pointer),
+                states[k + 1].ctypes.data_as(pointer),
+            )
+        return states.astype(np.float64)
+
+    return simulate
+
+
+def check_sympy(source: str, law: Law, flights: Sequence[Trajectory]) -> None:
+    """Compares a SymPy script, run on numbers in place of symbols, with the equations of the law.
+
+    Args:
+        source: of the script, written by us.
+        law: of the twin.
+        flights: whose states and commands it is evaluated at.
+
+    Raises:
+        NotAvailable: they differ.
+    """
+    code = compile(source.replace("import sympy as sp\n", ""), "exported twin", "exec")
+    program = law.expressions.program(law.outputs, law.inputs)
+    roots = [equation_roots(law).index(output) for output in law.outputs]
+    sizes = np.array([command.size for command in law.signals.commands])
+    for flight in flights:
+        rows = np.hstack([
+            flight.states[: flight.steps],
+            flight.commands / sizes,
+            np.full((flight.steps, len(law.actuation.hidden)), 0.1),
+        ])  # fmt: skip
+        expected = program.run(rows)
+        for row, outputs in zip(rows, expected, strict=True):
+            names: dict[str, Any] = {"sp": _numbers(row.tolist())}
+            try:
+                exec(code, names)
+                found = np.array(names["EQUATIONS"])[roots]
+            except ArithmeticError:
+                found = np.full(len(roots), np.nan)
+            off = np.abs(found - outputs) / (1.0 + np.abs(outputs))
+            if not (off <= CLOSE["double"]).all():
+                raise NotAvailable(
+                    f"Export, SymPy: expected the twin's own numbers to 1e-9, found {found} for {outputs}: a division"
+                    " is protected there, which SymPy's is not. Pass force=True to have it all the same."
+                )
+
+
+def _numbers(values: list[float]) -> SimpleNamespace:
+    """Stands for SymPy where symbols are numbers, taken in their order."""
+    remaining = iter(values)
+
+    def symbols(names: str, real: bool) -> list[float]:
+        return [next(remaining) for _ in names.split()]
+
+    return SimpleNamespace(
+        symbols=symbols,
+        Matrix=list,
+        Abs=abs,
+        sqrt=math.sqrt,
+        sin=math.sin,
+        cos=math.cos,
+        tanh=math.tanh,
+        exp=math.exp,
+        Min=min,
+        Max=max,
+    )
+
+
+def check_controller(
+    what: str,
+    found: Commanding,
+    own: Commanding,
+    family: Family,
+    flights: Sequence[Trajectory],
+    target: Floats,
+    precision: str,
+) -> None:
+    """Compares commands on the states of all flights.
+
+    Args:
+        what: was exported.
+        found: what it commands, period after period, on states (n, n_x): (n, n_u).
+        own: what the controller itself commands.
+        family: of the controller.
+        flights: to compare on.
+        target: state that it leads to (n_x,).
+        precision: "double" or "float".
+
+    Raises:
+        NotAvailable: they differ.
+    """
+    sizes = np.array([command.size for command in family.signals.commands])
+    for number, flight in enumerate(flights):
+        states = flight.states[: flight.steps]
+        off = np.abs(found(states, target) - own(states, target)) / sizes
+        if not (off <= CLOSE[precision]).all():
+            raise NotAvailable(
+                f"Export, {what}: expected the controller's own commands to {CLOSE[precision]:g}, found a difference of"
+                f" {float(np.max(off)):.3g} of a command's scale on flight {number}; pass force=True to have it all the"
+                " same."
+            )
+
+
+def python_controller(source: str) -> Commanding:
+    """What an exported Python controller commands.
+
+    Args:
+        source: of the module, written by us.
+    """
+    names: dict[str, Any] = {}
+    exec(compile(source, "exported controller", "exec"), names)
+
+    def commands(states: Floats, target: Floats) -> Floats:
+        controller = names["Controller"]()
+        return np.array([controller.command(state, target.tolist()) for state in states.tolist()])
+
+    return commands
+
+
+def c_controller(header: str, source: str, name: str, n_u: int, precision: str) -> Commanding:
+    """What an exported C controller commands, compiled by the C compiler of this machine.
+
+    Args:
+        header: of it.
+        source: of it.
+        name: what its functions begin with.
+        n_u: number of its commands.
+        precision: "double" or "float".
+
+    Raises:
+        NotAvailable: no C compiler, or it refuses.
+    """
+    library = _compiled(header, source, name)
+    real, dtype = (ctypes.c_double, np.float64) if precision == "double" else (ctypes.c_float, np.float32)
+    pointer = ctypes.POINTER(real)
+
+    def commands(states: Floats, target: Floats) -> Floats:
+        memory = ctypes.create_string_buffer(8 * MOST_REMEMBERED)
+        getattr(library, f"{name}_reset")(memory)
+        given, goal = states.astype(dtype), target.astype(dtype)
+        found = np.zeros((len(states), n_u), dtype=dtype)
+        for state, command in zip(given, found, strict=True):
+            getattr(library, f"{name}_command")(
+                memory, *(part.ctypes.data_as(pointer) for part in (state, goal, command))
+            )
+        return found.astype(np.float64)
+
+    return commands
+
+
+def _compiled(header: str, source: str, name: str) -> ctypes.CDLL:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise NotAvailable(
+            "Export, C: expected a C compiler to check it with, found no cc; install one, or pass force=True."
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / f"{name}.h").write_text(header, encoding="utf-8")
+        (Path(folder) / f"{name}.c").write_text(source, encoding="utf-8")
+        strict = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
+        done = subprocess.run(
+            [compiler, *strict, "-shared", "-fPIC", "-o", "twin.so", f"{name}.c", "-lm"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != 0:
+            raise NotAvailable(f"Export, C: expected that it compiles, found {done.stderr[:300]!r}.")
+        library = ctypes.CDLL(str(Path(folder) / "twin.so"))
+    return library

@@ -1,0 +1,206 @@
+"""One door to all exports: made, checked on the twin's flights, and written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.controllers import Family, UnboundFamily
+from twinloop.errors import InvalidInput, unknown
+from twinloop.law.exports.c_source import c_source
+from twinloop.law.exports.checks import (
+    Simulation,
+    c_controller,
+    c_simulation,
+    check_controller,
+    check_simulation,
+    check_sympy,
+    python_controller,
+    python_simulation,
+)
+from twinloop.law.exports.controller_source import controller_c, controller_python
+from twinloop.law.exports.python_source import python_source
+from twinloop.law.exports.symbolic import latex_source, sympy_source
+from twinloop.law.law import Law
+from twinloop.trajectory import Trajectory
+
+SUFFIXES = {"python": ".py", "c": ".c", "latex": ".tex", "sympy": ".py", "json": ".json"}
+"""Kinds of exports, with the suffix of their files."""
+PRECISIONS = ("double", "float")
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """What is exported, and what it is checked with.
+
+    Args:
+        law: of the twin.
+        simulate: the twin's own free run, cut where it diverges.
+        flights: that it was learnt from.
+        record: the twin as JSON.
+        check: whether what is made is compared with the twin on its flights.
+    """
+
+    law: Law
+    simulate: Simulation
+    flights: Sequence[Trajectory]
+    record: str
+    check: bool
+
+
+def asked(to: str | Path, kind: str | None) -> tuple[str, Path | None]:
+    """The kind of an export, and the file that it goes to, if it does.
+
+    Args:
+        to: a kind, or a path with the suffix of one.
+        kind: of the file, where its suffix does not say it.
+
+    Raises:
+        InvalidInput: no such kind, no such suffix, or no such folder.
+    """
+    if isinstance(to, str) and to in SUFFIXES and kind is None:
+        return to, None
+    path = Path(to)
+    if kind is None:
+        suffixes = {suffix: name for name, suffix in reversed(SUFFIXES.items())}
+        if path.suffix not in suffixes:
+            raise unknown(
+                "kind of export", str(to), [*SUFFIXES, *(f"a path that ends in {s}" for s in suffixes)]
+            )
+        kind = suffixes[path.suffix]
+    if kind not in SUFFIXES:
+        raise unknown("kind of export", kind, SUFFIXES)
+    if path.suffix != SUFFIXES[kind]:
+        raise InvalidInput(
+            f"Export: expected a path that ends in {SUFFIXES[kind]} for the kind {kind!r}, found {str(path)!r};"
+            " change it."
+        )
+    if not path.parent.is_dir():
+        raise InvalidInput(f"Export: expected an existing folder, found {str(path.parent)!r}; make it first.")
+    return kind, path
+
+
+def exported(source: Source, kind: str, name: str, precision: str = "double") -> dict[str, str]:
+    """Texts of an export by the suffix of their files, the main one first.
+
+    Args:
+        source: what is exported.
+        kind: a name in `SUFFIXES`.
+        name: what functions in C begin with.
+        precision: of C, "double" or "float".
+
+    Raises:
+        InvalidInput: another precision.
+        NotAvailable: the export does not give the twin's numbers, or cannot be checked.
+    """
+    law, flights = source.law, source.flights
+    if precision not in PRECISIONS:
+        raise unknown("precision", precision, PRECISIONS)
+    if kind == "json":
+        return {".json": source.record + "\n"}
+    if kind == "latex":
+        return {".tex": latex_source(law)}
+    if kind == "sympy":
+        text = sympy_source(law)
+        if source.check:
+            check_sympy(text, law, flights)
+        return {".py": text}
+    if kind == "python":
+        text = python_source(law)
+        if source.check:
+            check_simulation("Python", python_simulation(text), source.simulate, law, flights, "double")
+        return {".py": text}
+    name = c_name(name)
+    header, text = c_source(law, name, precision)
+    if source.check:
+        found = c_simulation(header, text, name, law, precision)
+        check_simulation("C", found, source.simulate, law, flights, precision)
+    return {".c": text, ".h": header}
+
+
+def exported_controller(
+    described: UnboundFamily,
+    family: Family,
+    genes: Floats,
+    kind: str,
+    name: str,
+    precision: str,
+    flights: Sequence[Trajectory],
+    target: Floats,
+) -> dict[str, str]:
+    """Texts of a controller by the suffix of their files, the main one first, checked on flights.
+
+    Args:
+        described: the family as a user wrote it.
+        family: the same, bound.
+        genes: gains (size,).
+        kind: "python" or "c".
+        name: what functions in C begin with.
+        precision: of C, "double" or "float".
+        flights: whose states it is checked on; none: it is not checked.
+        target: state that it leads to then (n_x,).
+
+    Raises:
+        InvalidInput: another kind or precision.
+        NotAvailable: a family that cannot be written down, or an export that differs or cannot be checked.
+    """
+    if kind not in ("python", "c"):
+        raise unknown("kind of export of a controller", kind, ("python", "c"))
+    if precision not in PRECISIONS:
+        raise unknown("precision", precision, PRECISIONS)
+
+    def own(states: Floats, goal: Floats) -> Floats:
+        controller = family.controller(genes)
+        return np.array([controller.command(state, goal) for state in states])
+
+    if kind == "python":
+        text = controller_python(described, family, genes)
+        if flights:
+            check_controller("Python", python_controller(text), own, family, flights, target, "double")
+        return {".py": text}
+    name = c_name(name)
+    header, text = controller_c(described, family, genes, name, precision)
+    if flights:
+        found = c_controller(header, text, name, family.signals.n_u, precision)
+        check_controller("C", found, own, family, flights, target, precision)
+    return {".c": text, ".h": header}
+
+
+def delivered(texts: Mapping[str, str], name: str, path: Path | None) -> str | tuple[Path, ...]:
+    """One text where no path was given, else the files that were written.
+
+    Args:
+        texts: by suffix, the main one first.
+        name: what functions in C begin with.
+        path: of the main file.
+
+    Raises:
+        InvalidInput: a file that cannot be written.
+    """
+    include = f'#include "{c_name(name)}.h"'
+    if path is None:
+        return "\n".join(reversed([*texts.values()])).replace(f"{include}\n", "")
+    written = []
+    for suffix, text in texts.items():
+        file = path.with_suffix(suffix)
+        try:
+            file.write_text(text.replace(include, f'#include "{path.stem}.h"'), encoding="utf-8")
+        except OSError as reason:
+            raise InvalidInput(f"Export: expected to be able to write {str(file)!r}: {reason}.") from reason
+        written.append(file)
+    return tuple(written)
+
+
+def c_name(name: str) -> str:
+    """A name that functions in C may begin with.
+
+    Args:
+        name: such as that of a file.
+    """
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return plain if plain[:1].isalpha() else f"twin_{plain}"

@@ -1,0 +1,155 @@
+"""A law for algebra and for papers: a script that makes SymPy expressions, and LaTeX."""
+
+from __future__ import annotations
+
+import re
+
+from twinloop._core import __version__
+from twinloop.law.equations import equations
+from twinloop.law.expansion import Expansion, written
+from twinloop.law.exports.python_source import equation_roots, joined
+from twinloop.law.expressions import Expressions
+from twinloop.law.law import Law
+from twinloop.law.writing import EXACT, Dialect, Writer
+
+SYMPY = Dialect({
+    "abs": "sp.Abs({})", "sqrt": "sp.sqrt(sp.Abs({}))", "min": "sp.Min({}, {})", "max": "sp.Max({}, {})",
+    **{function: f"sp.{function}({{}})" for function in ("sin", "cos", "tanh", "exp")}, "upright": "{}",
+})  # fmt: skip
+
+
+TAKEN = ("sp", "STATES", "COMMANDS", "HIDDEN", "EQUATIONS")
+"""Names of the script's own."""
+
+
+def sympy_source(law: Law) -> str:
+    """A law as a script that makes SymPy expressions, every constant with all its digits.
+
+    Args:
+        law: of a twin.
+
+    Returns:
+        Python that leaves `STATES`, `COMMANDS` (in units of their scales), `HIDDEN` and `EQUATIONS`, a matrix with the
+        derivative of each state, or with what the form of the twin says. Divisions are plain ones.
+    """
+    roots = equation_roots(law)
+    symbols = [f"{symbol}_" if symbol in TAKEN else symbol for symbol in law.symbols]
+    prefix = "t"
+    while any(symbol.startswith(prefix) and symbol[len(prefix) :].isdigit() for symbol in symbols):
+        prefix += "_"
+    writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, SYMPY)
+    n_x, n_u = law.signals.n_x, law.signals.n_u
+    groups = dict(
+        zip(TAKEN[1:4], (symbols[:n_x], symbols[n_x : n_x + n_u], symbols[n_x + n_u :]), strict=True)
+    )
+    kinds = {"acceleration": "derivatives of the states", "absolute": "the next states"}
+    lines = [
+        f'"""The equations of a twin, learnt by Twinloop {__version__}: {kinds.get(law.form, "what is added")}."""',
+        "",
+        *(f"# {note}" for note in _notes(law, EXACT)),
+        "",
+        "import sympy as sp",
+        "",
+    ]
+    for group, names in groups.items():
+        if names:
+            lines.append(f'{group} = {", ".join(names)}, = sp.symbols("{" ".join(names)},", real=True)')
+    between = "\n    "
+    lines += [
+        f"{name} = ({joined(writer.terms(number, define=True), between)})"
+        for number, name in writer.names.items()
+    ]
+    lines += [
+        "EQUATIONS = sp.Matrix([",
+        *(f"    {joined(writer.terms(root), between)}," for root in roots),
+        "])",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _latex_number(value: float, digits: int) -> str:
+    text = f"{value:.{digits}g}"
+    mantissa, exponent = text.split("e") if "e" in text else (text, "")
+    return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+LATEX = Dialect(
+    {
+        "abs": r"\left|{}\right|",
+        "sqrt": r"\sqrt{{\left|{}\right|}}",
+        "min": r"\min\left({}, {}\right)",
+        "max": r"\max\left({}, {}\right)",
+        "exp": r"\exp\left({}\right)",
+        **{function: rf"\{function}\left({{}}\right)" for function in ("sin", "cos", "tanh")},
+        "upright": "{}",
+    },
+    division=r"\frac{{{0}}}{{{1}}}",
+    times=r" \, ",
+    power="{}^{{{}}}",
+    number=_latex_number,
+    longest=400,
+)
+
+
+def latex_source(law: Law, digits: int = 6) -> str:
+    """A law as LaTeX, multiplied out.
+
+    Args:
+        law: of a twin.
+        digits: significant digits of constants.
+
+    Returns:
+        An `align*` environment of amsmath with an equation a state.
+    """
+    target = Expressions()
+    for place in range(law.inputs):
+        target.input(place)
+    expansion = Expansion(law.expressions, target)
+    roots = [written(target, expansion.polynomial(root)) for root in law.outputs]
+    writer = Writer(target, roots, [latex_name(symbol) for symbol in law.symbols], digits, "t_", False, LATEX)
+    lines = [
+        rf"  {name} &= {joined(writer.terms(number, define=True), ' ')}"
+        for number, name in writer.names.items()
+    ]
+    outputs = dict(zip(law.outputs, roots, strict=True))
+    kinematic = Writer(
+        law.expressions,
+        equation_roots(law),
+        [latex_name(symbol) for symbol in law.symbols],
+        digits,
+        "t_",
+        False,
+        LATEX,
+    )
+    for place, (name, root) in enumerate(zip(law.signals.state_names, equation_roots(law), strict=True)):
+        symbol = latex_name(name)
+        driven = law.form != "acceleration" or place in law.signals.driven
+        right = joined((writer if driven else kinematic).terms(outputs[root] if driven else root), " ")
+        if law.form == "acceleration":
+            left = rf"\frac{{\mathrm{{d}} {symbol}}}{{\mathrm{{d}} t}}"
+        else:
+            left = rf"{symbol}_{{k+1}}"
+            if law.form == "increment":
+                right = f"{symbol} - {right[1:]}" if right.startswith("-") else f"{symbol} + {right}"
+        lines.append(rf"  {left} &= {right}")
+    lines = [re.sub(r"\bt_([0-9]+)", r"t_{\1}", line) for line in lines]
+    notes = "".join(f"% {note}\n" for note in _notes(law, digits))
+    return notes + "\\begin{align*}\n" + " \\\\\n".join(lines) + "\n\\end{align*}\n"
+
+
+def _notes(law: Law, digits: int) -> list[str]:
+    """What belongs to the equations: conventions, actuators, hidden states."""
+    lines = equations(law, digits=digits).splitlines()
+    filled = [
+        line for line in lines if line.startswith(tuple(f"d {name} / dt" for name in law.hidden_symbols))
+    ]
+    return [line[2:] for line in lines if line.startswith("# ")] + filled
+
+
+def latex_name(name: str) -> str:
+    """A name of a signal as LaTeX writes it.
+
+    Args:
+        name: of a state or a command.
+    """
+    return rf"\mathit{{{name.replace('_', chr(92) + '_')}}}"

@@ -1,0 +1,239 @@
+"""Margins of the loops that a controller closes around a law, each broken at one place and the others closed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.controllers import Family, Mixer
+from twinloop.law.law import Law
+from twinloop.law.linear.controller import LinearController, linear_controller
+from twinloop.law.linear.plant import linearised, trimmed
+from twinloop.law.linear.state_space import Linear
+
+FREQUENCIES = 4000
+"""Frequencies at which a loop is looked at, in equal ratios."""
+SLOWEST = 1e-5
+"""Lowest of them, as a share of half the frequency of the periods."""
+HALVINGS = 60
+"""Times that an interval with a crossing is halved."""
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """How far one loop is from instability; a gain of 2 is 6 dB.
+
+    Args:
+        loop: where it is broken: the name of an axis or of a command.
+        stable: whether all loops together are stable; if not, margins mean nothing.
+        gain: factor above 1 by which the loop's gain may grow; infinite where it may grow without end.
+        gain_down: factor below 1 to which it may fall; 0 where it may vanish.
+        phase: what may be lost at the crossover, rad.
+        delay: what may be added to the loop, s.
+        crossover: highest frequency at which the loop's gain is 1, rad/s; 0 where it never is.
+        sensitivity: Ms, the largest |1 / (1 + L)|.
+        complementary: Mt, the largest |L / (1 + L)|.
+    """
+
+    loop: str
+    stable: bool
+    gain: float
+    gain_down: float
+    phase: float
+    delay: float
+    crossover: float
+    sensitivity: float
+    complementary: float
+
+
+class Loops:
+    """A plant and a controller, closed.
+
+    Args:
+        plant: of the law, in discrete time.
+        controller: that reads its first states.
+        outputs: slopes of the commands by the axes (n_u, axes), where the loops are broken at axes; None: at the
+            commands.
+    """
+
+    def __init__(self, plant: Linear, controller: LinearController, outputs: Floats | None = None) -> None:
+        assert plant.dt is not None
+        self.plant, self.controller, self.dt = plant, controller, plant.dt
+        n_x = controller.D.shape[1]
+        self._of_axes = np.eye(len(controller.D)) if outputs is None else outputs
+        self._to_axes = np.linalg.pinv(self._of_axes)
+        self._seen = n_x
+
+    def closed_poles(self) -> np.ndarray:
+        """Eigenvalues of the closed loop, in discrete time."""
+        plant, law = self.plant, self.controller
+        n, m = len(plant.A), len(law.A)
+        seen = np.eye(n)[: self._seen]
+        whole = np.zeros((n + m, n + m))
+        whole[:n, :n] = plant.A + plant.B @ law.D @ seen
+        whole[:n, n:] = plant.B @ law.C
+        whole[n:, :n] = law.B @ seen
+        whole[n:, n:] = law.A
+        return np.linalg.eigvals(whole)
+
+    def response(self, loop: int, frequencies: Floats) -> np.ndarray:
+        """L of one loop, broken where it leaves the controller, the others closed.
+
+        Args:
+            loop: number of the axis or command.
+            frequencies: (f,), rad/s.
+
+        Returns:
+            Complex gains (f,); 1 + L is what decides on stability.
+        """
+        through = self.controller.response(frequencies) @ self.plant.response(frequencies)[:, : self._seen]
+        around = self._to_axes @ through @ self._of_axes
+        size = around.shape[1]
+        closed = np.eye(size)
+        closed[loop, loop] = 0.0
+        answer = np.linalg.solve(np.eye(size) - around @ closed, around[:, :, loop : loop + 1])
+        return -np.asarray(answer[:, loop, 0])
+
+    def margins(self, loop: int, name: str) -> LoopMargins:
+        """Margins of one loop."""
+        half = math.pi / self.dt
+        frequencies = np.geomspace(SLOWEST * half, half * (1.0 - 1e-9), FREQUENCIES)
+        values = self.response(loop, frequencies)
+        crossings = self._crossings(loop, frequencies, np.log(np.abs(values)), lambda v: math.log(abs(v)))
+        turns = self._crossings(loop, frequencies, values.imag, lambda v: float(v.imag))
+        at = self.response(loop, np.array(crossings)) if crossings else np.zeros(0, complex)
+        lost = np.mod(np.angle(at) + math.pi, 2.0 * math.pi)
+        real = self.response(loop, np.array(turns)).real if turns else np.zeros(0)
+        factors = -1.0 / real[real < 0.0]
+        # The last point is half the frequency of the periods, where L is real.
+        factors = np.append(factors, [-1.0 / values[-1].real] if values[-1].real < 0.0 else [])
+        return LoopMargins(
+            loop=name,
+            stable=bool((np.abs(self.closed_poles()) < 1.0).all()),
+            gain=float(factors[factors > 1.0].min(initial=math.inf)),
+            gain_down=float(factors[factors < 1.0].max(initial=0.0)),
+            phase=float(np.minimum(lost, 2.0 * math.pi - lost).min(initial=math.inf)),
+            delay=float((lost / crossings).min(initial=math.inf)) if crossings else math.inf,
+            crossover=max(crossings, default=0.0),
+            sensitivity=float((1.0 / np.abs(1.0 + values)).max()),
+            complementary=float(np.abs(values / (1.0 + values)).max()),
+        )
+
+    def _crossings(
+        self, loop: int, frequencies: Floats, marks: Floats, mark: Callable[[complex], float]
+    ) -> list[float]:
+        """Frequencies at which a mark of L changes its sign, by bisection."""
+        found = []
+        for place in np.flatnonzero(np.sign(marks[:-1]) * np.sign(marks[1:]) < 0.0):
+            low, high = float(frequencies[place]), float(frequencies[place + 1])
+            for _ in range(HALVINGS):
+                middle = math.sqrt(low * high)
+                there = mark(complex(self.response(loop, np.array([middle]))[0]))
+                low, high = (middle, high) if there * marks[place] > 0.0 else (low, middle)
+            found.append(math.sqrt(low * high))
+        return found
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins of the loops of a controller, by loop, each broken while the others stay closed; printable.
+
+    Args:
+        broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+        nominal: of the twin.
+        worst: the worst of each margin over the committee.
+        members: how many models that has.
+    """
+
+    broken_at: str
+    nominal: tuple[LoopMargins, ...]
+    worst: tuple[LoopMargins, ...]
+    members: int
+
+    def __str__(self) -> str:
+        """A table as text, the nominal margins above the worst of each loop."""
+        head = (
+            f"{'loop':>16}  {'':>7}  {'gain':>8}  {'down to':>8}  {'phase (°)':>9}  {'delay (s)':>9}  {'crossover':>9}"
+            f"  {'Ms':>6}  {'Mt':>6}"
+        )
+        lines = [f"Loops broken at the {self.broken_at}; crossover in rad/s", head]
+        for pair in zip(self.nominal, self.worst, strict=True):
+            for which, row in zip(("twin", "worst"), pair, strict=True):
+                lines.append(
+                    f"{row.loop if which == 'twin' else '':>16}  {which:>7}  {row.gain:>8.3g}  {row.gain_down:>8.3g}"
+                    f"  {math.degrees(row.phase):>9.3g}  {row.delay:>9.3g}  {row.crossover:>9.3g}"
+                    f"  {row.sensitivity:>6.3g}  {row.complementary:>6.3g}{'' if row.stable else '  unstable'}"
+                )
+        lines.append(f"worst: the worst of each over {self.members} model{'s' * (self.members != 1)}")
+        return "\n".join(lines)
+
+
+def margins_of(
+    laws: Sequence[Law],
+    family: Family,
+    genes: Floats,
+    target: Floats,
+    mixer: Mixer | None,
+    names: Sequence[str],
+    broken_at: str,
+) -> Margins:
+    """Margins of all loops, at the target and under the command that holds it.
+
+    Args:
+        laws: the twin's, then those of the committee.
+        family: of the controller.
+        genes: its gains (size,).
+        target: state that it leads to (n_x,).
+        mixer: from axes to commands; None: axis i is command i.
+        names: of the loops.
+        broken_at: "axes" or "commands".
+
+    Returns:
+        Nominal and worst margins of each loop.
+
+    Raises:
+        NotAvailable: a law or the controller has no derivatives there.
+    """
+    controller = linear_controller(family, genes, target)
+    outputs = None if mixer is None or broken_at == "commands" else _slopes(mixer, controller.rest)
+    rows = []
+    for law in laws:
+        plant = linearised(law, target, trimmed(law, target, controller.rest), discrete=True)
+        closed = Loops(plant, controller, outputs)
+        rows.append([closed.margins(loop, name) for loop, name in enumerate(names)])
+    return Margins(
+        broken_at,
+        tuple(rows[0]),
+        tuple(worst(each) for each in zip(*rows, strict=True)),
+        max(1, len(laws) - 1),
+    )
+
+
+def _slopes(mixer: Mixer, rest: Floats) -> Floats:
+    """How commands move with the outputs of the axes at rest (n_u, axes)."""
+    before = np.abs(rest) ** (1.0 / mixer.power)
+    slopes = np.ones(len(rest)) if mixer.power == 1.0 else mixer.power * before ** (mixer.power - 1.0)
+    return np.asarray(mixer.matrix * slopes[:, np.newaxis], dtype=np.float64)
+
+
+def worst(margins: Sequence[LoopMargins]) -> LoopMargins:
+    """The worst of each margin of one loop over several laws.
+
+    Args:
+        margins: of the same loop.
+    """
+    return LoopMargins(
+        loop=margins[0].loop,
+        stable=all(each.stable for each in margins),
+        gain=min(each.gain for each in margins),
+        gain_down=max(each.gain_down for each in margins),
+        phase=min(each.phase for each in margins),
+        delay=min(each.delay for each in margins),
+        crossover=max(each.crossover for each in margins),
+        sensitivity=max(each.sensitivity for each in margins),
+        complementary=max(each.complementary for each in margins),
+    )

@@ -1,0 +1,300 @@
+"""A law around a point: how small departures of states and commands move on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.errors import NotAvailable
+from twinloop.law.actuation import Actuation, Actuator
+from twinloop.law.law import Law
+from twinloop.law.linear.jacobian import jacobian
+from twinloop.law.linear.state_space import Linear
+
+HALVINGS = 30
+"""Times that a step to a command that holds a state is halved at most."""
+
+
+def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Linear:
+    """A law around a point, by exact derivatives; with actuators at rest under the command, hidden states at 0.
+
+    Args:
+        law: of a twin.
+        state: (n_x,), SI units, radians.
+        command: (n_u,), in the units of the commands.
+        discrete: over a period, as the twin steps, instead of at an instant.
+
+    Returns:
+        The matrices with the names of what they stand for.
+
+    Raises:
+        NotAvailable: the law has no derivatives there, or, for continuous time, none at all.
+    """
+    found = _period(law, state, command) if discrete else _instant(law, state, command)
+    if not (np.isfinite(found.A).all() and np.isfinite(found.B).all() and np.isfinite(found.drift).all()):
+        raise NotAvailable(
+            "Linearisation: expected a law with finite derivatives at the point, found one that overflows or has a"
+            " root of 0 there; choose a point beside it."
+        )
+    return found
+
+
+def _instant(law: Law, state: Floats, command: Floats) -> Linear:
+    if law.form != "acceleration":
+        raise NotAvailable(
+            f"Linearisation: expected a law of derivatives, found the form {law.form!r}, which steps from period to"
+            " period; ask for discrete=True."
+        )
+    signals, hidden = law.signals, law.actuation.hidden
+    n_x, n_u = signals.n_x, signals.n_u
+    lagging = [i for i, actuator in enumerate(law.actuation.actuators) if actuator.lag > 0.0]
+    size = n_x + len(lagging) + len(hidden)
+    factors = 1.0 / np.array([each.size for each in signals.commands])
+    point = np.concatenate([state, factors * command, np.zeros(len(hidden))])
+    values, slopes = jacobian(law.expressions, law.derivatives(), _wrapped(law, point))
+    by_effect = slopes[:, n_x : n_x + n_u] * factors
+    A, B, drift = np.zeros((size, size)), np.zeros((size, n_u)), np.zeros(size)
+    A[:n_x, :n_x], A[:n_x, n_x + len(lagging) :], drift[:n_x] = (
+        slopes[:, :n_x],
+        slopes[:, n_x + n_u :],
+        values,
+    )
+    direct = [i for i in range(n_u) if i not in lagging]
+    B[:n_x, direct] = by_effect[:, direct]
+    for place, i in enumerate(lagging, start=n_x):
+        lag = law.actuation.actuators[i].lag
+        A[:n_x, place] = by_effect[:, i]
+        A[place, place], B[place, i] = -1.0 / lag, 1.0 / lag
+    for place, h in enumerate(hidden, start=n_x + len(lagging)):
+        level, slope = _level(h.commands, h.squared, factors * command, factors)
+        A[place, place], B[place] = -1.0 / h.time, slope
+        drift[place] = 0.0 if h.rest is None else level - h.rest
+    delays = signals.dt * np.array([float(actuator.delay) for actuator in law.actuation.actuators])
+    names = [f"{signals.command_names[i]}_effect" for i in lagging]
+    return Linear(
+        A,
+        B,
+        (*signals.state_names, *names, *law.hidden_symbols),
+        signals.command_names,
+        np.concatenate([state, command[lagging], np.zeros(len(hidden))]),
+        command,
+        drift,
+        None,
+        delays,
+    )
+
+
+def _wrapped(law: Law, inputs: Floats) -> Floats:
+    """Inputs of the equations, angles that wrap within half a period of 0."""
+    seen = inputs.copy()
+    for place, state in enumerate(law.signals.states):
+        if state.period is not None:
+            seen[place] -= np.rint(seen[place] / state.period) * state.period
+    return seen
+
+
+def _level(commands: Sequence[int], squared: bool, scaled: Floats, factors: Floats) -> tuple[float, Floats]:
+    """What fills a hidden state, and its slope by each command (n_u,)."""
+    given, slope = scaled[list(commands)], np.zeros(len(factors))
+    slope[list(commands)] = (2.0 * given if squared else 1.0) * factors[list(commands)] / len(commands)
+    return float((given**2 if squared else given).mean()), slope
+
+
+@dataclass(frozen=True, eq=False)
+class _Dual:
+    """Numbers with their derivatives by everything that a period begins with."""
+
+    values: Floats
+    slopes: Floats
+
+    def __add__(self, other: _Dual) -> _Dual:
+        return _Dual(self.values + other.values, self.slopes + other.slopes)
+
+    def __mul__(self, factor: float | Floats) -> _Dual:
+        of_rows = factor[:, np.newaxis] if isinstance(factor, np.ndarray) else factor
+        return _Dual(self.values * factor, self.slopes * of_rows)
+
+    @staticmethod
+    def stacked(parts: Sequence[_Dual]) -> _Dual:
+        return _Dual(
+            np.concatenate([part.values for part in parts]), np.concatenate([part.slopes for part in parts])
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Begun:
+    """What a period begins with, each with its derivatives: all of it together is the state of the linear model.
+
+    Args:
+        names: of the states of the linear model.
+        x: the states of the signals.
+        held: effect of each command that lags, by its place.
+        hidden: the hidden states.
+        queues: commands on their way, the oldest first, for each command.
+        sent: the commands of the period.
+    """
+
+    names: list[str]
+    x: _Dual
+    held: dict[int, _Dual]
+    hidden: _Dual
+    queues: list[list[_Dual]]
+    sent: _Dual
+
+    @staticmethod
+    def of(law: Law, state: Floats, command: Floats) -> _Begun:
+        signals, actuators = law.signals, law.actuation.actuators
+        sent = list(zip(signals.command_names, actuators, strict=True))
+        names = [*signals.state_names, *(f"{name}_effect" for name, a in sent if a.lag > 0.0)]
+        names += law.hidden_symbols
+        names += [f"{name}_{back}_before" for name, a in sent for back in range(a.delay, 0, -1)]
+        identity, rows = np.eye(len(names) + signals.n_u), iter(range(len(names)))
+
+        def taken(values: Floats) -> _Dual:
+            return _Dual(values, identity[[next(rows) for _ in values]])
+
+        x = taken(state)
+        held = {i: taken(command[[i]]) for i, actuator in enumerate(actuators) if actuator.lag > 0.0}
+        hidden = taken(np.zeros(len(law.actuation.hidden)))
+        queues = [[taken(command[[i]]) for _ in range(a.delay)] for i, a in enumerate(actuators)]
+        return _Begun(names, x, held, hidden, queues, _Dual(command, identity[len(names) :]))
+
+    def whole(self) -> _Dual:
+        """All of it, in the order of the names."""
+        waiting = [part for queue in self.queues for part in queue]
+        return _Dual.stacked([self.x, *self.held.values(), self.hidden, *waiting])
+
+
+def _period(law: Law, state: Floats, command: Floats) -> Linear:
+    """One period, with what is on its way as states: x, effects that lag, hidden states, commands before."""
+    begun = _Begun.of(law, state, command)
+    effects, held, waiting = _effects(law, begun)
+    filled = _filled(law, begun)
+    inputs = [
+        _Dual.stacked([of_commands, hidden]) for of_commands, hidden in zip(effects, filled, strict=True)
+    ]
+    ended = _Dual.stacked([_stepped(law, begun.x, inputs), *held, filled[2], *waiting])
+    before, size = begun.whole(), len(begun.names)
+    return Linear(
+        ended.slopes[:, :size],
+        ended.slopes[:, size:],
+        tuple(begun.names),
+        law.signals.command_names,
+        before.values,
+        command,
+        ended.values - before.values,
+        law.signals.dt,
+        np.zeros(law.signals.n_u),
+    )
+
+
+def _effects(law: Law, begun: _Begun) -> tuple[list[_Dual], list[_Dual], list[_Dual]]:
+    """Scaled effects of commands at start, middle and end of a period; what lags hold; commands still on their way."""
+    stages: list[list[_Dual]] = [[], [], []]
+    held, waiting = [], []
+    for i, actuator in enumerate(law.actuation.actuators):
+        arrived, *later = [*begun.queues[i], _Dual(begun.sent.values[[i]], begun.sent.slopes[[i]])]
+        half = float(np.exp(-0.5 * law.signals.dt / actuator.lag)) if actuator.lag > 0.0 else 0.0
+        start = begun.held.get(i, arrived)
+        middle = arrived * (1.0 - half) + start * half
+        end = arrived * (1.0 - half) + middle * half
+        for stage, effect in zip(stages, (start, middle, end), strict=True):
+            stage.append(effect)
+        held += [end] if i in begun.held else []
+        waiting += later
+    factors = 1.0 / np.array([each.size for each in law.signals.commands])
+    return [_Dual.stacked(stage) * factors for stage in stages], held, waiting
+
+
+def _filled(law: Law, begun: _Begun) -> list[_Dual]:
+    """Hidden states at the start, the middle and the end of a period."""
+    factors = 1.0 / np.array([each.size for each in law.signals.commands])
+    stages: list[list[_Dual]] = [[], [], []]
+    for j, h in enumerate(law.actuation.hidden):
+        kept = float(np.exp(-0.5 * law.signals.dt / h.time))
+        level, slope = _level(h.commands, h.squared, factors * begun.sent.values, factors)
+        over = 0.0 if h.rest is None else level - h.rest
+        added = _Dual(np.array([over]), slope[np.newaxis] @ begun.sent.slopes) * (h.time * (1.0 - kept))
+        start = _Dual(begun.hidden.values[[j]], begun.hidden.slopes[[j]])
+        middle = start * kept + added
+        for stage, value in zip(stages, (start, middle, middle * kept + added), strict=True):
+            stage.append(value)
+    return [_Dual.stacked(stage) if stage else begun.hidden for stage in stages]
+
+
+def _stepped(law: Law, x: _Dual, inputs: Sequence[_Dual]) -> _Dual:
+    """The next state under effects and hidden states at the start, the middle and the end of a period."""
+
+    def of(roots: Sequence[int], point: _Dual, stage: int) -> _Dual:
+        whole = _Dual.stacked([point, inputs[stage]])
+        values, slopes = jacobian(law.expressions, roots, _wrapped(law, whole.values))
+        return _Dual(values, slopes @ whole.slopes)
+
+    dt = law.signals.dt
+    if law.form == "absolute":
+        return of(law.outputs, x, 1)
+    if law.form == "increment":
+        return x + of(law.outputs, x, 1)
+    roots = law.derivatives()
+    first = of(roots, x, 0)
+    second = of(roots, x + first * (0.5 * dt), 1)
+    third = of(roots, x + second * (0.5 * dt), 1)
+    fourth = of(roots, x + third * dt, 2)
+    return x + (first + second * 2.0 + third * 2.0 + fourth) * (dt / 6.0)
+
+
+def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
+    """A command under which a state stays as much as it can: the nearest to a first guess, by Gauss and Newton.
+
+    Args:
+        law: of a twin.
+        state: (n_x,) to be held.
+        start: (n_u,), the first guess; where several commands hold the state, the answer is near it.
+
+    Returns:
+        The command (n_u,), within its bounds.
+    """
+    # A command that is held has arrived.
+    at_once = replace(law, actuation=Actuation((Actuator(),) * law.signals.n_u, law.actuation.hidden))
+    low, high = np.array([command.bounds for command in law.signals.commands]).T
+    sizes = np.array([command.size for command in law.signals.commands])
+    scales = np.array([state.scale for state in law.signals.states])
+
+    def off(command: Floats) -> tuple[float, Linear]:
+        found = _period(at_once, state, command)
+        return float(np.square(found.drift[: law.signals.n_x] / scales).sum()), found
+
+    best = np.clip(start, low, high)
+    least, found = off(best)
+    for _ in range(HALVINGS):
+        n_x = law.signals.n_x
+        reach = found.B[:n_x] * sizes / scales[:, np.newaxis]
+        step = np.linalg.lstsq(reach, -found.drift[:n_x] / scales, rcond=1e-9)[0] * sizes
+        share = 1.0
+        for _ in range(HALVINGS):
+            tried = np.clip(best + share * step, low, high)
+            left, there = off(tried)
+            if left < least:
+                break
+            share *= 0.5
+        else:
+            return best
+        settled = least - left <= 1e-12 * least
+        best, least, found = tried, left, there
+        if settled:
+            break
+    return best
+
+
+def resting(law: Law) -> Floats:
+    """Where the commands of a law are at rest, (n_u,): where its actuators begin, else in the middle of the bounds.
+
+    Args:
+        law: of a twin.
+    """
+    middles = (0.5 * sum(command.bounds) for command in law.signals.commands)
+    rests = (actuator.rest for actuator in law.actuation.actuators)
+    return np.array([middle if rest is None else rest for middle, rest in zip(middles, rests, strict=True)])

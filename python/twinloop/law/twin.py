@@ -1,0 +1,418 @@
+"""The twin: a learnt simulator made of readable equations, with its known error."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats, floats, number
+from twinloop.errors import InvalidInput, NotAvailable, engine_input
+from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
+from twinloop.law.equations import equations
+from twinloop.law.exports.export import Source, asked, delivered, exported
+from twinloop.law.flight import fly, fly_commands
+from twinloop.law.law import Law
+from twinloop.law.linear.plant import linearised, resting, trimmed
+from twinloop.law.linear.state_space import Linear
+from twinloop.law.noise import Noise
+from twinloop.records import Recorded, checked_record, from_text, read, to_text
+from twinloop.remarks import Remark
+from twinloop.signals import Signals
+from twinloop.streams import Unit
+from twinloop.test import Test, check_signals
+from twinloop.trajectory import Trajectory, check_recorded, continued
+
+WRONG = 0.5
+"""Share of the error of the model that never moves above which a flight is not followed."""
+DRAWS = 12
+"""Runs of each member of a committee that a band is made of."""
+STARTS = 5.0
+"""Standard deviations of a sensor by which a flight's first reading may be off the state that its test asks for."""
+NINE_OF_TEN = 1.645
+"""Standard deviations on either side of the mean between which nine of ten normal numbers lie."""
+
+
+class Twin(Recorded, kind="twin"):
+    """A model that stands in for the system.
+
+    Args:
+        model: the engine's model.
+        signals: what it is a model of.
+        errors: how well it follows the selected tests.
+        divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
+        members: of the committee, for the band of a simulated run; none: no band.
+        noise: of sensors and disturbances, for the band.
+        seed: of the band's random numbers.
+        inflation: factor on the spread of the members, where they were found to be too sure.
+        remarks: what a person should know of it and of the data.
+        offsets: by how much later than those of the driven states each state is read (n_x,), s; empty: none.
+        flights: that it was learnt from, on which its exports are checked.
+    """
+
+    def __init__(
+        self,
+        model: _core.Model,
+        signals: Signals,
+        errors: Iterable[TestErrors] = (),
+        divergence_factor: float = 10.0,
+        members: Sequence[_core.Model] = (),
+        noise: Noise | None = None,
+        seed: int = 0,
+        inflation: float = 1.0,
+        offsets: Sequence[float] = (),
+        flights: Sequence[Trajectory] = (),
+        remarks: Sequence[Remark] = (),
+    ) -> None:
+        self.flights = tuple(flights)
+        self.offsets = tuple(offsets)
+        self.inflation = inflation
+        self.remarks = tuple(remarks)
+        self.members = tuple(members)
+        self.noise = noise
+        self.seed = seed
+        self.model = model
+        self.signals = signals
+        self.errors = ErrorTable(errors)
+        self.divergence_factor = divergence_factor
+
+    @classmethod
+    def recorded_fields(cls) -> tuple[str, ...]:
+        """Names of the fields that a record has, in order."""
+        return (
+            *("signals", "model", "errors", "divergence_factor", "members", "noise", "seed", "inflation"),
+            *("offsets", "flights"),
+        )
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Twin:
+        found = checked_record(record, cls, cls.recorded_fields(), where)
+        signals = read(Signals, found["signals"], f"{where}.signals")
+        given = (signals, *given)
+        twin = cls(
+            read(_core.Model, found["model"], f"{where}.model", given),
+            signals,
+            read(tuple[TestErrors, ...], found["errors"], f"{where}.errors"),
+            number(f"Record {where}.divergence_factor", found["divergence_factor"], above=0.0),
+            read(tuple[_core.Model, ...], found["members"], f"{where}.members", given),
+            read(Noise | None, found["noise"], f"{where}.noise"),
+            read(int, found["seed"], f"{where}.seed"),
+            read(float, found["inflation"], f"{where}.inflation"),
+            read(tuple[float, ...], found["offsets"], f"{where}.offsets"),
+            read(tuple[Trajectory, ...], found["flights"], f"{where}.flights"),
+        )
+        widths = {(flight.states.shape[1], flight.commands.shape[1]) for flight in twin.flights}
+        noisy = twin.noise is None or len(twin.noise.sensors) == len(twin.noise.moves) == signals.n_x
+        if len(twin.offsets) not in (0, signals.n_x) or widths - {(signals.n_x, signals.n_u)} or not noisy:
+            raise InvalidInput(
+                f"Record {where}: expected offsets, noise and flights of {signals.n_x} states and {signals.n_u}"
+                " commands, found others; it is damaged."
+            )
+        return twin
+
+    @property
+    def follows(self) -> bool:
+        """Whether the twin, flown by itself, follows at least half of the flights that it was learnt from."""
+        noise = 0.0 if self.noise is None else float(np.square(self.noise.sensors).mean())
+        lost = 0
+        for row in self.errors:
+            frozen = row.closed_loop / row.normalised if row.normalised > 0.0 else math.inf
+            lost += not row.closed_loop - noise <= WRONG * max(frozen - noise, 2.0 * noise)
+        return 2 * lost <= len(self.errors)
+
+    def export(
+        self,
+        to: str | Path,
+        *,
+        kind: str | None = None,
+        precision: str = "double",
+        force: bool = False,
+    ) -> str | tuple[Path, ...]:
+        """The twin for use elsewhere, with its lags, delays, hidden states and all digits.
+
+        | kind | file | what it is |
+        |---|---|---|
+        | `python` | `.py` | `simulate(initial_state, commands)` and a class with `step`; it needs nothing but Python |
+        | `c` | `.c`, `.h` | C99 with one period a call; no allocation, nothing but <math.h> |
+        | `sympy` | `.py` | a script that makes SymPy expressions; divisions are plain ones |
+        | `latex` | `.tex` | equations for a paper, multiplied out, with six digits |
+        | `json` | `.json` | the twin itself, with its flights: `twinloop.load_twin` reads it back to the bit |
+
+        Python and C are run on the commands of the flights that the twin was learnt from and compared with the twin;
+        SymPy is evaluated at their states. Differences above 1e-9 of a state's scale are refused (1e-3 in single
+        precision).
+
+        Args:
+            to: a kind, or the path of a file with the suffix of one.
+            kind: of the file where its suffix does not say it: "sympy".
+            precision: of C, "double" or "float".
+            force: also a twin that does not follow its own flights, and without the comparison.
+
+        Returns:
+            The text where a kind was asked for (in C the header, then the source), else the paths that were written.
+
+        Raises:
+            InvalidInput: no such kind, or a path that cannot be written.
+            NotAvailable: the twin does not follow its own flights, or the export could not be checked on them.
+        """
+        chosen, path = asked(to, kind)
+        if not force and not self.follows:
+            raise NotAvailable(
+                "Export: expected a twin that follows the flights that it was learnt from, found one that does not"
+                " follow half of them; learn from more tests, or pass force=True."
+            )
+        record = to_text(self.to_record()) if chosen == "json" else ""
+        source = Source(
+            self.law,
+            lambda state, commands: self.simulate_commands(state, commands).states,
+            self.flights,
+            record,
+            not force,
+        )
+        name = "twin" if path is None else path.stem
+        return delivered(exported(source, chosen, name, precision), name, path)
+
+    @cached_property
+    def law(self) -> Law:
+        """Equations, kinematics, actuators, hidden states, sensors' offsets and integrator, as a value."""
+        return Law.of(self.model, self.signals, self.offsets)
+
+    def equations(self, digits: int = 6) -> str:
+        """The twin as text that SymPy reads, too.
+
+        Args:
+            digits: significant digits of constants; 17 give every bit back.
+
+        Returns:
+            A legend, then the equations, multiplied out, with the ± of each constant where a committee stands behind
+            the twin. With 17 digits they are as the program computes them.
+
+        Raises:
+            InvalidInput: digits out of range.
+        """
+        members = [Law.of(member, self.signals, self.offsets) for member in self.members]
+        return equations(self.law, members, digits)
+
+    def simulate(self, test: Test, initial_state: ArrayLike | None = None) -> Trajectory:
+        """Flies a test on the twin instead of the system.
+
+        Args:
+            test: any test for the same signals.
+            initial_state: where to start (n_x,), SI units, radians; None: where the test does.
+
+        Returns:
+            The predicted run, cut where it diverges; with a `band` where a committee stands behind the twin.
+
+        Raises:
+            InvalidInput: the test is for other signals, or the start for other states.
+        """
+        check_signals(test, self.signals)
+        if initial_state is not None:
+            start = floats("Initial state", initial_state, (self.signals.n_x,))
+            test = dataclasses.replace(test, initial_state=start)
+        run = fly(self.model, test, divergence_factor=self.divergence_factor)
+        spread = self.spread(test)
+        if spread is None or self.noise is None:
+            return run
+        mean, variance = (values[: len(run.states)] for values in spread)
+        half = NINE_OF_TEN * np.sqrt(self.inflation * self.inflation * variance + self.noise.sensors**2)
+        return dataclasses.replace(run, band=np.stack([mean - half, mean + half]))
+
+    def as_flown(self, test: Test, flown: Trajectory) -> Test:
+        """A test from where its flight began, to be compared with the flight.
+
+        Args:
+            test: that was flown.
+            flown: the flight.
+
+        Returns:
+            The test; states that were read further from where they were asked to begin than their sensors explain begin
+            as they were read.
+        """
+        read = flown.states[0]
+        explained = np.zeros_like(read) if self.noise is None else STARTS * self.noise.sensors
+        off = np.abs(self.signals.difference(read, test.initial_state)) > explained
+        return dataclasses.replace(test, initial_state=np.where(off, read, test.initial_state))
+
+    def spread(self, test: Test) -> tuple[Floats, Floats] | None:
+        """What members and disturbances, drawn together, make of a test.
+
+        Args:
+            test: any test for the same signals.
+
+        Returns:
+            Mean and variance of the true states (n + 1, n_x) over the runs that last; None where no committee stands
+            behind the twin.
+        """
+        if not self.members or self.noise is None:
+            return None
+        noise, moves = self.noise.drawn(DRAWS, test.steps, Unit(self.seed).part(0).stream("band"))
+        excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
+        runs = []
+        for member in self.members:
+            with engine_input():
+                drawn = _core.rollout(
+                    member,
+                    test.family.engine,
+                    np.tile(test.genes, (DRAWS, 1)),
+                    test.task,
+                    self.signals.engine,
+                    noise=noise,
+                    disturbance=moves,
+                    excitation=excitation,
+                    divergence_factor=self.divergence_factor,
+                )
+            runs.append(drawn.states)
+        states = np.concatenate(runs)
+        lasted = np.isfinite(states)
+        count = np.maximum(1, lasted.sum(axis=0))
+        # From one of the runs: sums of whole states round by more than runs may differ.
+        origin = np.where(lasted[0], states[0], 0.0)
+        off = np.where(lasted, self.signals.difference(states, origin), 0.0)
+        middle = off.sum(axis=0) / count
+        variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
+        return origin + middle, variance
+
+    def predict(self, states: ArrayLike, commands: ArrayLike, past: ArrayLike | None = None) -> Floats:
+        """One step.
+
+        Lags, delays and hidden states make what comes next depend on what was commanded before. Without a `past` each
+        row is the first period of a run.
+
+        Args:
+            states: (n_x,) or (rows, n_x), SI units, radians.
+            commands: (n_u,) or (rows, n_u), in their units.
+            past: what was commanded since the run began, (p, n_u) or, a run each, (rows, p, n_u), the oldest first, in
+                the commands' units; None: nothing yet.
+
+        Returns:
+            The states one period later, in the shape of `states`; not finite where the model is not.
+
+        Raises:
+            InvalidInput: shapes that do not fit.
+        """
+        single = np.ndim(states) == 1
+        x = floats("States", np.atleast_2d(states), (None, self.signals.n_x))
+        u = floats("Commands", np.atleast_2d(commands), (len(x), self.signals.n_u))
+        before = None
+        if past is not None:
+            rows = np.asarray(past)[np.newaxis] if np.ndim(past) == 2 and single else past
+            before = floats("Past commands", rows, (len(x), None, self.signals.n_u))
+        with engine_input():
+            following = self.model.step(x, u, past=before)
+        return following[0] if single else following
+
+    def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
+        """The twin around a point, by exact derivatives of its equations.
+
+        Actuators are at rest under the command there, hidden states at 0.
+
+        Args:
+            at: state (n_x,), SI units, radians.
+            command: (n_u,), in the units of the commands; None: under which the state stays as much as it can, near
+                the middle of the bounds or where the actuators rest.
+            discrete: how a period moves on instead of the derivative at an instant.
+
+        Returns:
+            A and B with the names of their states and commands; delays stand beside them in continuous time.
+
+        Raises:
+            InvalidInput: shapes that do not fit.
+            NotAvailable: no finite derivatives there, or a twin that only steps and no `discrete=True`.
+        """
+        state = floats("State to linearise at", at, (self.signals.n_x,))
+        if command is None:
+            point = trimmed(self.law, state, resting(self.law))
+        else:
+            point = floats("Command to linearise at", command, (self.signals.n_u,))
+        return linearised(self.law, state, point, discrete)
+
+    def simulate_commands(self, initial_state: ArrayLike, commands: ArrayLike) -> Trajectory:
+        """A free run under given commands, without a controller; lags and hidden states begin at rest, as in a flight.
+
+        Args:
+            initial_state: (n_x,), SI units, radians.
+            commands: (n, n_u), in their units, each held for one period; what lies beyond a bound is clipped.
+
+        Returns:
+            The predicted run, cut where it diverges.
+
+        Raises:
+            InvalidInput: shapes that do not fit.
+        """
+        state = floats("Initial state", initial_state, (self.signals.n_x,))
+        u = floats("Commands", commands, (None, self.signals.n_u))
+        if len(u) == 0:
+            return Trajectory(np.zeros(1), state[np.newaxis], u)
+        low, high = np.array([command.bounds for command in self.signals.commands]).T
+        return fly_commands(
+            self.model,
+            state,
+            np.clip(u, low, high),
+            self.signals,
+            divergence_factor=self.divergence_factor,
+        )
+
+    def fit(self, trajectory: Trajectory) -> FitTable:
+        """How well the twin's free run under the recorded commands, from the first reading, follows a record.
+
+        Args:
+            trajectory: of the same signals, with at least one step.
+
+        Returns:
+            RMSE, FIT % and R² of each state, over all readings after the first.
+
+        Raises:
+            InvalidInput: other columns, or no step.
+        """
+        recorded = check_recorded(trajectory, self.signals, None, self.divergence_factor, least=1)
+        free = self.simulate_commands(recorded.states[0], recorded.commands).states
+        read = continued(recorded, self.signals, recorded.states[0]).states[1:]
+        lasted = len(free) > len(read)
+        rows = []
+        for i, state in enumerate(self.signals.states):
+            around = float(np.square(read[:, i] - read[:, i].mean()).sum())
+            left = np.inf
+            if lasted:
+                left = float(np.square(self.signals.difference(read, free[1:])[:, i]).sum())
+            share = left / around if around > 0.0 else None
+            rows.append(
+                StateFit(
+                    name=state.name,
+                    unit=state.unit,
+                    rmse=float(np.sqrt(left / len(read))),
+                    fit=None if share is None else 100.0 * (1.0 - float(np.sqrt(share))),
+                    r2=None if share is None else 1.0 - share,
+                )
+            )
+        return FitTable(rows)
+
+    def __repr__(self) -> str:
+        return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"
+
+
+def load_twin(path: str | Path) -> Twin:
+    """A twin that was exported as JSON.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The twin, with the same numbers to the bit.
+
+    Raises:
+        InvalidInput: no such file, or one that holds no twin.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        raise InvalidInput(
+            f"Twin: expected a file that can be read, found {str(path)!r}: {reason}."
+        ) from reason
+    return Twin.from_record(from_text(text, f"Twin {str(path)!r}"))
