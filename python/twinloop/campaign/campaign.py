@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop.arrays import Floats, floats, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
-from twinloop.campaign.coevolution import Coevolution
+from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Progress
-from twinloop.campaign.identify_and_plan import IdentifyAndPlan
+from twinloop.campaign.identify_and_plan.method import IdentifyAndPlan
 from twinloop.campaign.keeping import Keeping, heading, look
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method

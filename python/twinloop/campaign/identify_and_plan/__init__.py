@@ -1,5 +1,1 @@
-"""The way of the preset `default`: a twin is identified, the next flight is planned on it."""
-
-from twinloop.campaign.identify_and_plan.method import IdentifyAndPlan
-
-__all__ = ["IdentifyAndPlan"]
+"""The way of the preset `default`: a twin is identified, and the next flight is planned on it."""
