@@ -158,7 +158,7 @@ def test_what_a_law_raises_comes_out_of_whatever_flew_it(pendulum_signals, pendu
     test = tl.Test(family, np.array([2.0, 1.0, 0.3]), np.zeros(2), np.array([1.0, 0.0]), 20)
     for fly in (
         lambda: pendulum.run(test),
-        lambda: tl.models.Twin(model, pendulum_signals).simulate(test),
+        lambda: tl.Twin(model, pendulum_signals).simulate(test),
         lambda: [test.controller().command([0.0, 0.0], [1.0, 0.0]) for _ in range(6)],
     ):
         Faulty.left = 5

@@ -173,10 +173,10 @@ def test_errors_of_models_do_not_see_how_a_record_was_wrapped(seed):
 def test_an_angle_may_turn_as_often_as_it_likes():
     spinning = model(SIGNALS, "r3 = r3 * 0.0")
     test = tl.Test(family_of(SIGNALS), np.zeros(3), np.array([0.0, 11.0]), np.array([1.0, 0.0]), 200)
-    run = tl.models.Twin(spinning, SIGNALS).simulate(test)
+    run = tl.Twin(spinning, SIGNALS).simulate(test)
     assert run.ended == "completed" and run.states[-1, 0] == pytest.approx(110.0)
     assert check_recorded(run, SIGNALS, 200, 10.0) is run
-    cut = tl.models.Twin(model(rig(periodic=False), "r3 = r3 * 0.0"), rig(periodic=False)).simulate(
+    cut = tl.Twin(model(rig(periodic=False), "r3 = r3 * 0.0"), rig(periodic=False)).simulate(
         tl.Test(family_of(rig(periodic=False)), np.zeros(3), [0.0, 11.0], [1.0, 0.0], 200)
     )
     assert cut.ended == "diverged"
@@ -226,7 +226,7 @@ def test_a_campaign_asks_alike_however_the_readings_were_wrapped(preset):
 
 
 def test_the_equations_say_between_what_they_see_an_angle():
-    twin = tl.models.Twin(model(rig(periodic=True), "r3 = r0 * -2.5"), rig(periodic=True))
+    twin = tl.Twin(model(rig(periodic=True), "r3 = r0 * -2.5"), rig(periodic=True))
     assert "# angle wraps: the equations see it from -3.14159 to 3.14159 rad" in twin.equations().splitlines()
 
 

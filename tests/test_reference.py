@@ -154,7 +154,7 @@ def test_a_reference_of_another_length_is_refused(family):
 
 
 def test_a_twin_simulates_a_test_from_any_start(family, model, pendulum_signals):
-    twin = tl.models.Twin(model, pendulum_signals)
+    twin = tl.Twin(model, pendulum_signals)
     test = led(family, [1.0, 0.0])
     assert same_bits(twin.simulate(test, initial_state=test.initial_state).states, twin.simulate(test).states)
     found = twin.simulate(test, initial_state=[0.5, -1.0])
@@ -178,7 +178,7 @@ def test_a_run_under_commands_is_step_after_step_with_lags_and_all(seed):
     lagging = _core.Model(program, "acceleration", signals.engine, [(0.08, 2, None)], [])
     draw = np.random.default_rng(seed)
     commands = draw.uniform(-3.0, 3.0, (30, 1))
-    twin = tl.models.Twin(lagging, signals)
+    twin = tl.Twin(lagging, signals)
     found = twin.simulate_commands([0.3, 0.0], commands)
     # What stood in for it: a controller of no gains, whose excitation the commands were.
     nothing = PID(axes=[("angle", None)], gains=CONTROLLER.gains, output=Mixer(np.zeros((1, 1)))).bind(
@@ -191,7 +191,7 @@ def test_a_run_under_commands_is_step_after_step_with_lags_and_all(seed):
 
 
 def test_commands_of_another_shape_are_refused(model, pendulum_signals):
-    twin = tl.models.Twin(model, pendulum_signals)
+    twin = tl.Twin(model, pendulum_signals)
     assert len(twin.simulate_commands([0.1, 0.2], np.empty((0, 1))).states) == 1
     for state, commands in (([0.1], [[0.0]]), ([0.1, 0.2], [[0.0, 1.0]])):
         with pytest.raises(tl.InvalidInput):
