@@ -35,7 +35,7 @@ class Test(Recorded, kind="test", given=("family",)):
         predicted: quality that the twin predicts, where it was asked (with the preset "paper" the final distance);
             infinite if it diverges.
         measured: quality that was flown, mean over complete runs; None if there was none.
-        spread: standard deviation of the prediction over the committee; None where there was none.
+        spread: standard deviation that the measured quality is expected to have; None where nothing was predicted.
         risk: probability that the flight leaves the envelope, by the committee; None where there was none.
         reason: why this test, for a person.
 
@@ -112,7 +112,7 @@ class Test(Recorded, kind="test", given=("family",)):
         """The same test with what a committee says of it.
 
         Args:
-            spread: standard deviation of the prediction over the committee.
+            spread: standard deviation that the measured quality is expected to have.
             risk: probability that the flight leaves the envelope.
             reason: why this test.
 

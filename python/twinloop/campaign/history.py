@@ -128,7 +128,7 @@ class Planned(Recorded, kind="planned"):
         test: number of the test.
         genes: gains of the test, in their units.
         predicted: quality on the committee, mean; infinite if a member diverges.
-        spread: standard deviation of it over the members.
+        spread: standard deviation that the measured quality is expected to have.
         risk: probability that the flight leaves the envelope, by the committee.
         safe: whether every member keeps the margin.
         bits: what the flight is expected to tell.

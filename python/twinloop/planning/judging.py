@@ -89,15 +89,15 @@ def risk(usages: Floats) -> float:
     return (float((usages > 1.0).sum()) + 0.5) / (usages.size + 1.0)
 
 
-def expected(means: Floats) -> tuple[float, float]:
-    """Quality that members expect on average, each by its mean (members,), and its spread; infinite where one diverges.
+def expected(qualities: Floats) -> tuple[float, float]:
+    """Quality that is expected to be measured, and its spread over members and noise; infinite where one diverges.
 
     Args:
-        means: of the members.
+        qualities: of one flight (members, draws).
     """
-    if not np.isfinite(means).all():
+    if not np.isfinite(qualities).all():
         return float("inf"), float("inf")
-    return float(means.mean()), float(means.std())
+    return float(qualities.mean()), float(qualities.std())
 
 
 class Judge:

@@ -60,7 +60,7 @@ class Proposal:
         excitation: (n, n_u), or None.
         predicted: mean quality over members and draws, as a record of the flight would give it; infinite if any
             diverges.
-        spread: standard deviation of the members' means; infinite likewise.
+        spread: standard deviation of it over members and noise; infinite likewise.
         risk: share of predicted flights that leave the envelope, with half a flight added on either side.
         safe: whether every member keeps the margin, and the envelope under every draw of the sensors' noise.
         disagreement: of the committee, log det.
@@ -252,7 +252,7 @@ class Planner(Judge):
         repeats = chosen >= drafts.repeats
         inside = quiet.worst_usage[chosen] <= 1.0 - self.options.margin and flights.usages.max() <= 1.0
         safe = bool(inside)
-        predicted, spread = expected(flights.qualities.mean(axis=(1, 2)))
+        predicted, spread = expected(flights.qualities[:, :, 0])
         excitation, disagreement = drafts.excitation[chosen], float(tells[chosen])
         return Proposal(
             genes=drafts.genes[chosen],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from math import isfinite, sqrt
 
 import numpy as np
 
@@ -22,6 +23,10 @@ OF_PARTS = 1.5
 SMALLEST, LARGEST = 1.0, 30.0
 LAST = 3
 """Flights that the factor is the median of."""
+FIRST_MISS = 0.02
+"""Share of a quality by which its prediction is taken to miss before any was flown."""
+OF_A_MISS = 2.0
+"""Standard deviations to be told in units of such a miss: of normal misses 87 % are then within two of them."""
 
 
 def needed_factor(twin: Twin, test: Test, flown: Trajectory) -> float | None:
@@ -59,6 +64,31 @@ def factor(needed: Sequence[float]) -> float:
         The median of the last ones, with the first guess among them while there are few.
     """
     return float(np.median([FIRST, *needed][-LAST:]))
+
+
+def calibrated(spread: float, predicted: float, flights: Iterable[Experiment]) -> float:
+    """Spread of a predicted quality, no smaller than what earlier predictions missed by, their bias included.
+
+    Args:
+        spread: standard deviation over members and noise.
+        predicted: the quality.
+        flights: told so far, with the predictions that they were flown on.
+
+    Returns:
+        The standard deviation to be told; infinite where the prediction is.
+    """
+    misses = [
+        abs(run.test.predicted - run.quality) / abs(run.quality)
+        for run in flights
+        if run.test is not None
+        and run.test.predicted is not None
+        and run.quality
+        and isfinite(run.test.predicted)
+    ]
+    # Predictions get better from flight to flight: the last two tell, and the geometric mean follows them down.
+    before, last = [FIRST_MISS, FIRST_MISS, *misses][-2:]
+    share = OF_A_MISS * sqrt(before * last)
+    return max(spread, share * abs(predicted)) if isfinite(predicted) else spread
 
 
 def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergence_factor: float) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
@@ -139,7 +140,8 @@ class Choice:
     def _answer(
         self, test: Test, measured: float | None, judged: Judged, recorded: Floats, pick: int, reason: str
     ) -> Test:
-        predicted, spread = expected(recorded[:, :, pick].mean(axis=1))
+        predicted, spread = expected(recorded[:, :, pick])
+        spread = calibrated(spread, predicted, self.book.experiments)
         usages = judged.usages[:, :, pick]
         return replace(test, predicted=predicted, measured=measured).explained(spread, risk(usages), reason)
 

@@ -11,7 +11,13 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.errors import errors, free_runs
 from twinloop.campaign.history import Lesson, Planned, Progress
-from twinloop.campaign.identify_and_plan.calibration import OF_PARTS, factor, left_of_flights, needed_factor
+from twinloop.campaign.identify_and_plan.calibration import (
+    OF_PARTS,
+    calibrated,
+    factor,
+    left_of_flights,
+    needed_factor,
+)
 from twinloop.campaign.identify_and_plan.choice import Choice
 from twinloop.campaign.identify_and_plan.diagnostics import distinct, doubts
 from twinloop.campaign.identify_and_plan.following import following
@@ -217,6 +223,7 @@ class IdentifyAndPlan:
             number,
             self._exploits(book, tuned, last),
         )
+        found = replace(found, spread=calibrated(found.spread, found.predicted, book.experiments))
         test = book.new_test(
             found.genes,
             excitation=found.excitation,

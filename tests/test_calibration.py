@@ -1,0 +1,48 @@
+"""Calibration: the spread of a predicted quality comes true as often as it says."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from twinloop.campaign.identify_and_plan.calibration import calibrated
+from twinloop.planning.judging import expected
+
+
+def flight(predicted, quality):
+    test = None if predicted is None else SimpleNamespace(predicted=predicted)
+    return SimpleNamespace(test=test, quality=quality)
+
+
+def test_what_is_expected_spreads_over_members_and_noise_alike():
+    stream = np.random.default_rng(0)
+    members, noise = stream.normal(0.0, 3.0, (400, 1)), stream.normal(0.0, 4.0, (400, 400))
+    mean, spread = expected(100.0 + members + noise)
+    assert mean == pytest.approx(100.0, abs=0.5)
+    assert spread == pytest.approx(5.0, rel=0.05)
+
+
+def test_where_one_member_diverges_nothing_is_known():
+    assert expected(np.array([[1.0, np.inf]])) == (np.inf, np.inf)
+    assert calibrated(np.inf, np.inf, []) == np.inf
+
+
+def test_a_spread_is_no_smaller_than_what_predictions_missed_by():
+    missed = [flight(1.1, 1.0), flight(2.2, 2.0), flight(0.55, 0.5)]
+    assert calibrated(1e-6, 3.0, missed) == pytest.approx(2.0 * 0.1 * 3.0)
+    assert calibrated(9.0, 3.0, missed) == 9.0
+
+
+def test_flights_without_a_prediction_or_a_quality_tell_nothing_of_it():
+    nothing = [flight(None, 1.0), flight(np.nan, 1.0), flight(np.inf, 1.0), flight(5.0, None)]
+    assert calibrated(1e-6, 1.0, nothing) == calibrated(1e-6, 1.0, [])
+
+
+def test_of_normal_misses_nine_to_ten_of_ten_are_within_two_spreads():
+    stream = np.random.default_rng(1)
+    inside = []
+    for _ in range(4000):
+        flown = 1.0 + 0.01 * stream.standard_normal(4)
+        spread = calibrated(0.0, 1.0, [flight(1.0, quality) for quality in flown[:3]])
+        inside.append(abs(flown[3] - 1.0) < 2.0 * spread)
+    assert 0.85 < np.mean(inside) < 0.98
