@@ -331,7 +331,10 @@ def _flights(result: Mapping[str, Any]) -> str:
     ]
     measure = result["quality"]
     title = f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; less is better."
-    note = "Spread: standard deviation that the measured quality is expected to have. Risk: probability that the flight leaves the envelope."
+    note = (
+        "Spread: standard deviation that the measured quality is expected to have.\nRisk: probability that the flight"
+        " leaves the envelope."
+    )
     return "\n".join([title, table(head, rows), note, *reasons])
 
 
