@@ -4,6 +4,7 @@ import numpy as np
 from measure import Disagreement, Line, Section, check_agreement, interleaved, ratio
 
 from twinloop import _core
+from twinloop.streams import Unit
 
 DT, STEPS, SIGNALS, LARGEST, COLDEST = 0.02, 400, 9, 16, 2.0
 PRICE = 12.0
@@ -75,8 +76,17 @@ def report(smoke: bool) -> Section:
     workers = _core.Workers(1)
 
     def ours() -> tuple[list[int], float]:
-        settings = {"moves": moves, "largest": LARGEST, "starts": 1, "seed": 0, "iteration": 0}
-        return _core.search_subsets([gram], [prices], coldest=COLDEST, workers=workers, **settings)[0][0]
+        unit = Unit(0, (0,)).named("subsets")
+        return _core.search_subsets(
+            [gram],
+            [prices],
+            moves=moves,
+            largest=LARGEST,
+            starts=1,
+            unit=unit,
+            coldest=COLDEST,
+            workers=workers,
+        )[0][0]
 
     (subset, value), (other, expected) = ours(), annealed(products, moves, 0)
     if list(subset) != other:
