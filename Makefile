@@ -74,6 +74,7 @@ $(VENV)/.created: | scripts/preflight.sh
 	@sh scripts/preflight.sh $(PYTHON)
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install '$(MATURIN)'
+	@echo '$(CURDIR)/studies' > "$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/twinloop_studies.pth"
 	@touch $@
 
 $(NATIVE): $(VENV)/.created pyproject.toml $(RUST_SOURCES)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
 from twinloop.systems import BUILT_IN, Quadrotor
 
-STUDIES = {"bench": "twinloop.exam.command", "reproduce": "twinloop.reproduce.command"}
+STUDIES = {"bench": "twinloop_exam.command", "reproduce": "twinloop.reproduce.command"}
 """Verbs that are loaded when they are called, by the module that holds each."""
 
 
@@ -33,13 +34,12 @@ class OneSentence(click.Group):
 
     def list_commands(self, context: click.Context) -> list[str]:
         """All verbs, those of studies among them."""
-        return sorted([*super().list_commands(context), *STUDIES])
+        return sorted([*super().list_commands(context), *filter(_is_here, STUDIES)])
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
         """A verb by its name."""
         if name in STUDIES:
-            verb: click.Command = getattr(import_module(STUDIES[name]), name)
-            return verb
+            return _study(name)
         return super().get_command(context, name)
 
     def main(self, args: Any = None, prog_name: str | None = None, **extra: Any) -> Any:  # type: ignore[override]
@@ -194,6 +194,20 @@ def _vehicle(system: str, noise: float | None, seed: int, gyroscopic: str, harsh
             f"--harsh: expected --gyroscopic physical, found {gyroscopic!r}; leave one of the two out."
         )
     return BUILT_IN[system].harsh(noise=1e-3 if noise is None else noise, seed=seed)
+
+
+def _is_here(name: str) -> bool:
+    return find_spec(STUDIES[name].partition(".")[0]) is not None
+
+
+def _study(name: str) -> click.Command:
+    if not _is_here(name):
+        raise NotAvailable(
+            f"{name!r} is not part of the installed package: clone the repository, `make test`, and call"
+            f" `.venv/bin/twinloop {name}` there."
+        )
+    verb: click.Command = getattr(import_module(STUDIES[name]), name)
+    return verb
 
 
 def _fail(sentence: str, code: int) -> None:

@@ -1,0 +1,184 @@
+"""The verb `twinloop bench power`: works the exam off, tunes the others, and prints the tables."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from fnmatch import fnmatch
+from pathlib import Path
+
+import click
+
+from twinloop.arrays import whole
+from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.faces.console import duration
+from twinloop_exam.kinds import Fitter, Tuner
+from twinloop_exam.learners import LEARNERS, for_smoke, learner
+from twinloop_exam.plan import TUNING_SEEDS, Scope, available, planned
+from twinloop_exam.results import Results
+from twinloop_exam.store import Store
+from twinloop_exam.study import work_off
+from twinloop_exam.systems import SUBJECTS
+from twinloop_exam.tables import FORMATS, as_text, render
+from twinloop_exam.tuning import EXPERIMENTS as TUNING_EXPERIMENTS
+from twinloop_exam.tuning import score, tuned, variants
+
+ASK_ABOVE = 600.0
+"""Seconds of estimated work above which a person at a terminal is asked first."""
+SMOKE_SYSTEMS = ("quadrotor-0", "quadrotor")
+SMOKE_SEEDS = range(2)
+SMOKE_LEFT_OUT = ("ours-*", "without-*")
+
+
+@click.group()
+def bench() -> None:
+    """Compare Twinloop with others."""
+
+
+@bench.command()
+@click.option("--systems", help=f"Comma-separated names: {', '.join(SUBJECTS)}; all by default.")
+@click.option("--learners", help="Comma-separated names, * allowed, such as ours,sindy-*; all by default.")
+@click.option("--seeds", help="FIRST:LAST+1, such as 10:35, or one seed.")
+@click.option("--experiments", type=int, help="After the first flight, at most; by default as each needs.")
+@click.option("--data", help="Learner whose flights the fits are made on; ours by default.")
+@click.option("--store", type=Path, metavar="FILE.db", help="Where rows are kept; exam.db by default.")
+@click.option("--jobs", type=int, default=1, show_default=True, help="Processes at once.")
+@click.option("--table", "form", help=f"Only print what the store holds: {', '.join(FORMATS)}.")
+@click.option("--tune", is_flag=True, help="Compare hyper-parameters of the others on seeds 0 to 9.")
+@click.option("--retry", is_flag=True, help="Try again what failed.")
+@click.option("--yes", is_flag=True, help="Do not ask before a long run.")
+@click.option("--smoke", is_flag=True, help="Less than a minute: does it run? The numbers mean nothing.")
+@click.pass_context
+def power(
+    context: click.Context,
+    systems: str | None,
+    learners: str | None,
+    seeds: str | None,
+    experiments: int | None,
+    data: str | None,
+    store: Path | None,
+    jobs: int,
+    form: str | None,
+    tune: bool,
+    retry: bool,
+    yes: bool,
+    smoke: bool,
+) -> None:
+    """The exam: how little data a twin and a controller need, beside what others need."""
+    if form is not None and form not in FORMATS:
+        raise unknown("form of the tables", form, FORMATS)
+    jobs = whole("--jobs", jobs, least=1)
+    if experiments is not None:
+        experiments = whole("--experiments", experiments)
+    names = _chosen("system of the exam", systems, SMOKE_SYSTEMS if smoke else list(SUBJECTS), SUBJECTS)
+    known = [name for name in LEARNERS if not (smoke and _matches(name, SMOKE_LEFT_OUT))]
+    chosen = [learner(name) for name in _chosen("learner", learners, known, LEARNERS)]
+    chosen_seeds = SMOKE_SEEDS if smoke and seeds is None else None if seeds is None else _seeds(seeds)
+    names, chosen = available(names, chosen, _say)
+    source = learner("ours" if data is None else data)
+    if smoke:
+        chosen, source = [for_smoke(who) for who in chosen], for_smoke(source)
+    with tempfile.TemporaryDirectory() as folder:
+        path = store or (Path(folder) / "smoke.db" if smoke else Path("exam.db"))
+        if form is not None and not path.exists():
+            raise NotAvailable(f"Store {str(path)!r}: expected a file, found none; run the exam first.")
+        scope = Scope(names, chosen, source, chosen_seeds, experiments, retry)
+        if tune:
+            click.echo(_tune(scope, path, jobs, yes), nl=False)
+            return
+        try:
+            failed = 0 if form is not None else _run(scope, path, jobs, yes)
+        except KeyboardInterrupt:
+            _say(f"Interrupted: what was measured is in {path.name}; the same command goes on from there.")
+            context.exit(130)
+        kept = Store(path)
+        try:
+            results = Results(kept, names, chosen, source, chosen_seeds)
+            click.echo(render(results, form or "text"), nl=False)
+        finally:
+            kept.close()
+    if smoke:
+        _say("A smoke run: the numbers mean nothing.")
+    context.exit(1 if smoke and failed else 0)
+
+
+def _run(scope: Scope, path: Path, jobs: int, yes: bool) -> int:
+    """Says what it will cost, then does it; how many jobs failed."""
+    scope = _with_source(scope)
+    store = Store(path)
+    try:
+        todo = planned(scope, store)
+    finally:
+        store.close()
+    cost = sum(job.seconds for job in todo) / jobs
+    _say(
+        f"{len(todo)} jobs to do, about {duration(cost)} on {jobs} process{'es' if jobs > 1 else ''} (as"
+        f" measured in {path.name}, guessed where it holds nothing)."
+    )
+    if cost > ASK_ABOVE and not yes and sys.stdin.isatty():
+        click.confirm("Begin?", abort=True, err=True)
+    return work_off(path, todo, jobs) if todo else 0
+
+
+def _with_source(scope: Scope) -> Scope:
+    """Fits need flights: whoever makes them is measured too."""
+    fitted = any(isinstance(who, Fitter) for who in scope.learners)
+    if not fitted or any(who.name == scope.data.name for who in scope.learners):
+        return scope
+    return replace(scope, learners=[scope.data, *scope.learners])
+
+
+def _tune(scope: Scope, path: Path, jobs: int, yes: bool) -> str:
+    system = "quadrotor" if "quadrotor" in scope.systems else scope.systems[0]
+    grids = [who for who in scope.learners if isinstance(who, Fitter | Tuner) and who.grid]
+    tried = [variant for who in grids for variant in variants(who)]
+    seeds = scope.seeds or TUNING_SEEDS
+    _run(Scope([system], tried, scope.data, seeds, max(TUNING_EXPERIMENTS), scope.retry), path, jobs, yes)
+    shown = []
+    store = Store(path)
+    try:
+        for who in grids:
+            scores = [
+                (variant, score(Results(store, [system], [variant], scope.data, seeds), system, variant))
+                for variant in variants(who)
+            ]
+            shown.append(as_text(tuned(who, scores)))
+    finally:
+        store.close()
+    return "\n\n".join(shown) + "\n"
+
+
+def _chosen(kind: str, asked: str | None, by_default: Sequence[str], known: Iterable[str]) -> list[str]:
+    if asked is None:
+        return list(by_default)
+    found: list[str] = []
+    for pattern in (word.strip() for word in asked.split(",")):
+        matching = [name for name in known if fnmatch(name, pattern)]
+        if not matching:
+            raise unknown(kind, pattern, known)
+        found += [name for name in matching if name not in found]
+    return found
+
+
+def _matches(name: str, patterns: Sequence[str]) -> bool:
+    return any(fnmatch(name, pattern) for pattern in patterns)
+
+
+def _seeds(text: str) -> range:
+    first, separator, end = text.partition(":")
+    try:
+        low = int(first)
+        high = int(end) if separator else low + 1
+    except ValueError:
+        low, high = 0, 0
+    if not 0 <= low < high:
+        raise InvalidInput(
+            f"--seeds: expected FIRST:LAST+1, such as 10:35, found {text!r}; write both numbers."
+        )
+    return range(low, high)
+
+
+def _say(sentence: str) -> None:
+    click.echo(sentence, err=True)

@@ -1,0 +1,129 @@
+"""A campaign that is rebuilt from its record goes on with the same bits, in this process and in another."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import twinloop as tl
+from lives import LIFE, lived, new
+from sameness import same, through_json
+from twinloop.records import to_text
+
+ELSEWHERE = """
+import json, sys
+import twinloop as tl
+campaign = tl.Campaign.from_record(json.load(sys.stdin), threads=1)
+tests = [campaign.ask(), campaign.ask(last=True), campaign.best_test]
+print(json.dumps([test.to_record() for test in tests]))
+print(json.dumps(campaign.to_record()))
+"""
+
+
+def rebuilt(campaign):
+    return tl.Campaign.from_record(through_json(campaign.to_record()), threads=1)
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_another_process_asks_what_the_original_asks(preset):
+    campaign = lived(new(preset, seed=4), LIFE[:6])
+    written = to_text(campaign.to_record())
+    answer = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE], input=written, capture_output=True, text=True, check=True
+    )
+    tests, record = (json.loads(line) for line in answer.stdout.splitlines())
+    assert tests == [
+        test.to_record() for test in (campaign.ask(), campaign.ask(last=True), campaign.best_test)
+    ]
+    assert to_text(record) == to_text(campaign.to_record())
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_a_campaign_rebuilt_after_each_event_is_the_one_that_was_not(preset):
+    plain = lived(new(preset, seed=1), LIFE)
+    moved = lived(new(preset, seed=1), LIFE, lambda campaign, step: rebuilt(campaign))
+    for pair in zip(plain.experiments, moved.experiments, strict=True):
+        assert same(*(run.trajectory for run in pair))
+        assert same(*(run.before for run in pair)) and same(*(run.test.genes for run in pair))
+    assert same(plain.history, moved.history)
+    assert same(plain.twin.members, moved.twin.members) and same(plain.twin.model, moved.twin.model)
+    assert same(plain.best_test.genes, moved.best_test.genes)
+
+
+def test_what_was_looked_at_in_between_is_kept_too():
+    campaign = lived(new("default"), LIFE[:4])
+    best = campaign.best_test
+    found = rebuilt(campaign)
+    assert to_text(found.to_record()) == to_text(campaign.to_record())
+    assert same(found.best_test, best)
+
+
+def test_an_iteration_that_was_interrupted_goes_on_where_it_stopped():
+    stopped = []
+
+    def stop(progress):
+        if progress.phase == "models" and progress.generation >= 2 and not stopped:
+            stopped.append(progress.generation)
+            raise KeyboardInterrupt
+
+    campaign = lived(new("paper"), LIFE[:1])
+    campaign.progress = stop
+    with pytest.raises(KeyboardInterrupt):
+        campaign.ask()
+    record = through_json(campaign.to_record())
+    assert record["memory"]["latest"]["left"] > 0
+    assert same(tl.Campaign.from_record(record).ask().genes, lived(new("paper"), LIFE[:1]).ask().genes)
+
+
+def test_tests_of_the_original_can_be_told_to_the_one_that_was_rebuilt(new_campaign, pendulum):
+    campaign = new_campaign()
+    first = campaign.test(pendulum.default_gains)
+    found = rebuilt(campaign)
+    found.tell(first, pendulum.run(first))
+    assert len(found.experiments) == 1 and len(campaign.experiments) == 0
+
+
+def damaged(record, path, value):
+    """A record with another value somewhere."""
+    record = through_json(record)
+    place = record
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return record
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "word"),
+    [
+        (["setup", "options", "model_populaton"], 3, "did you mean 'model_population'"),
+        (["setup", "steps"], 10**15, "steps"),
+        (["setup", "preset"], "papers", "'paper'"),
+        (["setup", "controller", "kind"], "piid", "did you mean 'pid'"),
+        (["logbook", "experiments", 0, 0], 7, "number of a test"),
+        (["logbook", "tests", 0, "number"], 3, "keep the tests in their order"),
+        (["logbook", "experiments", 0, 1, "trajectory", "t"], [0.0], "shape"),
+        (["memory", "latest", "told"], 3, "another campaign"),
+        (["memory", "latest", "left"], 10**6, "generations left"),
+        (["memory", "latest", "models", "population", 0], "program inputs=1", "expected"),
+        (["memory", "latest", "models", "generation"], -1, "at least 0"),
+        (["memory", "kind"], "memory_of_default", "memory_of_paper"),
+    ],
+)
+def test_a_campaign_that_never_was_is_refused(path, value, word):
+    record = lived(new("paper"), LIFE[:3]).to_record()
+    with pytest.raises(tl.InvalidInput, match=word):
+        tl.Campaign.from_record(damaged(record, path, value))
+
+
+def test_what_was_learnt_from_more_runs_than_there_are_is_refused():
+    record = through_json(lived(new("default"), LIFE[:3]).to_record())
+    record["logbook"]["experiments"].pop()
+    with pytest.raises(tl.InvalidInput, match="another campaign"):
+        tl.Campaign.from_record(record)
+
+
+def test_a_record_names_every_option_so_that_later_defaults_do_not_matter():
+    for preset in ("default", "paper"):
+        assert set(new(preset).setup.to_record()["options"]) == set(vars(new(preset).options))

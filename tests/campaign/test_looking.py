@@ -1,0 +1,134 @@
+"""Looking changes nothing: what is asked next, what flies in the end and the band are functions of `tell` and `ask`."""
+
+import copy
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import twinloop as tl
+from lives import FULL_LIFE, LIFE, PLANT, lived, new, outcome
+from twinloop.faces.result import summary
+
+LOOKS = {
+    "twin": lambda campaign: campaign.twin.simulate(campaign.experiments[0].test),
+    "best_test": lambda campaign: campaign.best_test,
+    "controller": lambda campaign: campaign.controller.command([0.1, 0.0], [1.0, 0.0]),
+    "committee": lambda campaign: campaign.committee,
+    "history": lambda campaign: campaign.history,
+    "experiments": lambda campaign: campaign.experiments,
+    "printing": lambda campaign: f"{campaign!r}{campaign}",
+    "summary": lambda campaign: summary(campaign, {}, {}),
+    "copy": copy.copy,
+}
+UNSEEN = {preset: None for preset in ("paper", "default")}
+
+
+def unseen(preset):
+    if UNSEEN[preset] is None:
+        UNSEEN[preset] = outcome(lived(new(preset), LIFE))
+    return UNSEEN[preset]
+
+
+def seen(preset, looks):
+    """A campaign of which, after step k, one sees `looks[k]`, in that order."""
+
+    def look(campaign, step):
+        for what in looks.get(step, ()):
+            LOOKS[what](campaign)
+        return campaign
+
+    return outcome(lived(new(preset), LIFE, look))
+
+
+@given(
+    st.dictionaries(
+        st.integers(0, len(LIFE) - 1), st.lists(st.sampled_from(sorted(LOOKS)), max_size=3), max_size=6
+    )
+)
+@settings(max_examples=25)
+def test_looking_at_a_campaign_of_the_paper_changes_no_bit(looks):
+    assert seen("paper", looks) == unseen("paper")
+
+
+@pytest.mark.parametrize(
+    "looks",
+    [
+        {0: ["twin"]},
+        {0: ["best_test"], 4: ["controller", "history"]},
+        {4: ["committee", "best_test"], 7: ["twin"], 8: ["summary"]},
+        {step: ["printing", "controller", "copy", "twin"] for step in range(len(LIFE))},
+    ],
+    ids=["a look before the second run", "between two answers", "before more runs", "everywhere"],
+)
+def test_looking_at_a_campaign_of_default_changes_no_bit(looks):
+    assert seen("default", looks) == unseen("default")
+
+
+def test_looking_changes_no_bit_of_what_follows_attached_failed_and_abandoned_flights():
+    def look(campaign, step):
+        for what in ("controller", "twin", "printing"):
+            LOOKS[what](campaign)
+        return copy.copy(campaign)
+
+    expected = outcome(lived(new("default"), FULL_LIFE))
+    assert outcome(lived(new("default"), FULL_LIFE, look)) == expected
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_goes_on_with_the_same_bits(preset, copied):
+    kept = []
+
+    def look(campaign, step):
+        kept.append(campaign)
+        return copied(campaign)
+
+    assert outcome(lived(new(preset), LIFE, look)) == unseen(preset)
+    # Those that stayed behind know nothing of what came after.
+    for step, campaign in enumerate(kept):
+        assert len(campaign.experiments) == sum(event != "ask" for event in LIFE[: step + 1])
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_shares_nothing(copied):
+    plant = PLANT
+    campaign = new("paper").run(plant, 2)
+    before = outcome(campaign)
+    other = copied(campaign)
+    asked = other.ask()
+    other.tell(asked, plant.run(asked))
+    other.threads, other.interrupted = 7, True
+    assert outcome(campaign) == before
+    assert campaign.threads == 1 and not campaign.interrupted
+    # A test that was asked of the one before it was copied may be told to both; one asked since may not.
+    again = campaign.ask()
+    assert again.same_as(asked)
+    stranger = other.ask()
+    with pytest.raises(tl.InvalidInput, match="as it was made"):
+        campaign.tell(stranger, plant.run(stranger))
+
+
+def test_a_look_that_was_interrupted_changes_nothing():
+    class StopAt:
+        def __init__(self, call):
+            self.left = call
+
+        def __call__(self, progress):
+            self.left -= 1
+            if self.left == 0:
+                raise KeyboardInterrupt
+
+    for preset, call in (("paper", 1), ("paper", 3), ("default", 2), ("default", 6)):
+
+        def look(campaign, step, call=call):
+            # After the last one a look shows the best so far, as it should.
+            campaign.progress = StopAt(call) if step < len(LIFE) - 1 else None
+            try:
+                _ = campaign.twin, campaign.best_test
+            except KeyboardInterrupt:
+                assert campaign.interrupted
+            campaign.progress = None
+            return campaign
+
+        assert outcome(lived(new(preset), LIFE, look)) == unseen(preset)

@@ -1,0 +1,237 @@
+"""The commands for people: a campaign file, test sheets, logs, failures; from an empty folder with a CSV."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+import twinloop as tl
+from conftest import pendulum_step
+from lives import SIGNALS, SMALL
+from sameness import same
+from twinloop.campaign.campaign_file import _toml, read_file, template
+from twinloop.faces.cli import main
+from twinloop.logs import write_columns
+
+PENDULUM = template("rig.db").partition("[options]")[0]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty folder with the campaign file of a pendulum that is learnt in no time."""
+    monkeypatch.chdir(tmp_path)
+    options = "\n".join(f"{name} = {_toml(value)}" for name, value in SMALL.items())
+    (tmp_path / "rig.toml").write_text(f"{PENDULUM}[options]\n{options}\n", encoding="utf-8")
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, list(arguments))
+
+
+def flown(test, file="flight.csv"):
+    """The log of a test, as a person would record it."""
+    run = tl.systems.Simulated(SIGNALS, pendulum_step).run(test)
+    columns = {"t": run.t, "torque": run.commands[:, 0], "rate": run.states[:, 1], "angle": run.states[:, 0]}
+    write_columns(Path(file), columns)
+    return run
+
+
+def look():
+    return tl.Campaign.load("rig.db", read_only=True)
+
+
+# The loop
+
+
+def test_a_campaign_is_flown_by_hand_as_from_python(folder):
+    for number in range(3):
+        asked = json.loads(run("ask", "rig.db", "--json").stdout)
+        assert asked["test"] == number
+        flown(look().tests[number])
+        told = run("tell", "rig.db", str(number), "flight.csv")
+        assert told.exit_code == 0 and f"test {number} flown" in told.stdout
+    by_hand = look()
+    plant = tl.systems.Simulated(SIGNALS, pendulum_step)
+    other = read_file("rig.toml").campaign(threads=1)
+    tests = [other.test(read_file("rig.toml").first)]
+    for number in range(3):
+        other.tell(tests[-1], plant.run(tests[-1]))
+        tests.append(other.ask()) if number < 2 else None
+    assert same(*([run.trajectory.states for run in c.experiments] for c in (by_hand, other)))
+    assert same([t.genes for t in by_hand.tests], [t.genes for t in other.tests])
+
+
+def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
+    first = run("ask", "rig.db").stdout
+    assert "angle.kp" in first and "N m/rad" in first and "twinloop tell rig.db 0 FLIGHT.csv" in first
+    flown(look().tests[0])
+    run("tell", "rig.db", "0", "flight.csv")
+    sheet = run("ask", "rig.db").stdout
+    assert "Predicted quality" in sheet and "Risk" in sheet
+    test = look().tests[1]
+    with open("rig-test-1.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == test.steps + 1
+    assert [float(row["excitation_torque"]) for row in rows[:-1]] == test.excitation[:, 0].tolist()
+    assert all(float(row["low_angle"]) <= float(row["high_angle"]) for row in rows)
+    # What was asked for is shown again, and not planned anew.
+    assert run("ask", "rig.db").stdout == sheet and len(look().tests) == 2
+    assert json.loads(run("ask", "rig.db", "--again", "--json").stdout)["test"] == 2
+
+
+def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder):
+    run("ask", "rig.db")
+    test = look().tests[0]
+    flown(test)
+    assert run("attach", "rig.db", "flight.csv").exit_code == 0
+    lines = (folder / "flight.csv").read_text(encoding="utf-8").splitlines()
+    (folder / "short.csv").write_text("\n".join(lines[:12]), encoding="utf-8")
+    refused = run("tell", "rig.db", "0", "short.csv")
+    assert refused.exit_code == 2 and "--aborted" in refused.stderr
+    assert "aborted" in run("tell", "rig.db", "0", "short.csv", "--aborted", "a gust").stdout
+    assert look().experiments[-1].trajectory.reason == "a gust"
+    run("ask", "rig.db")
+    assert "failed" in run("tell", "rig.db", "1", "--failed", "motor cut out").stdout
+    assert look().failures[0].reason == "motor cut out"
+    run("ask", "rig.db")
+    assert run("abandon", "rig.db", "2").exit_code == 0
+    campaign = look()
+    assert [campaign.status(t) for t in campaign.tests] == ["aborted", "failed", "abandoned"]
+    shown = run("show", "rig.db")
+    assert "Tests failed: 1." in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("tell", "rig.db", "0"), "--failed REASON"),
+        (("tell", "rig.db", "0", "x.csv", "--failed", "a", "--aborted", "b"), "found both"),
+        (("tell", "rig.db", "7", "--failed", "a"), "ask for one first"),
+        (("tell", "rig.db", "0", "x.csv"), "check its name"),
+        (("ask", "other.db"), "twinloop new other.toml"),
+        (("new", "rig.toml"), "found one"),
+        (("new", "rig.txt"), "end in .toml"),
+    ],
+)
+def test_misuse_is_one_sentence_with_what_to_do(folder, arguments, word):
+    run("ask", "rig.db")
+    refused = run(*arguments)
+    assert refused.exit_code == 2 and word in refused.stderr and refused.stderr.count("\n") == 1
+
+
+def test_a_changed_campaign_file_is_refused(folder):
+    run("ask", "rig.db")
+    file = folder / "rig.toml"
+    file.write_text(file.read_text(encoding="utf-8").replace("seed = 0", "seed = 1"), encoding="utf-8")
+    refused = run("ask", "rig.db")
+    assert refused.exit_code == 2 and "setup.seed = 0, found 1" in refused.stderr
+
+
+# The campaign file
+
+
+def test_the_file_that_is_written_is_a_campaign_with_every_default(tmp_path):
+    assert run("new", str(tmp_path / "rig.toml")).exit_code == 0
+    text = (tmp_path / "rig.toml").read_text(encoding="utf-8")
+    plain = read_file(tmp_path / "rig.toml").campaign()
+    # The comments are the defaults: without their signs it is the same campaign.
+    head, _, options = text.partition("[options]")
+    uncommented = head + "[options]" + options.replace("\n# ", "\n")
+    (tmp_path / "all.toml").write_text(uncommented, encoding="utf-8")
+    assert read_file(tmp_path / "all.toml").campaign().setup.to_record() == plain.setup.to_record()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ("dt = 0.05", "dtt = 0.05", "did you mean 'dt'"),
+        ("duration", "duraton", "did you mean 'duration'"),
+        ("derivative_of", "derivate_of", "did you mean 'derivative_of'"),
+        ("[first]", "[frist]", "did you mean 'first'"),
+        ('"pid"', '"pit"', "did you mean 'pid'"),
+        ('"angle.kp" = [0.0, 6.0]', '"angle.kq" = [0.0, 6.0]', "angle.k"),
+        ("seed = 0", "sed = 0", "did you mean 'seed'"),
+        ("seed = 0", "seed = -1", "seed"),
+        ("scale = 3.14", 'scale = "3.14"', "number"),
+        ("[task]", "[task", "expected TOML"),
+        ("[states.angle]", "[states.'angle; rm']", "rename"),
+    ],
+)
+def test_a_file_with_a_mistake_is_refused_with_what_is_wrong(tmp_path, old, new, word):
+    assert old in PENDULUM
+    file = tmp_path / "rig.toml"
+    file.write_text(PENDULUM.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(tl.InvalidInput, match=word):
+        read_file(file).campaign()
+
+
+@given(st.data())
+def test_a_file_with_anything_in_it_is_a_campaign_or_refused(tmp_path_factory, data):
+    lines = PENDULUM.splitlines()
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(lines) - 1))
+        other = data.draw(
+            st.sampled_from(["", "a = 1", "[x]", "[states]", "dt = inf", "unit = [nan]", lines[at] * 2])
+        )
+        lines[at] = data.draw(st.sampled_from([other, lines[at].partition("=")[0] + "= " + repr(other)]))
+    file = tmp_path_factory.mktemp("file") / "rig.toml"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    try:
+        read_file(file).campaign()
+    except tl.InvalidInput as refusal:
+        assert len(str(refusal)) < 2000
+
+
+# Logs
+
+
+def test_a_log_comes_back_to_the_bit(tmp_path):
+    stream = np.random.default_rng(1)
+    run = tl.Trajectory(0.05 * np.arange(6), stream.standard_normal((6, 2)), stream.standard_normal((5, 1)))
+    columns = {
+        "torque": run.commands[:, 0],
+        "note": run.t,
+        "rate": run.states[:, 1],
+        "angle": run.states[:, 0],
+    }
+    write_columns(tmp_path / "log.csv", {**columns, "t": run.t})
+    assert same(tl.load(tmp_path / "log.csv", SIGNALS), run)
+    text = (tmp_path / "log.csv").read_text(encoding="utf-8").replace(",", ";")
+    (tmp_path / "log.csv").write_text("\ufeff" + text + "\n\n", encoding="utf-8")
+    assert same(tl.load(tmp_path / "log.csv", SIGNALS), run)
+    full = np.vstack([run.commands, run.commands[-1:]])
+    np.savez(tmp_path / "log.npz", t=run.t, states=run.states, commands=full)
+    assert same(tl.load(tmp_path / "log.npz", SIGNALS), run)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "column"),
+        ("t,angle,rate,torqe\n0,0,0,0\n", "did you mean 'torqe'"),
+        ("t,angle,rate,torque\n0,0,x,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found 'x'"),
+        ("t,angle,rate,torque\n0,0,0,0\n0.05,0\n", "line 3"),
+        ("t,angle,rate,torque\n0.05,0,0,0\n0,0,0,0\n", "times that grow"),
+    ],
+)
+def test_a_log_with_a_mistake_is_refused_with_its_place(tmp_path, text, word):
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(tl.InvalidInput, match=word):
+        tl.load(tmp_path / "log.csv", SIGNALS)
+
+
+def test_no_log_and_an_archive_of_something_else_are_refused(tmp_path):
+    with pytest.raises(tl.InvalidInput, match="check its name"):
+        tl.load(tmp_path / "log.csv", SIGNALS)
+    np.savez(tmp_path / "log.npz", t=np.arange(3.0))
+    with pytest.raises(tl.InvalidInput, match="no states, commands"):
+        tl.load(tmp_path / "log.npz", SIGNALS)
+    np.savez(tmp_path / "log.npz", t=np.array([object()], dtype=object), states=[0], commands=[0])
+    with pytest.raises(tl.InvalidInput, match="file of NumPy"):
+        tl.load(tmp_path / "log.npz", SIGNALS)

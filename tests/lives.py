@@ -1,0 +1,132 @@
+"""Campaigns on a small pendulum: made, begun, lived through all events, kept in a store; and what they came to."""
+
+import numpy as np
+
+import twinloop as tl
+from conftest import PENDULUM_GAINS, TINY, pendulum_step
+from twinloop.records import to_text
+
+SIGNALS = tl.Signals(
+    [
+        tl.State("angle", "rad", scale=np.pi),
+        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
+    ],
+    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
+    dt=0.05,
+)
+CONTROLLER = tl.controllers.PID(
+    axes=[("angle", "rate")],
+    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
+)
+SMALL = {
+    "moves": 800, "starts": 1, "generations": 0, "lags": False, "evaluations": 128, "candidates": 24,
+    "committee_size": 4, "tuning_steps": 3, "draws": 2, "tuning_starts": 1,
+}  # fmt: skip
+OTHER_GAINS = {**PENDULUM_GAINS, "angle.kp": 1.2}
+
+LIFE = ("tell", "tell", "ask", "ask", "tell", "tell", "ask", "tell", "own", "own")
+"""Two runs before the first question, two questions at once, their answers, and runs that nobody asked for."""
+
+
+FULL_LIFE = ("tell", "attach", "ask", "fail", "ask", "ask", "abandon", "tell", "attach", "attach")
+"""The same with flights that nobody asked for, a test that failed and one that was never flown."""
+
+
+def new(preset, seed=0):
+    return tl.Campaign(
+        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
+        preset=preset, seed=seed, options=TINY if preset == "paper" else SMALL,
+    )  # fmt: skip
+
+
+def lived(campaign, life, look=lambda campaign, step: campaign):
+    """A campaign after its events; `look` sees it after each, and gives the campaign that goes on."""
+    stream = np.random.default_rng(5)
+    plant = tl.systems.Simulated(SIGNALS, pendulum_step)
+    waiting = [campaign.test(gains) for gains in (PENDULUM_GAINS, OTHER_GAINS)]
+    for step, event in enumerate(life):
+        if event == "ask":
+            waiting.append(campaign.ask())
+        elif event == "attach":
+            campaign.attach(plant.run(campaign.experiments[0].test))
+        elif event == "fail":
+            campaign.tell_failed(waiting.pop(0), "the motor cut out")
+        elif event == "abandon":
+            campaign.abandon(waiting.pop(0))
+        else:
+            test = campaign.test(OTHER_GAINS) if event == "own" else waiting.pop(0)
+            run = plant.run(test)
+            noisy = run.states + 1e-3 * stream.standard_normal(run.states.shape)
+            campaign.tell(test, tl.Trajectory(run.t, noisy, run.commands))
+        campaign = look(campaign, step)
+    return campaign
+
+
+def outcome(campaign):
+    """Everything that a campaign has asked and found, as one comparable value."""
+    best, twin = campaign.best_test, campaign.twin
+    run = twin.simulate(campaign.experiments[0].test)
+    return {
+        "asked": [(test.genes.tobytes(), None if test.excitation is None else test.excitation.tobytes())
+                  for test in campaign._book.tests],
+        "before": [run.before for run in campaign.experiments],
+        "history": campaign.history,
+        "program": str(twin.model.program),
+        "committee": [str(member.program) for member in campaign.committee],
+        "best": (best.number, best.genes.tobytes(), best.predicted, best.measured, best.reason),
+        "band": None if run.band is None else run.band.tobytes(),
+    }  # fmt: skip
+
+
+PLANT = tl.systems.Simulated(SIGNALS, pendulum_step, default_gains=PENDULUM_GAINS)
+
+
+def made(**changes):
+    arguments = {
+        "controller": CONTROLLER, "initial_state": [0.0, 0.0], "target_state": [1.0, 0.0], "duration": 1.0,
+        "threads": 1, **changes, "options": {**SMALL, **changes.get("options", {})},
+    }  # fmt: skip
+    return tl.Campaign(arguments.pop("signals", SIGNALS), **arguments)
+
+
+def begun(**changes):
+    campaign = made(**changes)
+    first = campaign.test(PENDULUM_GAINS)
+    campaign.tell(first, PLANT.run(first))
+    return campaign
+
+
+def cut(run, steps, ended="aborted", reason="stopped"):
+    rows = slice(steps + 1)
+    return tl.Trajectory(run.t[rows], run.states[rows], run.commands[:steps], ended=ended, reason=reason)
+
+
+def by_hand(steps, seed=0):
+    """What a pilot did: a record under commands of no controller, of its own length."""
+    stream, states, commands = np.random.default_rng(seed), [np.array([0.2, -0.1])], []
+    for k in range(steps):
+        commands.append(np.array([1.2 * np.sin(0.3 * k) + 0.4 * stream.normal()]).clip(-2.0, 2.0))
+        states.append(np.array(pendulum_step(states[-1], commands[-1])))
+    return tl.Trajectory(SIGNALS.dt * np.arange(steps + 1), np.array(states), np.array(commands))
+
+
+def stored(path, preset="paper", **changes):
+    """A campaign on the pendulum that is kept in a store."""
+    arguments = {
+        "controller": CONTROLLER, "initial_state": [0.0, 0.0], "target_state": [1.0, 0.0], "duration": 1.0,
+        "preset": preset, "options": TINY if preset == "paper" else SMALL, "threads": 1, **changes,
+    }  # fmt: skip
+    return tl.Campaign(SIGNALS, store=path, **arguments)
+
+
+def plain(campaign):
+    """All of a campaign but what tells it from others."""
+    record = campaign.to_record()
+    return to_text(record).replace(record["logbook"]["identity"], "")
+
+
+def flown(campaign, pendulum):
+    """A campaign with one experiment."""
+    first = campaign.test(pendulum.default_gains)
+    campaign.tell(first, pendulum.run(first))
+    return campaign

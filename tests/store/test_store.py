@@ -1,0 +1,356 @@
+"""What was told is kept: committed when `tell` returns, resumed to the bit, and never lost to a failure."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sqlalchemy import event
+
+import twinloop as tl
+from conftest import TINY
+from faults import killed_and_resumed
+from lives import LIFE, SMALL, flown, lived, plain, stored
+from sameness import same
+from twinloop.campaign import keeping
+from twinloop.store import found, kept, opened
+
+
+def rows(path, table):
+    """Rows of a table, read with nothing of ours."""
+    with sqlite3.connect(path) as connection:
+        return connection.execute(f"select * from {table}").fetchall()
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "hover.db"
+
+
+# Kept at once
+
+
+def test_what_was_made_and_told_is_committed_when_the_call_returns(path, pendulum):
+    campaign = stored(path)
+    first = campaign.test(pendulum.default_gains)
+    assert len(rows(path, "tests")) == 1 and rows(path, "experiments") == []
+    campaign.tell(first, pendulum.run(first))
+    assert len(rows(path, "experiments")) == 1 and rows(path, "checkpoints") == []
+    campaign.ask()
+    assert [len(rows(path, table)) for table in ("tests", "asked", "checkpoints")] == [2, 1, 1]
+
+
+def test_a_refused_call_leaves_no_row(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    short = tl.Trajectory([0.0], [[0.0, 0.0]], np.empty((0, 1)))
+    with pytest.raises(tl.InvalidInput):
+        campaign.tell(campaign.experiments[0].test, short)
+    assert len(rows(path, "experiments")) == 1 and len(campaign.experiments) == 1
+
+
+def test_a_search_that_is_under_way_is_kept_now_and_then(path, pendulum, monkeypatch):
+    monkeypatch.setattr(keeping, "SECONDS", 0.0)
+    campaign, left = flown(stored(path, options={**TINY, "model_generations": 60}), pendulum), []
+
+    def look(progress):
+        if progress.phase == "models":
+            memory = found(opened(path, read_only=True), None).memory
+            left.append(memory["latest"]["left"])
+
+    campaign.progress = look
+    campaign.ask()
+    assert len(left) > 1 and left[0] > 0 and left[-1] == 0
+
+
+# Resumed
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_a_campaign_that_is_opened_anew_after_each_event_is_the_one_that_was_not(path, preset):
+    def reopened(campaign, step):
+        campaign.close()
+        return tl.Campaign.load(path, threads=1) if step % 2 else stored(path, preset)
+
+    whole = lived(stored(path.with_name("whole.db"), preset), LIFE)
+    moved = lived(stored(path, preset), LIFE, reopened)
+    assert plain(moved) == plain(whole)
+    assert same(moved.best_test.genes, whole.best_test.genes)
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_a_campaign_that_is_killed_at_random_moments_ends_with_the_same_bits(preset):
+    assert killed_and_resumed(preset, kills=3, seed=1)[0] >= 3
+
+
+def test_the_noise_of_a_system_that_counts_its_runs_goes_on_where_it_was(path):
+    def campaign(where):
+        system = tl.systems.Quadrotor(noise=1e-3)
+        return system, tl.Campaign(
+            system.signals, controller=system.controller, initial_state=system.initial_state,
+            target_state=system.target_state, duration=1.0, preset="paper", options=TINY, threads=1, store=where,
+        )  # fmt: skip
+
+    system, whole = campaign(None)
+    whole.run(system, 3)
+    for experiments in (1, 2, 3):
+        system, moved = campaign(path)
+        moved.run(system, experiments)
+        moved.close()
+    assert system.runs == 3
+    assert same([run.trajectory for run in moved.experiments], [run.trajectory for run in whole.experiments])
+
+
+def test_another_system_than_the_one_that_was_flown_is_refused(path):
+    system = tl.systems.Quadrotor()
+    arguments = {
+        "controller": system.controller, "initial_state": system.initial_state, "store": path,
+        "target_state": system.target_state, "duration": 1.0, "preset": "paper", "options": TINY,
+    }  # fmt: skip
+    campaign = tl.Campaign(system.signals, **arguments)
+    campaign.run(system, 1)
+    campaign.close()
+    with pytest.raises(tl.InvalidInput, match=r"system\.noise = 0\.0, found 0\.01"):
+        tl.Campaign(system.signals, **arguments).run(tl.systems.Quadrotor(noise=0.01), 2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"seed": 4}, "setup.seed = 0, found 4"),
+        ({"options": {**TINY, "mutants": 5}}, "setup.options.mutants = 3, found 5"),
+        ({"target_state": [2.0, 0.0]}, "target_state"),
+        ({"preset": "default", "options": SMALL}, "preset = 'paper', found 'default'"),
+    ],
+)
+def test_another_configuration_under_the_same_name_is_refused(path, pendulum, changes, word):
+    flown(stored(path), pendulum).close()
+    with pytest.raises(tl.InvalidInput, match=word.replace("(", r"\(")):
+        stored(path, **changes)
+    assert len(stored(path).experiments) == 1  # and nothing is locked or changed by that
+
+
+def test_several_campaigns_live_in_one_store(path, pendulum):
+    one = flown(stored(path, name="one"), pendulum)
+    two = stored(path, name="two", seed=1)
+    flown(two, pendulum).ask()
+    assert [
+        (row["name"], row["experiments"], row["tests"]) for row in kept(opened(path, read_only=True))
+    ] == [
+        ("one", 1, 1),
+        ("two", 1, 2),
+    ]
+    with pytest.raises(tl.InvalidInput, match="one, two"):
+        tl.Campaign.load(path, read_only=True)
+    with pytest.raises(tl.InvalidInput, match="did you mean 'two'"):
+        tl.Campaign.load(path, "twoo", read_only=True)
+    assert plain(tl.Campaign.load(path, "two", read_only=True)) == plain(two)
+    assert len(one.experiments) == 1
+
+
+def test_a_campaign_without_a_store_is_saved_and_loaded(path, new_campaign, pendulum):
+    campaign = flown(new_campaign(), pendulum)
+    campaign.save(path)
+    asked = campaign.ask()
+    campaign.save(path)  # what is new
+    loaded = tl.Campaign.load(path, threads=1)
+    assert plain(loaded) == plain(campaign)
+    trajectory = pendulum.run(asked)
+    campaign.tell(asked, trajectory)
+    loaded.tell(asked, trajectory)
+    assert same(campaign.ask().genes, loaded.ask().genes)
+    loaded.close()
+    with pytest.raises(tl.InvalidInput, match="gone on by itself"):
+        new_campaign().save(path)
+
+
+def test_a_copy_of_a_kept_campaign_is_not_kept(path, pendulum):
+    import copy
+
+    campaign = flown(stored(path), pendulum)
+    copy.deepcopy(campaign).test(pendulum.default_gains)
+    assert len(rows(path, "tests")) == 1
+
+
+def test_the_store_says_what_results_come_from(path, pendulum):
+    flown(stored(path), pendulum).close()
+    stored(path).close()
+    held = found(opened(path, read_only=True), None)
+    assert [session["versions"]["twinloop"] for session in held.sessions] == [tl.__version__] * 2
+    assert held.sessions[0]["processor"] and held.setup["seed"] == 0
+    assert len(rows(path, "experiments")[0][4]) == 64
+
+
+# Readers and writers
+
+
+def test_a_second_writer_is_refused_and_a_reader_is_not(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    for second in (lambda: stored(path), lambda: tl.Campaign.load(path), lambda: campaign.save(path)):
+        with pytest.raises(tl.StoreFailure, match=f"process {os.getpid()}.*read_only=True"):
+            second()
+    assert len(tl.Campaign.load(path, read_only=True).experiments) == 1
+    campaign.close()
+    tl.Campaign.load(path).close()
+
+
+def test_a_reader_in_the_middle_of_reading_does_not_hold_up_the_writer(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    with opened(path, read_only=True).transaction() as reading:
+        before = reading.exec_driver_sql("select count(*) from tests").scalar()
+        writer = threading.Thread(target=lambda: campaign.test(pendulum.default_gains))
+        writer.start()
+        writer.join(10.0)
+        assert not writer.is_alive()
+        assert reading.exec_driver_sql("select count(*) from tests").scalar() == before
+    assert len(rows(path, "tests")) == before + 1
+
+
+def test_the_death_of_a_writer_lets_the_next_one_in(path):
+    code = (
+        "import sys, os, signal; sys.path.insert(0, sys.argv[1]); from lives import stored;"
+        "campaign = stored(sys.argv[2]); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    child = subprocess.run(
+        [sys.executable, "-c", code, str(Path(__file__).parents[1]), str(path)], check=False
+    )
+    assert child.returncode == -signal.SIGKILL
+    assert path.with_name("hover.db-1.lock").exists()
+    stored(path).close()
+    assert not path.with_name("hover.db-1.lock").exists()
+
+
+# Failures
+
+
+def full_disk(campaign):
+    """From now on the database cannot grow."""
+    engine = campaign._keeping._keeper.store.engine
+    engine.dispose()
+
+    @event.listens_for(engine, "connect")
+    def bound(connection, _):
+        connection.execute("PRAGMA max_page_count = 1")
+
+
+def test_a_full_disk_is_said_and_loses_nothing(path, pendulum):
+    campaign = stored(path)
+    first = campaign.test(pendulum.default_gains)
+    full_disk(campaign)
+    with pytest.raises(tl.StoreFailure, match="room on the disk"):
+        for _ in range(100):
+            before = plain(campaign)
+            campaign.tell(first, pendulum.run(first))
+    told = len(campaign.experiments)
+    assert plain(campaign) == before and told < 100
+    campaign.close()
+    again = stored(path)
+    assert plain(again) == before
+    again.tell(first, pendulum.run(first))
+    assert len(again.experiments) == told + 1
+
+
+def test_what_was_learnt_survives_a_full_disk_in_memory(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    full_disk(campaign)
+    with pytest.raises(tl.StoreFailure, match="room on the disk"):
+        campaign.ask()
+    campaign.close()  # goes on without the store
+    assert same(campaign.ask().genes, flown(stored(path.with_name("other.db")), pendulum).ask().genes)
+
+
+@pytest.mark.skipif(hasattr(os, "geteuid") and os.geteuid() == 0, reason="root may write everything")
+def test_a_store_that_may_not_be_written_is_said(path, pendulum):
+    flown(stored(path), pendulum).close()
+    path.chmod(0o444)
+    with pytest.raises(tl.StoreFailure, match="right to write"):
+        stored(path)
+
+
+def test_a_store_that_becomes_read_only_is_said_and_loses_nothing(path, pendulum):
+    campaign = stored(path)
+    first = campaign.test(pendulum.default_gains)
+    engine = campaign._keeping._keeper.store.engine
+    engine.dispose()
+    event.listen(engine, "connect", lambda connection, _: connection.execute("PRAGMA query_only = ON"))
+    with pytest.raises(tl.StoreFailure, match="right to write"):
+        campaign.tell(first, pendulum.run(first))
+    assert campaign.experiments == ()
+
+
+def test_a_file_that_is_no_store_is_refused_and_left_as_it_was(path):
+    for content in (b"gains,are,here\n" * 100, b"SQLite format 3\x00" + b"\xff" * 5000):
+        path.write_bytes(content)
+        with pytest.raises(tl.InvalidInput, match="expected a database of Twinloop"):
+            stored(path)
+        assert path.read_bytes() == content
+
+
+def test_a_truncated_store_is_refused(path, pendulum):
+    flown(stored(path), pendulum).close()
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(tl.InvalidInput, match="damaged"):
+        stored(path)
+
+
+def test_a_database_of_something_else_is_refused(path):
+    with sqlite3.connect(path) as connection:
+        connection.execute("create table flights (number integer)")
+    with pytest.raises(tl.InvalidInput, match="something else, with the tables flights"):
+        stored(path)
+    assert rows(path, "sqlite_master")[0][1] == "flights" and len(rows(path, "sqlite_master")) == 1
+
+
+def test_a_store_of_a_newer_version_is_refused(path, pendulum):
+    flown(stored(path), pendulum).close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("update alembic_version set version_num = '0999'")
+    for call in (stored, tl.Campaign.load, lambda where: tl.Campaign.load(where, read_only=True)):
+        with pytest.raises(tl.InvalidInput, match="newer Twinloop"):
+            call(path)
+
+
+def test_an_experiment_that_somebody_has_changed_is_refused(path, pendulum):
+    flown(stored(path), pendulum).close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("update experiments set record = replace(record, '0.1', '0.2')")
+    with pytest.raises(tl.InvalidInput, match="experiment 0 as it was told"):
+        stored(path)
+
+
+@pytest.mark.parametrize(
+    ("where", "word"),
+    [
+        ("nowhere/hover.db", "existing folder"),
+        (".", "a folder"),
+        ("hover://somewhere", "address such as"),
+    ],
+)
+def test_a_place_where_no_store_can_be_is_refused(tmp_path, monkeypatch, where, word):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(tl.InvalidInput, match=word):
+        stored(where)
+
+
+def test_loading_from_where_nothing_is_makes_nothing(tmp_path):
+    with pytest.raises(tl.InvalidInput, match="no such file"):
+        tl.Campaign.load(tmp_path / "hover.db")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("missing", ["sqlalchemy", "alembic"])
+def test_without_its_packages_the_store_says_what_to_install(path, monkeypatch, missing):
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(tl.NotAvailable, match=r"pip install 'twinloop\[store\]'"):
+        stored(path)
+
+
+@pytest.mark.parametrize("name", ["", "  ", "x" * 201, None])
+def test_a_campaign_needs_a_name_in_its_store(path, name):
+    with pytest.raises(tl.InvalidInput, match="name"):
+        stored(path, name=name)

@@ -1,0 +1,107 @@
+"""The same store on a PostgreSQL server, which the test starts; skipped where there is none to start."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+import twinloop as tl
+from lives import LIFE, flown, lived, plain, stored
+from sameness import same
+from twinloop.store import kept, opened
+
+pytest.importorskip("psycopg", reason="the driver psycopg is not installed")
+if not (shutil.which("initdb") and shutil.which("pg_ctl")):
+    pytest.skip("no PostgreSQL server (initdb, pg_ctl) is installed", allow_module_level=True)
+
+
+@pytest.fixture(scope="module")
+def server():
+    """The address of a server of our own, on a socket in a folder of its own."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        who = {}
+        if os.geteuid() == 0:  # PostgreSQL does not run as root
+            shutil.chown(folder, "nobody")
+            who = {"user": "nobody", "group": "nogroup", "extra_groups": []}
+        data = str(folder / "data")
+
+        def run(*command):
+            # Into a file: the server keeps what it was started with, and a pipe would never end.
+            with (folder / "said").open("w") as said:
+                done = subprocess.run(command, stdout=said, stderr=said, cwd=folder, check=False, **who)
+            assert done.returncode == 0, (folder / "said").read_text()
+
+        run("initdb", "-D", data, "-A", "trust", "-U", "hover", "--no-sync")
+        options = f"-c listen_addresses='' -k {folder}"
+        run("pg_ctl", "-D", data, "-w", "-l", str(folder / "log"), "-o", options, "start")
+        yield f"postgresql+psycopg://hover@/postgres?host={folder}"
+        run("pg_ctl", "-D", data, "-m", "immediate", "stop")
+
+
+def fresh(server, name):
+    """A database of its own on the server."""
+    from sqlalchemy import create_engine, text
+
+    engine = create_engine(server, isolation_level="AUTOCOMMIT")
+    with engine.connect() as connection:
+        connection.execute(text(f"create database {name}"))
+    engine.dispose()
+    return server.replace("/postgres?", f"/{name}?")
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_a_campaign_on_a_server_is_the_one_in_a_file(server, tmp_path, preset):
+    address = fresh(server, f"same_{preset}")
+
+    def reopened(campaign, step):
+        campaign.close()
+        return tl.Campaign.load(address, threads=1) if step % 2 else stored(address, preset)
+
+    in_file = lived(stored(tmp_path / "hover.db", preset), LIFE)
+    on_server = lived(stored(address, preset), LIFE, reopened)
+    assert plain(on_server) == plain(in_file)
+    assert same(on_server.best_test.genes, in_file.best_test.genes)
+    on_server.close()
+
+
+def test_a_second_writer_is_refused_and_a_reader_is_not(server, pendulum):
+    address = fresh(server, "writers")
+    campaign = flown(stored(address, name="one"), pendulum)
+    with pytest.raises(tl.StoreFailure, match="only one who writes"):
+        stored(address, name="one")
+    other = stored(address, name="two", seed=1)
+    assert len(tl.Campaign.load(address, "one", read_only=True).experiments) == 1
+    source = opened(address, read_only=True)
+    assert [row["name"] for row in kept(source)] == ["one", "two"]
+    source.close()
+    campaign.close()
+    other.close()
+    tl.Campaign.load(address, "one").close()
+
+
+def test_the_death_of_a_writer_lets_the_next_one_in(server):
+    address = fresh(server, "death")
+    code = (
+        "import sys, os, signal; sys.path.insert(0, sys.argv[1]); from lives import stored;"
+        "campaign = stored(sys.argv[2]); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    child = subprocess.run([sys.executable, "-c", code, str(Path(__file__).parents[1]), address], check=False)
+    assert child.returncode == -signal.SIGKILL
+    for _ in range(100):  # the server sees the death of its client a moment later
+        try:
+            stored(address).close()
+            return
+        except tl.StoreFailure:
+            continue
+    raise AssertionError("still locked")
+
+
+def test_a_server_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(tl.StoreFailure, match="nothing that was kept is lost"):
+        stored(f"postgresql+psycopg://hover:secret@/postgres?host={tmp_path}")
