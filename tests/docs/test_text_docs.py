@@ -12,7 +12,9 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [
     "tutorial.md",
     "reproduction.md",
-    *sorted(f"concepts/{p.name}" for p in (DOCS / "concepts").glob("*.md")),
+    *sorted(
+        p.relative_to(DOCS).as_posix() for room in ("concepts", "default") for p in (DOCS / room).glob("*.md")
+    ),
 ]
 """Pages whose blocks of Python are run; those that only include an example are tested as examples."""
 
