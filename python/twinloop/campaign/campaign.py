@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import os
-import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -18,23 +15,18 @@ from twinloop.arrays import Floats, floats, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
 from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Progress
-from twinloop.campaign.identify_and_plan.method import IdentifyAndPlan
-from twinloop.campaign.keeping import Keeping, heading, look
-from twinloop.campaign.logbook import Logbook
-from twinloop.campaign.method import Method
-from twinloop.campaign.presets import AnyOptions, Options
-from twinloop.campaign.setup import Setup, checked, refuse_arguments
+from twinloop.campaign.lasting import Lasting
+from twinloop.campaign.presets import AnyOptions
+from twinloop.campaign.setup import checked, refuse_arguments
 from twinloop.controllers import Controller, Family, UnboundFamily
-from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
+from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.law.exports.export import asked, delivered, exported_controller
 from twinloop.law.law import Law
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.objectives import closed_loop
-from twinloop.records import Record, Recorded, checked_record
 from twinloop.remarks import warn
 from twinloop.signals import Signals
-from twinloop.store import Kept
 from twinloop.systems import System
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
@@ -60,7 +52,7 @@ GENTLE = "gentle"
 """The excitation of a first test where nothing else is asked for: the preset's own."""
 
 
-class Campaign(Recorded, kind="campaign"):
+class Campaign(Lasting, kind="campaign"):
     """Learns a twin and a controller from as few experiments as possible.
 
     Args:
@@ -129,42 +121,6 @@ class Campaign(Recorded, kind="campaign"):
         if store is not None:
             self._open(store, name)
 
-    def _begin(self, setup: Setup, threads: int | None, progress: Callable[[Progress], None] | None) -> None:
-        self.setup = setup
-        self.threads = (
-            available_threads() if threads is None else whole("Campaign, threads", threads, least=1)
-        )
-        if progress is not None and not callable(progress):
-            raise InvalidInput(
-                f"Campaign, progress: expected something to call with a Progress, found {progress!r}; pass a function."
-            )
-        self.progress = progress
-        self.interrupted = False
-        with engine_input():
-            self._workers = _core.Workers(threads=self.threads)
-        self._book = Logbook(self.setup)
-        self._method = self._chosen()
-        self._controller: Controller | None = None
-        self._keeping: Keeping | None = None
-
-    def _open(self, where: str | Path, name: str) -> None:
-        """Goes on with what a store holds, and keeps there what comes."""
-        keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
-        try:
-            self._recall(keeping.kept)
-        except BaseException:
-            keeping.close()
-            raise
-        keeping.restored(self._method.memory)
-        self._keeping = keeping
-        # A campaign that nobody holds any more writes no more; the end of the process is one of those.
-        weakref.finalize(self, keeping.close)
-
-    def _recall(self, kept: Kept) -> None:
-        self._book = Logbook.from_record(kept.logbook, self.setup)
-        if kept.memory is not None:
-            self._method.restore(kept.memory, self._book)
-
     @property
     def signals(self) -> Signals:
         """Of the system."""
@@ -179,165 +135,6 @@ class Campaign(Recorded, kind="campaign"):
     def options(self) -> AnyOptions:
         """Of the preset, with those that were changed."""
         return self.setup.options
-
-    @classmethod
-    def recorded_fields(cls) -> tuple[str, ...]:
-        """Names of the fields that a record has, in order."""
-        return "setup", "logbook", "memory"
-
-    def to_record(self) -> Record:
-        """The campaign as numbers, texts, lists and dicts: its setup, all that was told, all that was learnt.
-
-        Raises:
-            NotAvailable: its controllers have no plain form.
-        """
-        return {
-            **self._head(),
-            "setup": self.setup.to_record(),
-            "logbook": self._book.to_record(),
-            "memory": self._method.to_record(),
-        }
-
-    @classmethod
-    def from_record(
-        cls,
-        record: object,
-        *given: object,
-        threads: int | None = None,
-        progress: Callable[[Progress], None] | None = None,
-    ) -> Campaign:
-        """The campaign that a record was written of; it goes on with the same bits.
-
-        Args:
-            record: such as `to_record` gives, or JSON gives back.
-            given: nothing; a campaign is whole.
-            threads: how many the engine may use, by default all that there are.
-            progress: called with a `Progress` a few times a second while the loops run.
-
-        Returns:
-            A campaign of its own.
-
-        Raises:
-            InvalidInput: another kind, a newer version, an unknown or missing key, or a value that cannot be used.
-        """
-        found = checked_record(record, cls, cls.recorded_fields(), cls.KIND)
-        campaign = object.__new__(cls)
-        campaign._begin(Setup.from_record(found["setup"]), threads, progress)
-        campaign._book = Logbook.from_record(found["logbook"], campaign.setup)
-        campaign._method.restore(found["memory"], campaign._book)
-        return campaign
-
-    def __copy__(self) -> Campaign:
-        """A campaign that goes on by itself from here, with the same bits.
-
-        Both call the same `progress`; the copy's `controller` is at rest.
-        """
-        campaign = object.__new__(Campaign)
-        campaign.setup, campaign.threads = self.setup, self.threads
-        campaign.progress, campaign.interrupted = self.progress, self.interrupted
-        campaign._workers = _core.Workers(threads=self.threads)
-        campaign._book = self._book.copied()
-        campaign._method = campaign._chosen()
-        campaign._method.memory, campaign._controller = self._method.memory, None
-        campaign._keeping = None  # a store has one writer
-        return campaign
-
-    def __deepcopy__(self, memo: dict[int, object]) -> Campaign:
-        """As `copy.copy`: what both share are values that never change."""
-        return copy.copy(self)
-
-    # Keeping
-
-    def save(self, where: str | Path, name: str = "campaign") -> None:
-        """Writes the campaign into a store, or what is new into one where it was saved before.
-
-        Args:
-            where: a file of SQLite, or the address of a database; made where there is none.
-            name: of the campaign there.
-
-        Raises:
-            InvalidInput: another campaign of that name is there, or no store.
-            NotAvailable: the packages of the extra `store` are missing.
-            StoreFailure: the store cannot be written.
-        """
-        keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
-        try:
-            mine, known = self._book.to_record(), keeping.kept.logbook
-            lists = [key for key, value in known.items() if isinstance(value, list)]
-            if known["identity"] != mine["identity"] or any(
-                mine[key][: len(known[key])] != known[key] for key in lists
-            ):
-                raise InvalidInput(
-                    f"Campaign.save: expected {keeping.name} to be this one as it was, found another one, or one that"
-                    " has gone on by itself; choose another name."
-                )
-            keeping.keep(self._book, self._method)
-        finally:
-            keeping.close()
-
-    @classmethod
-    def load(
-        cls,
-        where: str | Path,
-        name: str | None = None,
-        *,
-        read_only: bool = False,
-        threads: int | None = None,
-        progress: Callable[[Progress], None] | None = None,
-    ) -> Campaign:
-        """A campaign from a store, where it is kept from now on too; it goes on with the same bits.
-
-        Args:
-            where: a file of SQLite, or the address of a database.
-            name: of the campaign there; None: the only one.
-            read_only: whether to look only: others may write it meanwhile, and what is done here is not kept.
-            threads: how many the engine may use, by default all that there are.
-            progress: called with a `Progress` a few times a second while the loops run.
-
-        Returns:
-            The campaign.
-
-        Raises:
-            InvalidInput: no store, no such campaign, or several and no name.
-            NotAvailable: the packages of the extra `store` are missing.
-            StoreFailure: somebody else writes the campaign, or the store cannot be read.
-        """
-        campaign = object.__new__(cls)
-        if read_only:
-            kept = look(where, name, read_only)
-            campaign._begin(Setup.from_record(kept.setup), threads, progress)
-            campaign._recall(kept)
-        else:
-            known, setup = heading(where, name)
-            campaign._begin(Setup.from_record(setup), threads, progress)
-            campaign._open(where, known)
-        return campaign
-
-    @property
-    def store(self) -> str | None:
-        """Where it is kept; None: nowhere."""
-        return None if self._keeping is None else self._keeping.store
-
-    def close(self) -> None:
-        """Lets others write the campaign in its store; nothing that is done afterwards is kept there."""
-        if self._keeping is not None:
-            self._keeping.close()
-            self._keeping = None
-
-    def _keep(self) -> None:
-        if self._keeping is not None:
-            self._keeping.keep(self._book, self._method)
-
-    @contextmanager
-    def _entering(self) -> Iterator[None]:
-        """What is entered in the book meanwhile is committed at the end, or taken back."""
-        book, memory = self._book.copied(), self._method.memory
-        try:
-            yield
-            self._keep()
-        except BaseException:
-            self._book, self._method.memory = book, memory
-            raise
 
     # Ask and tell
 
@@ -716,12 +513,6 @@ class Campaign(Recorded, kind="campaign"):
 
     # Inside
 
-    def _chosen(self) -> Method:
-        options = self.setup.options
-        if isinstance(options, Options):
-            return Coevolution(self.setup, options, self._workers, self._report)
-        return IdentifyAndPlan(self.setup, options, self._workers, self._report)
-
     def _learn(self) -> None:
         if not self._book.experiments:
             raise NotAvailable(
@@ -772,12 +563,6 @@ class Campaign(Recorded, kind="campaign"):
             )
         return self.test(gains)
 
-    def _report(self, progress: Progress) -> None:
-        if self._keeping is not None:
-            self._keeping.checkpoint(self._method)
-        if self.progress is not None:
-            self.progress(progress)
-
     def _report_experiment(self) -> None:
         progress = Progress(
             "experiment", self._method.iteration, 0, 0, len(self._book.experiments), (), (), (), 0, 0
@@ -800,10 +585,3 @@ def controller_to_fly(campaign: Campaign) -> tuple[Test | None, str]:
         return campaign.best_test, ""
     except NotAvailable as reason:
         return None, str(reason)
-
-
-def available_threads() -> int:
-    """Processors that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
