@@ -14,6 +14,9 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
 from twinloop.campaign.coevolution.method import Coevolution
+from twinloop.campaign.examination.check import Checks
+from twinloop.campaign.examination.checking import checks
+from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Progress
 from twinloop.campaign.lasting import Lasting
 from twinloop.campaign.presets import AnyOptions
@@ -351,6 +354,28 @@ class Campaign(Lasting, kind="campaign"):
         if self._controller is None or self._controller.genes.tobytes() != best.genes.tobytes():
             self._controller = best.controller()
         return self._controller
+
+    def examine(self) -> Examination:
+        """All that an engineer checks, computed when it is asked for, after learning all that was told.
+
+        Raises:
+            NotAvailable: nothing was told.
+        """
+        self._learn()
+        book = self._book
+        return Examination(self, self._method.twins_before(book), self._method.innovations(book))
+
+    def checks(self) -> Checks:
+        """Whether the twin may be believed and the controller flown, check by check; printable.
+
+        Returns:
+            Checks with their value, limit and sentence; `passed` says whether all that bind hold, `twin_passed` whether
+            those of the twin do.
+
+        Raises:
+            NotAvailable: nothing was told.
+        """
+        return checks(self.examine())
 
     def margins(
         self, parameters: Mapping[str, float] | ArrayLike | None = None, broken_at: str = "axes"

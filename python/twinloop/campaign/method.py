@@ -81,6 +81,19 @@ class Method(Protocol):
         """The best model when the last test was asked for; None before."""
         ...
 
+    def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
+        """Earlier twins, the oldest first, with how many of the first experiments each had learnt."""
+        ...
+
+    def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
+        """Innovations of each experiment that was learnt: readings less their predictions one period before.
+
+        Returns:
+            Over the standard deviation that is expected of them (n + 1, n_x); None where the method knows no noise, or
+            the model diverges.
+        """
+        ...
+
     def history(self, book: Logbook) -> tuple[Iteration, ...] | tuple[Lesson, ...]:
         """A record of each turn."""
         ...

@@ -148,6 +148,18 @@ class Coevolution:
         asked = self.memory.asked
         return None if asked is None else asked.models.best_model
 
+    def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
+        """The best trade-off when the last test was asked for."""
+        asked, latest = self.memory.asked, self.memory.latest
+        if asked is None or latest is None or len(asked.experiments) >= len(latest.experiments):
+            return ()
+        twin = Twin(asked.models.best_model, self.setup.signals, (), self.options.divergence_factor)
+        return ((len(asked.experiments), twin),)
+
+    def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
+        """None: the paper knows no noise."""
+        return None
+
     def history(self, book: Logbook) -> tuple[Iteration, ...]:
         """One record for each iteration, from 0."""
         latest = self.memory.latest

@@ -27,10 +27,11 @@ from twinloop.campaign.setup import Setup
 from twinloop.controllers import lqr_gains
 from twinloop.controllers.state_feedback import FeedbackFamily
 from twinloop.elementary import log
-from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
+from twinloop.identification.sensors.offsets import moved
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
@@ -71,6 +72,7 @@ class Learnt(Recorded, kind="learnt"):
             learnt.
         lessons: records of this identification and of those that it began with.
         gains: that were tuned on the committee when a test was asked for; None: none were.
+        models: the best model of each identification, as `lessons`; what an older version wrote has none.
     """
 
     told: int
@@ -80,6 +82,7 @@ class Learnt(Recorded, kind="learnt"):
     needed: tuple[float, ...]
     lessons: tuple[Lesson, ...]
     gains: Floats | None = None
+    models: tuple[_core.Model, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +191,9 @@ class IdentifyAndPlan:
         errors_of_best = free_runs(identified.members[:1], book, self.workers)[0]
         lesson = self._lesson(identified, follows, book, errors_of_best.tolist())
         before = () if known is None else known.lessons
-        return Learnt(told, identified, believed, follows, needed, (*before, lesson))
+        earlier = () if known is None else known.models
+        models = (*earlier, identified.model)
+        return Learnt(told, identified, believed, follows, needed, (*before, lesson), models=models)
 
     def ask(self, book: Logbook, last: bool) -> Test:
         """The next test, with what is expected of it."""
@@ -302,6 +307,36 @@ class IdentifyAndPlan:
     def asked_model(self) -> _core.Model | None:
         """The best model when the last test was asked for."""
         return None if self.memory.asked is None else self.memory.asked.identified.model
+
+    def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
+        """What was known earlier: the twin of the last question with its band, those before it as models alone."""
+        latest, asked, divergence = self._latest(), self.memory.asked, self.options.divergence_factor
+        told = [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
+        found = {
+            learnt: Twin(model, self.setup.signals, (), divergence)
+            for learnt, model in zip(told, latest.models, strict=True)
+        }
+        if asked is not None:
+            found[asked.told] = self._twin(asked, book, [])
+        return tuple((learnt, found[learnt]) for learnt in sorted(found) if learnt < latest.told)
+
+    def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
+        """Whitened prediction errors of the twin's own filter."""
+        latest = self._latest()
+        runs = [
+            Run.of(run.trajectory.states, run.trajectory.commands).continued(self.setup.signals)
+            for run in book.experiments[: latest.told]
+        ]
+        runs = moved(runs, self.setup.signals, latest.identified.offsets)
+        with engine_input():
+            found = _core.predictions(
+                latest.identified.model,
+                [chain.engine for chain in latest.identified.chains],
+                [(run.states, run.weights, run.commands) for run in runs],
+                divergence_factor=self.options.divergence_factor,
+                workers=self.workers,
+            )
+        return None if found is None else tuple(errors for errors, _ in found)
 
     def history(self, book: Logbook) -> tuple[Lesson, ...]:
         """One record for each identification."""

@@ -1,0 +1,139 @@
+"""The checks of a campaign: whether its twin may be believed, and its controller flown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.examination import Examination
+
+LEFT = 0.1
+"""Error on a flight that was not learnt, over that of a model that never moves, above which a twin is not believed."""
+INSIDE = 0.75
+"""Share of the readings of such a flight that are asked for inside the 90 % band."""
+MISSES = 4.0
+"""Spreads by which the last quality that was predicted may have missed."""
+COLOURED = 0.1
+"""Share of correlation coefficients that may lie beyond their 99 % limits."""
+SENSITIVITY = 2.0
+"""Ms up to which a loop is taken for well damped (Åström and Murray 2008, section 12.2)."""
+RISK = 0.05
+"""Probability of leaving the envelope up to which a controller is flown."""
+
+
+def checks(found: Examination) -> Checks:
+    """All checks of a campaign.
+
+    Args:
+        found: its examination.
+
+    Returns:
+        Those of the twin, then those of the controller.
+    """
+    return Checks((*_of_twin(found), *_of_controller(found)))
+
+
+def _of_twin(found: Examination) -> Iterator[Check]:
+    twin, runs = found.twin, len(found.experiments)
+    worst = max((row.normalised for row in twin.errors), default=math.inf)
+    follows = twin.follows
+    yield Check(
+        "follows", "twin", worst, None, follows, True,
+        f"Flown by itself the twin {'follows' if follows else 'does not follow'} the {runs} experiments that it was"
+        f" learnt from: error at most {worst:.2g} (0 is perfect, 1 a model that never moves).",
+    )  # fmt: skip
+    grave = [remark for remark in twin.remarks if remark.serious]
+    yield Check(
+        "remarks", "twin", float(len(grave)), 0.0, not grave, True,
+        "Nothing serious speaks against the data or the twin." if not grave else " ".join(str(each) for each in grave),
+    )  # fmt: skip
+    yield from _of_unseen(found)
+    yield from _of_innovations(found)
+
+
+def _of_unseen(found: Examination) -> Iterator[Check]:
+    if not found.unseen:
+        yield Check(
+            "unseen-flight", "twin", None, LEFT, False, True,
+            "No experiment is left that the twin had not learnt when it was made: what it predicts of a new one nobody"
+            " knows. Fly one more.",
+        )  # fmt: skip
+        return
+    last = found.unseen[-1]
+    which = "a record" if last.number is None else f"test {last.number}"
+    good = last.error <= LEFT
+    yield Check(
+        "unseen-flight", "twin", last.error, LEFT, good, True,
+        f"Before it had learnt it, the twin {'predicted' if good else 'did not predict'} {which}: error"
+        f" {last.error:.2g}, at most {LEFT:g} is asked for.",
+    )  # fmt: skip
+    if last.inside is not None:
+        wide = last.inside >= INSIDE
+        yield Check(
+            "band", "twin", last.inside, INSIDE, wide, True,
+            f"{100.0 * last.inside:.0f} % of the readings of {which} were inside the band that was foretold for 90 % of"
+            f" them; at least {100.0 * INSIDE:.0f} % are asked for.",
+        )  # fmt: skip
+    miss = found.last_miss
+    if miss is not None:
+        near = abs(miss) <= MISSES
+        yield Check(
+            "quality", "twin", abs(miss), MISSES, near, True,
+            f"The last quality that was predicted missed what was flown by {abs(miss):.2g} of its standard deviations;"
+            f" at most {MISSES:g} are asked for.",
+        )  # fmt: skip
+
+
+def _of_innovations(found: Examination) -> Iterator[Check]:
+    own, causes = found.autocorrelation, found.crosscorrelation
+    if own is None or causes is None:
+        return
+    for name, these, words in (
+        ("whiteness", own, "of the innovations with themselves"),
+        ("commands", causes, "of the innovations with the commands before them"),
+    ):
+        white = these.outside <= COLOURED
+        shows = "would show" if white else "shows"
+        yield Check(
+            name, "twin", these.outside, COLOURED, white, True,
+            f"{100.0 * these.outside:.0f} % of the correlations {words} are beyond their 99 % limits; more than"
+            f" {100.0 * COLOURED:.0f} % {shows} that something acts which the twin has not got.",
+        )  # fmt: skip
+
+
+def _of_controller(found: Examination) -> Iterator[Check]:
+    best = found.best
+    why = found.no_controller if best is None else f"There is a controller to fly. {best.reason}".strip()
+    yield Check(
+        "controller", "controller", None, None, best is not None, True, why,
+    )  # fmt: skip
+    if best is None:
+        return
+    margins = found.margins
+    if margins is not None:
+        stable = all(loop.stable for loop in margins.worst)
+        yield Check(
+            "stable", "controller", None, None, stable, True,
+            f"Around the target all loops are {'stable on each' if stable else 'unstable on at least one'} of the"
+            f" {margins.members} models of the committee.",
+        )  # fmt: skip
+        worst = max(margins.worst, key=lambda loop: loop.sensitivity)
+        damped = worst.sensitivity <= SENSITIVITY
+        yield Check(
+            "sensitivity", "controller", worst.sensitivity, SENSITIVITY, damped, False,
+            f"The largest sensitivity over loops and committee is {worst.sensitivity:.2f}, of {worst.loop}; up to"
+            f" {SENSITIVITY:g} is usual.",
+        )  # fmt: skip
+    if best.risk is not None:
+        safe = best.risk <= RISK
+        yield Check(
+            "envelope", "controller", best.risk, RISK, safe, True,
+            f"The probability that it leaves the envelope is {best.risk:.2g} by the committee; at most {RISK:g} is"
+            " asked for.",
+        )  # fmt: skip
+    flown = any(run.number == best.number and run.kept_envelope for run in found.experiments)
+    yield Check(
+        "flown", "controller", None, None, flown, False,
+        "These gains have flown to the end, within the envelope." if flown else "These gains have not flown yet.",
+    )  # fmt: skip

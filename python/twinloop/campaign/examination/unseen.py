@@ -1,0 +1,109 @@
+"""Flights that a twin had not learnt, and what it made of them: the test that counts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment
+from twinloop.law.twin import Twin
+from twinloop.objectives import normalised_error
+from twinloop.trajectory import Trajectory, continued
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """A flight and the free run of a twin that had not learnt it.
+
+    Args:
+        place: of the experiment among all, from 0.
+        number: of the test; None for a run that nobody asked for.
+        learnt: how many experiments the twin had learnt.
+        flown: the flight.
+        predicted: by the twin, from where the flight began, under the test's own controller; with a band where the
+            committee of that time is still known.
+        error: mean squared error over that of a model that never moves; infinite where the free run diverged.
+        rmse: of each state (n_x,), in its unit; infinite where it diverged.
+        fit: FIT % of each state (n_x,); NaN where it never moved.
+        inside: share of the readings inside the band; None without one.
+    """
+
+    place: int
+    number: int | None
+    learnt: int
+    flown: Trajectory
+    predicted: Trajectory
+    error: float
+    rmse: Floats
+    fit: Floats
+    inside: float | None
+
+
+def unseen_flights(
+    experiments: Sequence[Experiment], twins: Sequence[tuple[int, Twin]]
+) -> tuple[Unseen, ...]:
+    """Each flight beside the free run of the latest twin that had not learnt it.
+
+    Args:
+        experiments: in the order told.
+        twins: with how many of the first experiments each had learnt.
+
+    Returns:
+        One for each flight of which such a twin is known.
+    """
+    found = []
+    for place, run in enumerate(experiments):
+        known = [(learnt, twin) for learnt, twin in twins if learnt <= place]
+        if known:
+            learnt, twin = max(known, key=lambda pair: pair[0])
+            found.append(_beside(place, run, learnt, twin))
+    return tuple(found)
+
+
+def _beside(place: int, run: Experiment, learnt: int, twin: Twin) -> Unseen:
+    predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
+    rmse, fit, inside = followed(twin, run.trajectory, predicted)
+    lasted = bool(np.isfinite(rmse).all())
+    squares = float(np.square(rmse).mean()) if lasted else float("inf")
+    # Of whole flights as the campaign counts them, which is over all states.
+    error = (
+        normalised_error(squares, run.frozen)
+        if run.before is None
+        else normalised_error(run.before, run.frozen)
+    )
+    return Unseen(place, run.number, learnt, run.trajectory, predicted, error, rmse, fit, inside)
+
+
+def followed(twin: Twin, flown: Trajectory, predicted: Trajectory) -> tuple[Floats, Floats, float | None]:
+    """How well a free run follows a flight.
+
+    Args:
+        twin: whose run it is.
+        flown: the flight.
+        predicted: the free run.
+
+    Returns:
+        RMSE (n_x,) and FIT % (n_x,) of each state over the readings after the first, infinite where the run is shorter
+        than the flight; and the share of the readings inside its band, None without one.
+    """
+    signals = twin.signals
+    read = continued(flown, signals, flown.states[0]).states[1:]
+    rows = min(len(read), len(predicted.states) - 1)
+    off = signals.difference(read[:rows], predicted.states[1 : rows + 1])
+    around = np.square(read - read.mean(axis=0)).sum(axis=0)
+    inside = None
+    if predicted.band is not None and rows:
+        low, high = predicted.band[:, 1 : rows + 1]
+        middle = 0.5 * (low + high)
+        within = np.abs(signals.difference(read[:rows], middle)) <= 0.5 * (high - low)
+        # Readings of a flight that the twin did not live to see are outside.
+        inside = float(within.sum() / read.size)
+    if rows < len(read) or rows == 0:
+        lost = np.full(signals.n_x, np.inf)
+        return lost, -lost, inside
+    squares = np.square(off).sum(axis=0)
+    share = np.divide(squares, around, out=np.full_like(squares, np.nan), where=around > 0.0)
+    return np.sqrt(squares / rows), 100.0 * (1.0 - np.sqrt(share)), inside

@@ -1,0 +1,170 @@
+"""What an engineer checks, beside slow formulas; and checks that tell a twin that lacks something from a whole one."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import lives
+import twinloop as tl
+from conftest import PENDULUM_GAINS, pendulum_step
+from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
+
+STREAM = np.random.default_rng(7)
+
+
+def slow_correlation(xs, us, lag):
+    """The textbook formula, number by number, over runs: Σ (x_k − x̄)(u_{k−lag} − ū) over the root of both squares."""
+    x_mean = sum(sum(x) for x in xs) / sum(len(x) for x in xs)
+    u_mean = sum(sum(u) for u in us) / sum(len(u) for u in us)
+    total = 0.0
+    for x, u in zip(xs, us, strict=True):
+        for k in range(lag, len(x)):
+            total += (x[k] - x_mean) * (u[k - lag] - u_mean)
+    squares = sum((v - x_mean) ** 2 for x in xs for v in x) * sum((v - u_mean) ** 2 for u in us for v in u)
+    return total / math.sqrt(squares)
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(st.integers(9, 30), min_size=1, max_size=3))
+def test_correlations_are_those_of_the_textbook(seed, lengths):
+    stream = np.random.default_rng(seed)
+    xs = [stream.normal(size=(n, 2)) for n in lengths]
+    us = [stream.normal(size=(n, 3)) for n in lengths]
+    own = autocorrelation(xs, 4)
+    assert own.values[:, 0] == pytest.approx(1.0)
+    for i in range(2):
+        column = [x[:, i].tolist() for x in xs]
+        for lag in range(5):
+            assert own.values[i, lag] == pytest.approx(slow_correlation(column, column, lag), abs=1e-12)
+    both = crosscorrelation(xs, us, 4)
+    for i in range(2):
+        for j in range(3):
+            for lag in range(1, 5):
+                # Row k of a cause stands one period before row k.
+                slow = slow_correlation(
+                    [x[:, i].tolist() for x in xs], [u[:, j].tolist() for u in us], lag - 1
+                )
+                assert both.values[i, j, lag - 1] == pytest.approx(slow, abs=1e-12)
+
+
+def test_white_noise_is_inside_its_limits_99_times_in_100_and_an_echo_is_not():
+    white = [STREAM.normal(size=(400, 20)) for _ in range(3)]
+    assert autocorrelation(white, 20).outside < 0.03
+    echo = [x.copy() for x in white]
+    for x in echo:
+        x[3:] += 0.6 * x[:-3]
+    found = autocorrelation(echo, 20)
+    assert (np.abs(found.values[:, 3]) > found.limit).all()
+    assert autocorrelation([np.zeros((50, 2))], 4).values[:, 1:] == pytest.approx(0.0)
+
+
+def test_what_a_command_moved_and_the_model_does_not_know_is_found_at_its_lag():
+    commands = [STREAM.normal(size=(200, 2)) for _ in range(2)]
+    innovations = [STREAM.normal(size=(200, 3)) for _ in range(2)]
+    for e, u in zip(innovations, commands, strict=True):
+        e[4:, 1] += 0.8 * u[:-4, 0]  # row k of a command is one period before row k of the innovations
+    found = crosscorrelation(innovations, commands, 8)
+    i, j, place = np.unravel_index(np.argmax(np.abs(found.values)), found.values.shape)
+    assert (i, j, found.lags[place]) == (1, 0, 5.0)
+
+
+def test_runs_that_are_short_bear_fewer_lags():
+    assert [lags_of(lengths) for lengths in ([400, 300], [90, 400], [7], [])] == [20, 11, 0, 0]
+
+
+def flown(step, experiments):
+    """A campaign on a pendulum that is read with noise."""
+    plant = tl.systems.Simulated(lives.SIGNALS, step)
+    campaign = tl.Campaign(
+        lives.SIGNALS, controller=lives.CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=2.0,
+        threads=1, options={"moves": 3000, "generations": 0, "lags": False, "candidates": 64, "draws": 4},
+    )  # fmt: skip
+    stream, test = np.random.default_rng(3), campaign.test(PENDULUM_GAINS)
+    for told in range(1, experiments + 1):
+        run = plant.run(test)
+        noisy = run.states + [1e-3, 5e-3] * stream.standard_normal(run.states.shape)
+        campaign.tell(test, tl.Trajectory(run.t, noisy, run.commands))
+        test = campaign.ask() if told < experiments else test
+    return campaign
+
+
+@pytest.fixture(scope="module")
+def good():
+    return flown(pendulum_step, 4)
+
+
+def test_flights_that_were_not_learnt_are_those_after_what_was_known(good):
+    found = good.examine()
+    assert [(flight.place, flight.learnt) for flight in found.unseen] == [(1, 1), (2, 2), (3, 3)]
+    last = found.unseen[-1]
+    run, asked = good.experiments[3], good._method.asked_model
+    # By the formulas, on the engine's own free run.
+    off = run.trajectory.states[1:] - last.predicted.states[1:]
+    assert last.rmse == pytest.approx(np.sqrt((off**2).mean(axis=0)))
+    spread = run.trajectory.states[1:] - run.trajectory.states[1:].mean(axis=0)
+    assert last.fit == pytest.approx(100 * (1 - np.linalg.norm(off, axis=0) / np.linalg.norm(spread, axis=0)))
+    low, high = last.predicted.band[:, 1:]
+    read = run.trajectory.states[1:]
+    assert last.inside == pytest.approx(((read >= low) & (read <= high)).mean())
+    assert str(asked.program) == str(good._method.memory.asked.models[-1].program)
+    assert last.error == pytest.approx(run.before / run.frozen)
+
+
+def test_looking_at_a_campaign_changes_nothing(good):
+    before = good.to_record()
+    good.checks()
+    assert good.to_record() == before
+
+
+def test_a_twin_of_a_pendulum_passes_and_says_how_sure_it_is(good):
+    checks = good.checks()
+    assert checks.twin_passed
+    names = [check.name for check in checks]
+    assert {"follows", "remarks", "unseen-flight", "band", "whiteness", "commands", "stable"} <= set(names)
+    assert all(check.sentence and check.subject in ("twin", "controller") for check in checks)
+
+
+def test_what_was_known_is_kept_with_the_campaign(good):
+    again = tl.Campaign.from_record(good.to_record(), threads=1)
+    assert [str(check) for check in again.checks()] == [str(check) for check in good.checks()]
+
+
+def test_an_older_record_without_earlier_models_is_read(good):
+    record = good.to_record()
+    for part in ("asked", "latest"):
+        del record["memory"][part]["models"]
+    again = tl.Campaign.from_record(record, threads=1)
+    assert [flight.place for flight in again.examine().unseen] == [3]
+
+
+def test_a_twin_that_was_never_tried_on_a_flight_it_had_not_learnt_does_not_pass():
+    found = lives.lived(lives.new("default"), ("tell",)).checks()
+    failed = {check.name: check for check in found.failed}
+    assert not found.twin_passed and failed["unseen-flight"].value is None
+    assert "Fly one more" in failed["unseen-flight"].sentence
+
+
+def test_a_twin_without_an_end_stop_that_the_system_has_does_not_pass():
+    def step(x, u):
+        angle, rate = pendulum_step(x, u)
+        return (0.8, -0.4 * abs(rate)) if angle > 0.8 else (angle, rate)
+
+    checks = flown(step, 3).checks()
+    assert not checks.twin_passed
+    assert {check.subject for check in checks.failed} >= {"twin"}
+
+
+def test_only_what_binds_decides():
+    good = Check("a", "twin", 1.0, 2.0, True, True, "Fine.")
+    look = dataclasses.replace(good, name="b", passed=False, binding=False)
+    bad = dataclasses.replace(good, name="c", passed=False, subject="controller")
+    assert Checks([good, look]).passed and not Checks([good, look, bad]).passed
+    assert Checks([good, look, bad]).twin_passed
+    assert [check.verdict for check in (good, look, bad)] == ["passed", "look", "failed"]
+    assert str(Checks([good, bad])).splitlines()[1].startswith("failed")
+    with pytest.raises(tl.InvalidInput, match="subject"):
+        dataclasses.replace(good, subject="weather")
