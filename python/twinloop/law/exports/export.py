@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.controllers import Family, UnboundFamily
-from twinloop.errors import InvalidInput, unknown
+from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.law.exports.c_source import c_source
 from twinloop.law.exports.checks import (
     Simulation,
@@ -24,13 +25,27 @@ from twinloop.law.exports.checks import (
     python_simulation,
 )
 from twinloop.law.exports.controller_source import controller_c, controller_python
+from twinloop.law.exports.fmu.running import fmu_simulation
+from twinloop.law.exports.fmu.unit import archived, built, unit_of
 from twinloop.law.exports.python_source import python_source
 from twinloop.law.exports.symbolic import latex_source, sympy_source
 from twinloop.law.law import Law
 from twinloop.trajectory import Trajectory
 
-SUFFIXES = {"python": ".py", "c": ".c", "latex": ".tex", "sympy": ".py", "json": ".json"}
+SUFFIXES = {
+    "python": ".py",
+    "c": ".c",
+    "fmu3": ".fmu",
+    "fmu2": ".fmu",
+    "latex": ".tex",
+    "sympy": ".py",
+    "json": ".json",
+}
 """Kinds of exports, with the suffix of their files."""
+Contents = dict[str, str] | dict[str, bytes]
+"""Of files, by their suffixes."""
+FMUS = {"fmu3": 3, "fmu2": 2}
+"""Versions of FMI."""
 PRECISIONS = ("double", "float")
 
 
@@ -64,6 +79,11 @@ def asked(to: str | Path, kind: str | None) -> tuple[str, Path | None]:
         InvalidInput: no such kind, no such suffix, or no such folder.
     """
     if isinstance(to, str) and to in SUFFIXES and kind is None:
+        if to in FMUS:
+            raise InvalidInput(
+                f"Export: expected a path that ends in {SUFFIXES[to]}, found the kind {to!r} alone, which is no text;"
+                " name a file."
+            )
         return to, None
     path = Path(to)
     if kind is None:
@@ -85,8 +105,8 @@ def asked(to: str | Path, kind: str | None) -> tuple[str, Path | None]:
     return kind, path
 
 
-def exported(source: Source, kind: str, name: str, precision: str = "double") -> dict[str, str]:
-    """Texts of an export by the suffix of their files, the main one first.
+def exported(source: Source, kind: str, name: str, precision: str = "double") -> Contents:
+    """What is in the files of an export by the suffix of their files, the main one first.
 
     Args:
         source: what is exported.
@@ -116,11 +136,33 @@ def exported(source: Source, kind: str, name: str, precision: str = "double") ->
             check_simulation("Python", python_simulation(text), source.simulate, law, flights, "double")
         return {".py": text}
     name = c_name(name)
+    if kind in FMUS:
+        if precision != "double":
+            raise InvalidInput(f"Export, precision: expected 'double' for an FMU, found {precision!r}.")
+        return {".fmu": _unit(source, FMUS[kind], name)}
     header, text = c_source(law, name, precision)
     if source.check:
         found = c_simulation(header, text, name, law, precision)
         check_simulation("C", found, source.simulate, law, flights, precision)
     return {".c": text, ".h": header}
+
+
+def _unit(source: Source, version: int, name: str) -> bytes:
+    """An FMU; by force also without a binary."""
+    law, flights = source.law, source.flights
+    start = flights[0].states[0] if flights else np.zeros(law.signals.n_x)
+    unit = unit_of(version, law, name, start)
+    with TemporaryDirectory(prefix="fmu-") as folder:
+        try:
+            library, place = built(unit, Path(folder))
+        except NotAvailable:
+            if source.check:
+                raise
+            return archived(unit.files)
+        if source.check:
+            found = fmu_simulation(version, library, unit.token, law)
+            check_simulation(f"FMI {version}.0", found, source.simulate, law, flights, "double")
+        return archived({**unit.files, **({place: library.read_bytes()} if place else {})})
 
 
 def exported_controller(
@@ -171,11 +213,11 @@ def exported_controller(
     return {".c": text, ".h": header}
 
 
-def delivered(texts: Mapping[str, str], name: str, path: Path | None) -> str | tuple[Path, ...]:
+def delivered(contents: Contents, name: str, path: Path | None) -> str | tuple[Path, ...]:
     """One text where no path was given, else the files that were written.
 
     Args:
-        texts: by suffix, the main one first.
+        contents: by suffix, the main one first.
         name: what functions in C begin with.
         path: of the main file.
 
@@ -184,12 +226,15 @@ def delivered(texts: Mapping[str, str], name: str, path: Path | None) -> str | t
     """
     include = f'#include "{c_name(name)}.h"'
     if path is None:
-        return "\n".join(reversed([*texts.values()])).replace(f"{include}\n", "")
+        texts = [text for text in contents.values() if isinstance(text, str)]
+        return "\n".join(reversed(texts)).replace(f"{include}\n", "")
     written = []
-    for suffix, text in texts.items():
+    for suffix, content in contents.items():
         file = path.with_suffix(suffix)
+        if isinstance(content, str):
+            content = content.replace(include, f'#include "{path.stem}.h"').encode()
         try:
-            file.write_text(text.replace(include, f'#include "{path.stem}.h"'), encoding="utf-8")
+            file.write_bytes(content)
         except OSError as reason:
             raise InvalidInput(f"Export: expected to be able to write {str(file)!r}: {reason}.") from reason
         written.append(file)
