@@ -6,6 +6,13 @@ from pathlib import Path
 
 import pytest
 
+NEEDS = {
+    "gymnasium_pendulum": ("gymnasium", "pip install 'twinloop[gymnasium]'"),
+    "gymnasium_mujoco": ("mujoco", "pip install 'twinloop[mujoco]'"),
+    "rotorpy_vehicle": ("rotorpy", 'pip install --no-deps "rotorpy>=3,<4"'),
+    "fmu": ("fmpy", "pip install 'twinloop[fmu]'"),
+}
+"""Packages of others that an example needs; the test set-up brings them."""
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 
@@ -15,6 +22,8 @@ def test_there_are_examples():
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs_and_shows_something(example, tmp_path):
+    package, advice = NEEDS.get(example.stem, ("twinloop", ""))
+    pytest.importorskip(package, reason=f"needs {advice}")
     done = subprocess.run(
         [sys.executable, "-W", "error", str(example)],
         cwd=tmp_path,

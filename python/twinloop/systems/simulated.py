@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
 
 from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput
 from twinloop.signals import Signals
-from twinloop.systems.stepped import Deviations, Step, Stepped
+from twinloop.systems.stepped import Deviations, Episode, Step, Stepped
 from twinloop.test import Test
+from twinloop.trajectory import Trajectory
 
 
 class Simulated(Stepped):
@@ -20,7 +24,7 @@ class Simulated(Stepped):
         signals: its states, commands and period.
         step: the state one period later; it may keep no state of its own between runs.
         noise: standard deviations of the sensors, in the units of the states: by name, one for each state, or one for
-            all. The noisy state is read and recorded, `true_states` keep the other; the step function sees the true one.
+            all. The noisy state is read and recorded, `true_states` keep the other, which the step function sees.
         seed: of the noise; run r of this object, and of a campaign that goes on in another process, draws from a stream
             of (seed, r).
         default_gains: a controller that it is safe to begin with, by name.
@@ -45,5 +49,19 @@ class Simulated(Stepped):
             )
         self._step = step
 
-    def _begin(self, test: Test) -> tuple[Floats, Step]:
-        return test.initial_state, self._step
+    def _begin(self, test: Test) -> Episode:
+        return _Run(test.initial_state, self._step)
+
+
+@dataclass
+class _Run:
+    """A run that begins where it should."""
+
+    start: Floats
+    step: Step
+
+    def __call__(self, state: Floats, command: Floats) -> ArrayLike:
+        return self.step(state, command)
+
+    def finished(self, flown: Trajectory) -> Trajectory:
+        return flown

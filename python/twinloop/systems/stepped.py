@@ -1,9 +1,10 @@
-"""Systems that move on a period at a time: their steps checked, their sensors noisy if asked for, their runs counted."""
+"""Systems that move on a period at a time: steps are checked, sensors noisy if asked for, runs counted."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,20 @@ Step = Callable[[Floats, Floats], ArrayLike]
 """(state (n_x,), command (n_u,)) -> state (n_x,) one period later."""
 Deviations = Mapping[str, float] | Sequence[float] | float
 """Standard deviations of sensors: by name of the state, one for each, or one for all; in the units of the states."""
+
+
+class Episode(Protocol):
+    """One run that has begun: `start` is where (n_x,), which may be elsewhere than was asked for."""
+
+    start: Floats
+
+    def __call__(self, state: Floats, command: Floats) -> ArrayLike:
+        """The state (n_x,) one period later, under the command (n_u,)."""
+        ...
+
+    def finished(self, flown: Trajectory) -> Trajectory:
+        """The run as it is recorded, once it has ended."""
+        ...
 
 
 class Stepped(System):
@@ -79,15 +94,14 @@ class Stepped(System):
             InvalidInput: the test is for other signals.
         """
         check_signals(test, self._signals)
-        start, step = self._begin(test)
+        episode = self._begin(test)
         noise = None
         if self.noise.any():
-            noise = self.noise * run_stream(self.seed, self.runs).standard_normal(
-                (test.steps + 1, len(start))
-            )
-        guard = Guard(step, self._signals.n_x)
+            shape = (test.steps + 1, self._signals.n_x)
+            noise = self.noise * run_stream(self.seed, self.runs).standard_normal(shape)
+        guard = Guard(episode, self._signals.n_x)
         try:
-            flown = fly(guard, dataclasses.replace(test, initial_state=start), noise=noise)
+            flown = fly(guard, dataclasses.replace(test, initial_state=episode.start), noise=noise)
         except SystemFailure:
             raise
         except Exception:
@@ -95,10 +109,10 @@ class Stepped(System):
                 raise guard.failure from guard.failure.__cause__
             raise
         self.runs += 1
-        return flown
+        return episode.finished(flown)
 
-    def _begin(self, test: Test) -> tuple[Floats, Step]:
-        """Where a run begins (n_x,), which may be elsewhere than asked for, and how it goes on."""
+    def _begin(self, test: Test) -> Episode:
+        """A run of a test, at its start."""
         raise NotImplementedError
 
 
