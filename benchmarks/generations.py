@@ -16,7 +16,7 @@ def report(smoke: bool) -> Section:
         f"Generations: the whole model loop, population {POPULATION}, {loop.STEPS} steps a test"
     )
     tests, chunks, generations = (1, 2, 3) if smoke else (8, 9, 100)
-    selected = loop.fly(tests).selected(divergence_factor=10.0)
+    selected = loop.fly(tests).selected(loop.SETTING)
     workers = _core.Workers(1)
     variation = _core.Variation(POPULATION)
     for form in ("absolute", "acceleration"):

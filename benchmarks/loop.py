@@ -36,6 +36,8 @@ FAMILY = _core.Family.pid(
     [(0.0, high, False) for high in [0.3, 0.1, 0.1] * 3],
     (MATRIX, OFFSET, 0.5),
 )
+SETTING = _core.Setting(_core.Limits(SIGNALS), FAMILY)
+FAR = _core.Setting(_core.Limits(SIGNALS, DIVERGENCE_FACTOR), FAMILY)
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,8 @@ class Flights:
     states: np.ndarray
     commands: np.ndarray
 
-    def selected(self, divergence_factor: float = DIVERGENCE_FACTOR) -> _core.SelectedTests:
-        tests = _core.SelectedTests(SIGNALS, FAMILY, divergence_factor)
+    def selected(self, setting: _core.Setting = FAR) -> _core.SelectedTests:
+        tests = _core.SelectedTests(setting)
         for gains, states, commands in zip(self.gains, self.states, self.commands, strict=True):
             tests = tests.with_test(gains, self.target, states, commands)
         return tests
@@ -72,5 +74,5 @@ def fly(tests: int, seed: int = 0) -> Flights:
         drag_factor=DRAG,
         gyroscopic="print",
     )
-    runs = _core.rollout(plant, FAMILY, gains, _core.Task(np.zeros(6), target, STEPS), SIGNALS)
+    runs = _core.rollout(plant, SETTING, gains, _core.Task(np.zeros(6), target, STEPS))
     return Flights(gains, target, runs.states, runs.commands)

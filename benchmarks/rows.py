@@ -23,7 +23,7 @@ def report(smoke: bool) -> Section:
     numba = optional("numba_rows", section)
     for rows in (100, 1000) if smoke else (100, 1000, 10_000):
         states, commands = rng.normal(size=(rows + 1, loop.STATES)), rng.normal(size=(rows, loop.COMMANDS))
-        tests = _core.SelectedTests(loop.SIGNALS, loop.FAMILY)
+        tests = _core.SelectedTests(loop.SETTING)
         # The commands as the program sees them are of the size of the states.
         tests = tests.with_test(np.zeros(9), np.zeros(loop.STATES), states, commands * loop.HOVER)
         programs, models = _programs(rng, count, tests)

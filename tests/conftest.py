@@ -122,3 +122,14 @@ def rig_family(rig):
     """A PID on the first state that moves both commands, one that differences the second state."""
     matrix, offset = [[1.0, 0.25], [0.5, -2.0]], [0.1, -0.2]
     return _core.Family.pid(rig, [(0, 1), (1, None)], [(0.0, 2.0, False)] * 6, (matrix, offset, 1.0))
+
+
+def setting_of(signals, family, divergence_factor=10.0):
+    """What the engine flies in."""
+    return _core.Setting(_core.Limits(signals, divergence_factor), family)
+
+
+@pytest.fixture(scope="session")
+def rig_setting(rig, rig_family):
+    """The rig with its controllers."""
+    return setting_of(rig, rig_family)

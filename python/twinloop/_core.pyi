@@ -390,25 +390,21 @@ class Runs:
 
 def replay(
     dynamics: Model | Quadrotor,
+    limits: Limits,
     initial: ArrayLike,
     commands: ArrayLike,
-    signals: Signals,
-    *,
-    divergence_factor: float = 10.0,
 ) -> Runs:
     """A free run from a state (n_x,) under commands (n, n_u), without a controller."""
 
 def rollout(
     dynamics: Model | Quadrotor | Callable[[_Floats, _Floats], ArrayLike],
-    family: Family,
+    setting: Setting,
     parameters: ArrayLike,
     task: Task,
-    signals: Signals,
     *,
     noise: ArrayLike | None = None,
     excitation: ArrayLike | None = None,
     disturbance: ArrayLike | None = None,
-    divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> Runs:
     """Closes the loop of each controller (m, size) around the dynamics.
@@ -419,10 +415,22 @@ def rollout(
     """
 
 @final
+class Limits:
+    """Where runs of a system count as diverged: at a multiple of the scale of a state."""
+
+    def __new__(cls, signals: Signals, divergence_factor: float = 10.0) -> Limits: ...
+
+@final
+class Setting:
+    """Limits, and controllers for the same signals: what runs are flown in."""
+
+    def __new__(cls, limits: Limits, family: Family) -> Setting: ...
+
+@final
 class SelectedTests:
     """The tests that were run on the system, with their trajectories."""
 
-    def __new__(cls, signals: Signals, family: Family, divergence_factor: float = 10.0) -> SelectedTests: ...
+    def __new__(cls, setting: Setting) -> SelectedTests: ...
     def with_test(
         self,
         parameters: ArrayLike,
@@ -450,12 +458,10 @@ def closed_loop(
 
 def final_distances(
     models: Sequence[Model],
-    family: Family,
+    setting: Setting,
     parameters: ArrayLike,
     task: Task,
-    signals: Signals,
     *,
-    divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> _Floats:
     """Distance of the last state to the target (models, tests); infinite where the run diverged."""
@@ -472,15 +478,13 @@ class Flights:
 
     def __new__(
         cls,
-        signals: Signals,
-        family: Family,
+        setting: Setting,
         parameters: ArrayLike,
         initial_states: ArrayLike,
         target_states: ArrayLike,
         steps: int,
         *,
         excitation: ArrayLike | None = None,
-        divergence_factor: float = 10.0,
     ) -> Flights:
         """parameters (K, size), initial and target states (K, n_x), excitation (K, steps, n_u)."""
     @property
@@ -598,6 +602,7 @@ def search_subsets(
 
 def tune(
     model: Model,
+    limits: Limits,
     chains: Sequence[_Chain],
     records: Sequence[_Record],
     *,
@@ -606,7 +611,6 @@ def tune(
     iterations: int,
     draws: int = 0,
     unit: _Name | None = None,
-    divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> tuple[Model, float, int, _Floats, list[Model]]:
     """The model with free constants, and lags of groups of commands and times of hidden states, moved until the least
@@ -618,10 +622,10 @@ def tune(
 
 def predictions(
     model: Model,
+    limits: Limits,
     chains: Sequence[_Chain],
     records: Sequence[_Record],
     *,
-    divergence_factor: float = 10.0,
     workers: Workers | None = None,
 ) -> list[tuple[_Floats, _Floats]] | None:
     """Whitened prediction errors and states once each reading was used, both (n + 1, n_x) for each run."""
@@ -745,7 +749,6 @@ class TestSettings:
         mutants: int = 10,
         mutant_step: float = 0.05,
         mutation_step: float = 0.1,
-        divergence_factor: float = 10.0,
     ) -> TestSettings: ...
 
 @final
@@ -755,9 +758,8 @@ class TestSearch:
     @staticmethod
     def start(
         committee: Sequence[Model],
-        family: Family,
+        setting: Setting,
         task: Task,
-        signals: Signals,
         settings: TestSettings,
         variation: Variation,
         seed: int,
@@ -768,9 +770,8 @@ class TestSearch:
     @staticmethod
     def restored(
         committee: Sequence[Model],
-        family: Family,
+        setting: Setting,
         task: Task,
-        signals: Signals,
         settings: TestSettings,
         variation: Variation,
         counters: _Counters,

@@ -9,6 +9,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import TwinloopError
+from twinloop.limits import Limits
 from twinloop.signals import Signals
 from twinloop.systems import System
 from twinloop.test import Test
@@ -54,7 +55,7 @@ def check_system(
     start = _first(initial_state, getattr(system, "initial_state", None), np.zeros(signals.n_x))
     target = _first(target_state, getattr(system, "target_state", None), np.zeros(signals.n_x))
     test = Test(family, family.genes(chosen), start, target, steps)
-    trajectory = check_recorded(system.run(test), signals, steps, 10.0)
+    trajectory = check_recorded(system.run(test), Limits(signals), steps)
     if trajectory.ended == "completed":
         _promise(trajectory.steps == steps, f"a completed run of {steps} steps, found {trajectory.steps}")
     else:

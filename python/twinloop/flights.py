@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats, Integers, floats
 from twinloop.controllers import Family
 from twinloop.errors import engine_input
+from twinloop.limits import Limits
 from twinloop.signals import Signals
 
 
@@ -22,7 +23,7 @@ def candidates(
     steps: int,
     *,
     excitation: ArrayLike | None = None,
-    divergence_factor: float = 10.0,
+    limits: Limits | None = None,
 ) -> _core.Flights:
     """K flights of one length, laid out for the engine once and judged as often as needed.
 
@@ -34,7 +35,7 @@ def candidates(
             flight (K, n + 1, n_x).
         steps: number of commands of each, n.
         excitation: what is added to the commands of each (K, n, n_u), in their units; None: nothing.
-        divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
+        limits: where a flight counts as diverged; None: at ten times a state's scale.
 
     Returns:
         The engine's flights.
@@ -46,14 +47,12 @@ def candidates(
     rows = floats("Flights, genes (candidates, gains)", genes, (None, family.size))
     with engine_input():
         return _core.Flights(
-            family.signals.engine,
-            family.engine,
+            (limits or Limits(family.signals)).setting(family),
             rows,
             _states("Flights, initial states", initial_states, len(rows), n_x),
             _states("Flights, target states", target_states, len(rows), n_x, steps),
             steps,
             excitation=excitation,
-            divergence_factor=divergence_factor,
         )
 
 

@@ -12,20 +12,21 @@ from twinloop import _core
 from twinloop.arrays import Floats, Integers, floats, number
 from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
+from twinloop.limits import Limits
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 
 def selected_tests(
-    tests: Sequence[Test], trajectories: Sequence[Trajectory], divergence_factor: float = 10.0
+    tests: Sequence[Test], trajectories: Sequence[Trajectory], limits: Limits | None = None
 ) -> _core.SelectedTests:
     """Tests and what the system answered, as the engine judges models on them.
 
     Args:
         tests: at least one, all of one family.
         trajectories: one for each test.
-        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+        limits: where a run counts as diverged; None: at ten times a state's scale.
 
     Returns:
         The engine's set of selected tests.
@@ -40,7 +41,7 @@ def selected_tests(
         )
     family = tests[0].family
     with engine_input():
-        selected = _core.SelectedTests(family.signals.engine, family.engine, divergence_factor)
+        selected = _core.SelectedTests((limits or Limits(family.signals)).setting(family))
         for test, trajectory in zip(tests, trajectories, strict=True):
             selected = selected.with_test(
                 test.genes, test.target_state, trajectory.states, trajectory.commands, test.excitation
@@ -181,7 +182,7 @@ def final_distances(
     genes: ArrayLike,
     task: _core.Task,
     *,
-    divergence_factor: float = 10.0,
+    limits: Limits | None = None,
     workers: _core.Workers | None = None,
 ) -> Floats:
     """Final distance δ of tests on models (paper, section IV.C).
@@ -191,7 +192,7 @@ def final_distances(
         family: of the controllers.
         genes: gains of k tests (k, size), in their units.
         task: start, target and length of all of them.
-        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+        limits: where a run counts as diverged; None: at ten times a state's scale.
         workers: how the work is carried out; one thread by default.
 
     Returns:
@@ -202,8 +203,7 @@ def final_distances(
     """
     with engine_input():
         return _core.final_distances(
-            models, family.engine, genes, task, family.signals.engine,
-            divergence_factor=divergence_factor, workers=workers,
+            models, (limits or Limits(family.signals)).setting(family), genes, task, workers=workers
         )  # fmt: skip
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twinloop.arrays import Floats, floats
 from twinloop.errors import InvalidInput, unknown
+from twinloop.limits import Limits
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -75,16 +75,13 @@ class Trajectory(Recorded, kind="trajectory"):
         return len(self.commands)
 
 
-def check_recorded(
-    trajectory: object, signals: Signals, steps: int | None, divergence_factor: float, least: int = 2
-) -> Trajectory:
+def check_recorded(trajectory: object, limits: Limits, steps: int | None, least: int = 2) -> Trajectory:
     """Refuses what cannot be learnt from.
 
     Args:
         trajectory: what a system answered.
-        signals: what it should consist of.
+        limits: of a run, with the signals that it should consist of.
         steps: how many steps the test asked for; None where nobody asked.
-        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
         least: steps that it must have.
 
     Returns:
@@ -94,6 +91,7 @@ def check_recorded(
         InvalidInput: no trajectory, another width or period, too short, too long, far out of scale, or with commands
             beyond their bounds by more than those are apart.
     """
+    signals = limits.signals
     if not isinstance(trajectory, Trajectory):
         raise InvalidInput(
             f"Expected a twinloop.Trajectory, found {type(trajectory).__name__}; wrap the record in one."
@@ -125,14 +123,13 @@ def check_recorded(
             " loop only jitters around it, pass the even times dt * np.arange(n + 1)."
         )
     # Twice: noise may carry the last reading of a run that was stopped in time past the limit.
-    scales = np.array([math.inf if state.periodic else state.scale for state in signals.states])
-    limits = 2.0 * divergence_factor * scales
-    excess = np.abs(trajectory.states) / limits
+    farthest = 2.0 * limits.states
+    excess = np.abs(trajectory.states) / farthest
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     if excess[k, i] > 1.0:
         state = signals.states[int(i)]
         raise InvalidInput(
-            f"Trajectory: expected {state.name} within {limits[i]:g} {state.unit} (twice the divergence"
+            f"Trajectory: expected {state.name} within {farthest[i]:g} {state.unit} (twice the divergence"
             f" factor times its scale), found {trajectory.states[k, i]:g} at row {k}; cut the record before"
             " it, or declare a larger scale."
         )

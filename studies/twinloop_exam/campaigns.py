@@ -108,7 +108,7 @@ def of_twin(twin: Twin, held_out: HeldOut) -> dict[str, float | None]:
         Measures by name.
     """
     # Without the committee's band, which `twin.simulate` would draw for each of the controllers.
-    errors = held_out.errors(lambda test: fly(twin.model, test, divergence_factor=twin.divergence_factor))
+    errors = held_out.errors(lambda test: fly(twin.model, test, limits=twin.limits))
     median, tail = quantiles(errors)
     return {
         "error_median": median,

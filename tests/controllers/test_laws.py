@@ -15,6 +15,7 @@ from twinloop.contracts import check_controller
 from twinloop.controllers import PID, Cascade, Mixer, StateFeedback
 from twinloop.faces.result import summary
 from twinloop.faces.text import render
+from twinloop.limits import Limits
 
 ANGLES = ("roll", "pitch", "yaw")
 SYSTEM = tl.systems.Quadrotor()
@@ -113,9 +114,7 @@ def test_a_real_run_has_the_bits_of_a_roll_out_of_many_lanes(name):
     plant = SYSTEM.dynamics
     for width in _core.vector_widths():
         workers = _core.Workers(1, width)
-        runs = _core.rollout(
-            plant, family.engine, genes, task, SYSTEM.signals.engine, divergence_factor=1e6, workers=workers
-        )
+        runs = _core.rollout(plant, Limits(SYSTEM.signals, 1e6).setting(family), genes, task, workers=workers)
         for row in (0, 33, 69):
             controller, state = family.controller(genes[row]), np.zeros(6)
             for k in range(40):

@@ -10,6 +10,7 @@ from oracles import same_bits
 from twinloop import _core
 from twinloop.contracts import check_controller, check_system
 from twinloop.controllers import Mixer, StateFeedback
+from twinloop.limits import Limits
 
 
 class Feedback:
@@ -148,12 +149,13 @@ def test_every_width_flies_the_same_bits_with_rotors_that_lag():
     genes = np.random.default_rng(0).uniform(-0.1, 0.3, (70, family.size))
     task = _core.Task(np.zeros(6), system.target_state, 40)
 
+    setting = Limits(system.signals).setting(family)
+
     def flown(width):
         workers = _core.Workers(1, width)
-        signals = system.signals.engine
-        return _core.rollout(system.dynamics, family.engine, genes, task, signals, workers=workers).states
+        return _core.rollout(system.dynamics, setting, genes, task, workers=workers).states
 
     narrow = flown("baseline")
     assert all(same_bits(narrow, flown(width)) for width in _core.vector_widths())
-    alone = _core.rollout(system.dynamics, family.engine, genes[69:], task, system.signals.engine).states
+    alone = _core.rollout(system.dynamics, setting, genes[69:], task).states
     assert same_bits(narrow[69:], alone)

@@ -68,14 +68,14 @@ class World:
         self.task = _core.Task(self.start, self.target, 4)
         self.gains = np.full((1, 3), 0.5)
         self.states, self.commands = random.normal(size=(5, n_x)), random.normal(size=(4, n_u))
-        empty = _core.SelectedTests(self.signals, self.family)
+        self.limits = _core.Limits(self.signals)
+        self.setting = _core.Setting(self.limits, self.family)
+        empty = _core.SelectedTests(self.setting)
         self.selected = empty.with_test(self.gains[0], self.target, self.states, self.commands)
         self.variation = _core.Variation(4)
         self.workers = _core.Workers(1)
         self.settings = _core.TestSettings(mutants=2)
-        self.flights = _core.Flights(
-            self.signals, self.family, self.gains, self.start[None], self.target[None], 4
-        )
+        self.flights = _core.Flights(self.setting, self.gains, self.start[None], self.target[None], 4)
         self.quality = _core.Quality("iae", np.ones(n_x))
         self.envelope = [(-2.0, 2.0)] * n_x
         self.noise = np.zeros((1, 5, n_x))
@@ -93,16 +93,15 @@ class World:
         self.model_of_search = self.search.best_model
         self.test_search = _core.TestSearch.start(
             [self.model_of_search],
-            self.family,
+            self.setting,
             self.task,
-            self.signals,
             self.settings,
             self.variation,
             0,
             1,
             self.workers,
         )
-        self.runs = _core.rollout(self.model, self.family, self.gains, self.task, self.signals)
+        self.runs = _core.rollout(self.model, self.setting, self.gains, self.task)
         self.objectives = random.normal(size=(6, n_x))
         self.archive = _core.Archive(n_x)
 
@@ -134,10 +133,10 @@ def calls(world):
     starts = {"initial_states": w.start[None], "target_states": w.target[None]}
     motion = {"sensors": w.sensors, "motion": w.motion}
     judged = {"models": [w.model], "selected": w.selected, "workers": w.workers}
-    recorded = {"model": w.model, "chains": w.chains, "records": w.records, "divergence_factor": 10.0}
+    recorded = {"model": w.model, "limits": w.limits, "chains": w.chains, "records": w.records}
     problem = (w.regression, w.coefficients, w.sensors, w.motion, w.sensors * 1e-3, (1e-6, 0.0, 1.0))
     crossed = {"first": w.program, "second": w.other_program, "seed": 0}
-    flown = {"parameters": w.gains, "task": w.task, "signals": w.signals, "divergence_factor": 10.0}
+    flown = {"setting": w.setting, "parameters": w.gains, "task": w.task}
     learnt = {"form": "absolute", "signals": w.signals}
     found = {
         "vector_widths": (_core.vector_widths, {}),
@@ -206,17 +205,15 @@ def calls(world):
             _core.rollout,
             {
                 "dynamics": w.model,
-                "family": w.family,
                 **flown,
                 "noise": w.noise,
                 "excitation": w.excitation,
                 "disturbance": w.disturbance,
             },
         ),
-        "SelectedTests": (
-            _core.SelectedTests,
-            {"signals": w.signals, "family": w.family, "divergence_factor": 10.0},
-        ),
+        "Limits": (_core.Limits, {"signals": w.signals, "divergence_factor": 10.0}),
+        "Setting": (_core.Setting, {"limits": w.limits, "family": w.family}),
+        "SelectedTests": (_core.SelectedTests, {"setting": w.setting}),
         "SelectedTests.with_test": (
             w.selected.with_test,
             {
@@ -231,19 +228,17 @@ def calls(world):
         "open_loop": (_core.open_loop, judged),
         "closed_loop": (_core.closed_loop, judged),
         "k_step": (_core.k_step, {**judged, "steps": 2}),
-        "final_distances": (_core.final_distances, {"models": [w.model], "family": w.family, **flown}),
+        "final_distances": (_core.final_distances, {"models": [w.model], **flown}),
         "discrimination": (_core.discrimination, {"distances": np.ones((3, 2)), "cap": 3.0}),
         "instability": (_core.instability, {"distances": np.ones((3, 2)), "cap": 3.0}),
         "Flights": (
             _core.Flights,
             {
-                "signals": w.signals,
-                "family": w.family,
+                "setting": w.setting,
                 "parameters": w.gains,
                 **starts,
                 "steps": 4,
                 "excitation": w.excitation,
-                "divergence_factor": 10.0,
             },
         ),
         "Flights.__len__": (w.flights.__len__, {}),
@@ -360,16 +355,14 @@ def calls(world):
                 "mutants": 2,
                 "mutant_step": 0.05,
                 "mutation_step": 0.1,
-                "divergence_factor": 10.0,
             },
         ),
         "TestSearch.start": (
             _core.TestSearch.start,
             {
                 "committee": [w.model_of_search],
-                "family": w.family,
+                "setting": w.setting,
                 "task": w.task,
-                "signals": w.signals,
                 "settings": w.settings,
                 "variation": w.variation,
                 "seed": 0,
@@ -401,9 +394,8 @@ def restored(world):
     }
     of_tests = {
         "committee": [w.model_of_search],
-        "family": w.family,
+        "setting": w.setting,
         "task": w.task,
-        "signals": w.signals,
         "settings": w.settings,
         "variation": w.variation,
         "counters": w.test_search.counters,
@@ -419,7 +411,7 @@ def restored(world):
         **drawn(w),
         "replay": (
             _core.replay,
-            {"dynamics": w.model, "initial": w.start, "commands": w.commands, "signals": w.signals},
+            {"dynamics": w.model, "limits": w.limits, "initial": w.start, "commands": w.commands},
         ),
         "Quality.recorded": (
             w.quality.recorded,
@@ -557,12 +549,18 @@ def holds_the_engines_own(value):
     return type(first).__module__ == "twinloop._core" and not isinstance(first, anybodys)
 
 
-STARTS = {("Model.shape", "signals"), *((f"Family.{law}", "signals") for law in LAWS)}
+STARTS = {
+    ("Model.shape", "signals"),
+    ("Limits", "signals"),
+    ("SelectedTests", "setting"),
+    *((f"Family.{law}", "signals") for law in LAWS),
+}
 """Arguments that all others are numbers for."""
 NUMBERS = {"program", "first", "second", "grammar", "task", "quality", "grams", "population", "archive"}
 """Arguments that are made of numbers without a unit or a period: others where they are more or fewer."""
 ALONE = {
     ("Model", "signals"),
+    ("Flights", "setting"),
     ("tune", "model"),
     ("predictions", "model"),
     ("ModelSearch.start", "selected"),
@@ -628,7 +626,7 @@ def test_counts_that_no_machine_can_hold_are_refused(name, argument):
 
 def test_a_search_that_is_advanced_on_tests_it_was_not_judged_on_is_refused():
     gains, target = OURS.gains[0], OURS.target
-    empty = _core.SelectedTests(OURS.signals, OURS.family)
+    empty = _core.SelectedTests(OURS.setting)
     other = empty.with_test(gains, target, OURS.states + 0.5, OURS.commands)
     with pytest.raises(ValueError, match="last judged on"):
         OURS.search.advance(other, 1, OURS.workers)
@@ -648,11 +646,11 @@ def test_a_crossover_never_makes_more_instructions_than_a_program_may_have():
 
 
 def test_no_flight_on_no_model_has_the_shape_that_its_lists_say():
-    empty = _core.SelectedTests(OURS.signals, OURS.family)
+    empty = _core.SelectedTests(OURS.setting)
     assert _core.open_loop([OURS.model], empty).shape == (1, 0)
     assert all(part.shape == (0, 1) for part in _core.closed_loop([], OURS.selected))
     nobody = np.zeros((0, 3))
-    distances = _core.final_distances([OURS.model], OURS.family, nobody, OURS.task, OURS.signals)
+    distances = _core.final_distances([OURS.model], OURS.setting, nobody, OURS.task)
     assert distances.shape == (1, 0)
 
 

@@ -18,6 +18,7 @@ from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.terms.libraries import LIBRARIES, rungs
 from twinloop.identification.terms.pool import Pool
+from twinloop.limits import Limits
 from twinloop.objectives import closed_loop, frozen_error, open_loop, selected_tests
 from twinloop.test import final_distance
 from twinloop.trajectory import check_recorded, continued
@@ -163,7 +164,7 @@ def test_errors_of_models_do_not_see_how_a_record_was_wrapped(seed):
         record = tl.Trajectory(0.05 * np.arange(25), states, commands)
         selected = selected_tests([test], [record])
         errors = [of(pendulums(SIGNALS), selected, WORKERS) for of in (open_loop, closed_loop)]
-        whole = continued(check_recorded(record, SIGNALS, 24, 10.0), SIGNALS, test.initial_state)
+        whole = continued(check_recorded(record, Limits(SIGNALS), 24), SIGNALS, test.initial_state)
         assert same_bits(whole.states, truth)
         found.append([*errors, frozen_error(whole, SIGNALS), final_distance(states[-1], [1.0, 0.0], SIGNALS)])
     for one, other in zip(*found, strict=True):
@@ -175,7 +176,7 @@ def test_an_angle_may_turn_as_often_as_it_likes():
     test = tl.Test(family_of(SIGNALS), np.zeros(3), np.array([0.0, 11.0]), np.array([1.0, 0.0]), 200)
     run = tl.Twin(spinning, SIGNALS).simulate(test)
     assert run.ended == "completed" and run.states[-1, 0] == pytest.approx(110.0)
-    assert check_recorded(run, SIGNALS, 200, 10.0) is run
+    assert check_recorded(run, Limits(SIGNALS), 200) is run
     cut = tl.Twin(model(rig(periodic=False), "r3 = r3 * 0.0"), rig(periodic=False)).simulate(
         tl.Test(family_of(rig(periodic=False)), np.zeros(3), [0.0, 11.0], [1.0, 0.0], 200)
     )

@@ -12,6 +12,7 @@ from twinloop import _core, flights
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
 from twinloop.law.flight import fly, fly_commands
+from twinloop.limits import Limits
 from twinloop.objectives import closed_loop, selected_tests
 from twinloop.planning.quality import quality_of
 from twinloop.test import final_distance
@@ -77,7 +78,9 @@ def test_the_engine_judges_flights_as_their_records_are_judged(seed, kind):
         test = led(family, targets[i], genes[i])
         run = fly(plant, test)
         assert found[0, 0, i] == pytest.approx(quality.flown(run, test.target_state), rel=1e-12)
-        distance = _core.final_distances([plant], family.engine, genes[i : i + 1], test.task, signals.engine)
+        distance = _core.final_distances(
+            [plant], Limits(signals).setting(family), genes[i : i + 1], test.task
+        )
         assert distance[0, 0] == pytest.approx(final_distance(run.states[-1], targets[i, -1]), rel=1e-12)
 
 
@@ -167,7 +170,7 @@ def test_a_run_under_recorded_commands_is_that_of_the_controller_that_gave_them(
     family, model, pendulum_signals
 ):
     run = fly(model, led(family, ROWS))
-    again = fly_commands(model, run.states[0], run.commands, pendulum_signals)
+    again = fly_commands(model, run.states[0], run.commands, Limits(pendulum_signals))
     assert same_bits(again.states, run.states) and same_bits(again.commands, run.commands)
 
 
@@ -197,4 +200,4 @@ def test_commands_of_another_shape_are_refused(model, pendulum_signals):
         with pytest.raises(tl.InvalidInput):
             twin.simulate_commands(state, commands)
     with pytest.raises(tl.InvalidInput, match="at least one row of commands"):
-        fly_commands(model, np.zeros(2), np.empty((0, 1)), pendulum_signals)
+        fly_commands(model, np.zeros(2), np.empty((0, 1)), Limits(pendulum_signals))

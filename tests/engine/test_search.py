@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from conftest import setting_of
 from oracles import dominates, non_dominated, same_bits
 from strategies import program_text
 from twinloop import _core, pareto
@@ -13,14 +14,14 @@ WORKERS = _core.Workers()
 
 
 @pytest.fixture(scope="module")
-def selected(rig, rig_family):
+def selected(rig_setting):
     """One to three tests, flown on a plain linear system."""
-    sets = [_core.SelectedTests(rig, rig_family)]
+    sets = [_core.SelectedTests(rig_setting)]
     stream = np.random.default_rng(0)
     for genes in stream.uniform(0.0, 2.0, (3, 6)):
         runs = _core.rollout(
             lambda x, u: np.array([x[0] + 0.1 * x[1], 0.9 * x[1] + 0.1 * u[0] - 0.02 * u[1]]),
-            rig_family, genes[None], _core.Task(START, TARGET, 15), rig,
+            rig_setting, genes[None], _core.Task(START, TARGET, 15),
         )  # fmt: skip
         assert runs.lasted[0] == 15
         sets.append(sets[-1].with_test(genes, TARGET, runs.states[0], runs.commands[0]))
@@ -157,9 +158,9 @@ def test_moving_on_without_learning_the_new_test_is_refused(selected):
         search.advance(selected[1], 1, WORKERS)
 
 
-def test_a_search_without_tests_is_refused(rig, rig_family):
+def test_a_search_without_tests_is_refused(rig_setting):
     with pytest.raises(ValueError, match="at least one selected test"):
-        started(_core.SelectedTests(rig, rig_family))
+        started(_core.SelectedTests(rig_setting))
 
 
 def test_a_search_is_a_value_that_moving_on_leaves_as_it_was(selected):
@@ -218,18 +219,16 @@ def model(rig, *instructions):
 
 
 @pytest.fixture
-def committee(rig, selected):
+def committee(selected):
     search = started(selected[1]).advance(selected[1], 10, WORKERS)
     archive = search.archive
     return [archive[i] for i in search.committee(8)]
 
 
-def search_of(committee, rig, rig_family, task=None, seed=1, iteration=1, population=30, **settings):
+def search_of(committee, rig_setting, task=None, seed=1, iteration=1, population=30, **settings):
     task = task or _core.Task(START, TARGET, 12)
     chosen, variation = _core.TestSettings(**{"mutants": 4, **settings}), _core.Variation(population)
-    return _core.TestSearch.start(
-        committee, rig_family, task, rig, chosen, variation, seed, iteration, WORKERS
-    )
+    return _core.TestSearch.start(committee, rig_setting, task, chosen, variation, seed, iteration, WORKERS)
 
 
 def linear(rig, gain):
@@ -239,12 +238,12 @@ def linear(rig, gain):
     )
 
 
-def test_discrimination_of_a_test_is_that_of_its_final_distances_on_the_committee(rig, rig_family):
+def test_discrimination_of_a_test_is_that_of_its_final_distances_on_the_committee(rig, rig_setting):
     committee = [linear(rig, gain) for gain in (0.1, 0.15, 0.2, 0.4)]
     task = _core.Task(START, TARGET, 12)
     cap = 3.0 * np.linalg.norm(np.subtract(TARGET, START))
-    search = search_of(committee, rig, rig_family, task, control_quality=True).advance(6, WORKERS)
-    found = _core.final_distances(committee, rig_family, search.archive_genes, task, rig)
+    search = search_of(committee, rig_setting, task, control_quality=True).advance(6, WORKERS)
+    found = _core.final_distances(committee, rig_setting, search.archive_genes, task)
     expected = 1.0 / (np.minimum(found, cap).var(axis=0) + 1e-9)
     rows = search.archive_objectives
     np.testing.assert_allclose(rows[:, 0], expected, rtol=1e-9)
@@ -255,22 +254,22 @@ def test_discrimination_of_a_test_is_that_of_its_final_distances_on_the_committe
     assert same_bits(search.best_genes, search.archive_genes[search.best])
 
 
-def test_a_model_that_runs_away_counts_as_the_cap(rig, rig_family):
+def test_a_model_that_runs_away_counts_as_the_cap(rig, rig_setting):
     wild = model(rig, "r4 = r0 * 30.0", "r5 = r1 + 0.0")
     committee = [linear(rig, 0.1), wild]
     task = _core.Task(START, TARGET, 12)
     cap = 2.0 * np.linalg.norm(np.subtract(TARGET, START))
-    search = search_of(committee, rig, rig_family, task, distance_cap=2.0)
-    found = _core.final_distances(committee, rig_family, search.archive_genes, task, rig)
+    search = search_of(committee, rig_setting, task, distance_cap=2.0)
+    found = _core.final_distances(committee, rig_setting, search.archive_genes, task)
     assert np.isinf(found[1]).all()
     expected = 1.0 / (np.array([np.minimum(found[0], cap), np.full(found.shape[1], cap)]).var(axis=0) + 1e-9)
     np.testing.assert_allclose(search.archive_objectives[:, 0], expected, rtol=1e-9)
 
 
-def test_instability_vanishes_with_the_step_of_the_mutants_and_grows_with_it(rig, rig_family):
+def test_instability_vanishes_with_the_step_of_the_mutants_and_grows_with_it(rig, rig_setting):
     committee = [linear(rig, 0.2), linear(rig, 0.3)]
-    steady = search_of(committee, rig, rig_family, mutants=6, mutant_step=1e-9)
-    shaken = search_of(committee, rig, rig_family, mutants=6, mutant_step=0.2)
+    steady = search_of(committee, rig_setting, mutants=6, mutant_step=1e-9)
+    shaken = search_of(committee, rig_setting, mutants=6, mutant_step=0.2)
     assert (steady.archive_objectives[:, 1] < 1e-12).all()
     assert shaken.archive_objectives[:, 1].max() > 1e-6
 
@@ -280,29 +279,29 @@ def runaway_above(rig):
     return model(rig, "r6 = r2 * 2.0", "r6 = exp(r6)", "r6 = r6 * r6", "r4 = r0 + r6", "r5 = r1 * 0.5")
 
 
-def test_a_candidate_that_diverges_on_the_best_model_is_dominated_by_one_that_does_not(rig, rig_family):
+def test_a_candidate_that_diverges_on_the_best_model_is_dominated_by_one_that_does_not(rig, rig_setting):
     task = _core.Task([0.0, 0.0], [0.4, 0.0], 6)
     best = runaway_above(rig)
     committee = [best, linear(rig, 0.2)]
     genes = np.random.default_rng(0).uniform(0.0, 2.0, (200, 6))
-    share = np.isinf(_core.final_distances([best], rig_family, genes, task, rig)).mean()
+    share = np.isinf(_core.final_distances([best], rig_setting, genes, task)).mean()
     assert 0.05 < share < 0.95  # some do, some do not
-    search = search_of(committee, rig, rig_family, task).advance(3, WORKERS)
-    found = _core.final_distances([best], rig_family, search.archive_genes, task, rig)
+    search = search_of(committee, rig_setting, task).advance(3, WORKERS)
+    found = _core.final_distances([best], rig_setting, search.archive_genes, task)
     assert np.isfinite(found).all()
 
 
-def test_where_every_candidate_diverges_none_looks_stable_or_discriminating(rig, rig_family):
+def test_where_every_candidate_diverges_none_looks_stable_or_discriminating(rig, rig_setting):
     wild = model(rig, "r4 = r0 * 30.0", "r5 = r1 + 0.0")
-    search = search_of([wild, linear(rig, 0.2)], rig, rig_family, control_quality=True)
+    search = search_of([wild, linear(rig, 0.2)], rig_setting, control_quality=True)
     assert search.archive_objectives.shape == (1, 3)
     assert (search.archive_objectives > 1e9).all()
 
 
-def test_a_best_model_that_ignores_the_commands_is_called_flat(rig, rig_family):
+def test_a_best_model_that_ignores_the_commands_is_called_flat(rig, rig_setting):
     deaf = model(rig, "r4 = r0 * 0.9", "r5 = r1 * 0.9")
-    assert search_of([deaf, linear(rig, 0.2)], rig, rig_family).flat
-    assert not search_of([linear(rig, 0.2), deaf], rig, rig_family).flat
+    assert search_of([deaf, linear(rig, 0.2)], rig_setting).flat
+    assert not search_of([linear(rig, 0.2), deaf], rig_setting).flat
 
 
 def test_genes_stay_in_their_box(rig):
@@ -311,30 +310,32 @@ def test_genes_stay_in_their_box(rig):
     family = _core.Family.pid(rig, [(0, 1), (1, None)], list(zip(low, high, logarithmic, strict=True)))
     committee = [linear(rig, 0.1), linear(rig, 0.3)]
     genes = (
-        search_of(committee, rig, family, population=60, mutation_step=1.0).advance(5, WORKERS).archive_genes
+        search_of(committee, setting_of(rig, family), population=60, mutation_step=1.0)
+        .advance(5, WORKERS)
+        .archive_genes
     )
     assert (genes >= low).all() and (genes <= high).all()
 
 
-def test_every_asking_starts_from_another_random_population(committee, rig, rig_family):
-    one = search_of(committee, rig, rig_family, iteration=1)
-    two = search_of(committee, rig, rig_family, iteration=2)
+def test_every_asking_starts_from_another_random_population(committee, rig_setting):
+    one = search_of(committee, rig_setting, iteration=1)
+    two = search_of(committee, rig_setting, iteration=2)
     assert not same_bits(one.best_genes, two.best_genes)
     assert one.evaluations == 30
     assert one.advance(3, WORKERS).evaluations > 30
 
 
-def test_a_committee_of_two_kinds_is_refused(rig, rig_family):
+def test_a_committee_of_two_kinds_is_refused(rig, rig_setting):
     other = _core.Model(linear(rig, 0.1).program, "increment", rig)
     with pytest.raises(ValueError, match="all of one form"):
-        search_of([linear(rig, 0.1), other], rig, rig_family)
+        search_of([linear(rig, 0.1), other], rig_setting)
     with pytest.raises(ValueError, match="one model or more"):
-        search_of([], rig, rig_family)
+        search_of([], rig_setting)
 
 
-def test_a_task_that_starts_at_its_target_is_refused(rig, rig_family):
+def test_a_task_that_starts_at_its_target_is_refused(rig, rig_setting):
     with pytest.raises(ValueError, match="away from the initial state"):
-        search_of([linear(rig, 0.1)], rig, rig_family, _core.Task(START, START, 5))
+        search_of([linear(rig, 0.1)], rig_setting, _core.Task(START, START, 5))
 
 
 def test_dominance_is_what_the_oracle_says():

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from twinloop import _core, objectives
+from twinloop.limits import Limits
 
 DT, SCALE = 0.1, 2.0
 LAW = _core.Program.parse(
@@ -44,7 +45,7 @@ def run(seed, steps):
 
 
 def selected(runs):
-    empty = _core.SelectedTests(SIGNALS.engine, FAMILY.engine)
+    empty = _core.SelectedTests(Limits(SIGNALS).setting(FAMILY))
     for states, commands in runs:
         empty = empty.with_test([0.5, 0.5, 0.5], [0.0, 0.0], states, commands)
     return empty
@@ -155,7 +156,7 @@ def test_lagging_rotors_remember_what_was_commanded():
     start = np.array([0.3, -0.2, 0.1, 0.0, 0.0, 0.0])
     task = _core.Task(start, np.zeros(6), 6)
     gains = family.genes(system.default_gains)[np.newaxis]
-    flown = _core.rollout(plant, family.engine, gains, task, system.signals.engine)
+    flown = _core.rollout(plant, Limits(system.signals).setting(family), gains, task)
     commands, states = flown.commands[0], [start]
     for k in range(6):
         states.append(plant.step([states[-1]], commands[[k]], past=commands[np.newaxis, :k])[0])

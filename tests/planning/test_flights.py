@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from conftest import setting_of
 from oracles import same_bits
 from strategies import program_text
 from twinloop import _core, flights
@@ -38,15 +39,15 @@ def committee(rig):
 class Drawn:
     """K random candidates."""
 
-    def __init__(self, rig, family, count, excited=True, seed=0):
+    def __init__(self, setting, count, excited=True, seed=0):
         stream = np.random.default_rng(seed)
         self.genes = stream.uniform(0.0, 2.0, (count, 6))
         self.initial, self.target = stream.uniform(-1.0, 1.0, (2, count, 2))
         self.excitation = stream.normal(0.0, 1.0, (count, STEPS, 2)) if excited else None
         self.flights = _core.Flights(
-            rig, family, self.genes, self.initial, self.target, STEPS, excitation=self.excitation
+            setting, self.genes, self.initial, self.target, STEPS, excitation=self.excitation
         )
-        self.rig, self.family, self.count = rig, family, count
+        self.setting, self.count = setting, count
 
     def run(self, model, i, noise=None, offset=0.0):
         """The trajectory of one candidate, alone."""
@@ -55,7 +56,7 @@ class Drawn:
         noise = None if noise is None else noise[None]
         genes = self.genes[i : i + 1]
         return _core.rollout(
-            model, self.family, genes, task, self.rig, noise=noise, excitation=excitation
+            model, self.setting, genes, task, noise=noise, excitation=excitation
         )  # fmt: skip
 
 
@@ -81,8 +82,8 @@ def expected_usage(states):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("count", GROUPS)
 @pytest.mark.parametrize("costs", [(0.0, 0.0), (0.3, 0.02)])
-def test_every_flight_is_judged_by_its_own_trajectory(rig, rig_family, committee, kind, count, costs):
-    drawn, stream, weights = Drawn(rig, rig_family, count), np.random.default_rng(1), np.array([2.0, 0.5])
+def test_every_flight_is_judged_by_its_own_trajectory(rig_setting, committee, kind, count, costs):
+    drawn, stream, weights = Drawn(rig_setting, count), np.random.default_rng(1), np.array([2.0, 0.5])
     noise, offsets = stream.normal(0.0, 0.05, (3, STEPS + 1, 2)), stream.normal(0.0, 0.1, (3, 2))
     measure = _core.Quality(kind, weights, effort=costs[0], effort_rate=costs[1])
     qualities, usages = _core.qualities(
@@ -108,8 +109,8 @@ def test_every_flight_is_judged_by_its_own_trajectory(rig, rig_family, committee
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_measured_quality_is_that_of_the_readings(rig, rig_family, committee, kind):
-    drawn, weights = Drawn(rig, rig_family, 5), np.array([2.0, 0.5])
+def test_a_measured_quality_is_that_of_the_readings(rig_setting, committee, kind):
+    drawn, weights = Drawn(rig_setting, 5), np.array([2.0, 0.5])
     noise = np.random.default_rng(1).normal(0.0, 0.05, (3, STEPS + 1, 2))
     measure = _core.Quality(kind, weights, effort=0.3, effort_rate=0.02)
     found = _core.qualities(committee[:3], drawn.flights, measure, ENVELOPE, noise=noise, measured=True)
@@ -125,8 +126,8 @@ def test_a_measured_quality_is_that_of_the_readings(rig, rig_family, committee, 
     assert same_bits(silent[0], _core.qualities(committee[:3], drawn.flights, measure, ENVELOPE)[0])
 
 
-def test_without_draws_there_is_one_flight_without_noise(rig, rig_family, committee):
-    drawn, measure = Drawn(rig, rig_family, 5, excited=False), _core.Quality("iae", [1.0, 1.0])
+def test_without_draws_there_is_one_flight_without_noise(rig_setting, committee):
+    drawn, measure = Drawn(rig_setting, 5, excited=False), _core.Quality("iae", [1.0, 1.0])
     found = _core.qualities(committee, drawn.flights, measure, ENVELOPE)
     silent = _core.qualities(
         committee,
@@ -143,8 +144,8 @@ def test_without_draws_there_is_one_flight_without_noise(rig, rig_family, commit
     assert same_bits(only_offsets[0][:, 1], found[0][:, 0])
 
 
-def test_the_true_state_uses_the_envelope_and_states_without_one_do_not(rig, rig_family, committee):
-    drawn, measure = Drawn(rig, rig_family, 4), _core.Quality("iae", [1.0, 1.0])
+def test_the_true_state_uses_the_envelope_and_states_without_one_do_not(rig_setting, committee):
+    drawn, measure = Drawn(rig_setting, 4), _core.Quality("iae", [1.0, 1.0])
     assert (_core.qualities(committee[:3], drawn.flights, measure, [None, None])[1] == 0.0).all()
     noise = np.zeros((1, STEPS + 1, 2))
     noise[0, STEPS] = 100.0  # a reading that no command answers any more
@@ -166,8 +167,8 @@ def expected_disagreement(runs, sds, cap):
 
 @pytest.mark.parametrize("count", [*GROUPS, 140])
 @pytest.mark.parametrize("cap", [100.0, 3.0])
-def test_disagreement_is_the_log_determinant_of_the_deviations(rig, rig_family, committee, count, cap):
-    drawn, sds = Drawn(rig, rig_family, count), np.array([0.05, 0.2])
+def test_disagreement_is_the_log_determinant_of_the_deviations(rig_setting, committee, count, cap):
+    drawn, sds = Drawn(rig_setting, count), np.array([0.05, 0.2])
     values, where = _core.disagreements(committee, drawn.flights, sds, cap=cap)
     assert values.shape == (count,) and where.shape == (count, 4)
     for i in range(count):
@@ -187,8 +188,8 @@ def test_disagreement_is_the_log_determinant_of_the_deviations(rig, rig_family, 
             assert where[i].tolist() == place
 
 
-def test_members_that_agree_have_nothing_to_disagree_about(rig, rig_family, committee):
-    drawn = Drawn(rig, rig_family, 3)
+def test_members_that_agree_have_nothing_to_disagree_about(rig_setting, committee):
+    drawn = Drawn(rig_setting, 3)
     for alike in (committee[:1], [committee[0]] * 4):
         values, where = _core.disagreements(alike, drawn.flights, [0.1, 0.1])
         assert values == pytest.approx(np.zeros(3), abs=1e-12) and (values >= 0.0).all()
@@ -196,8 +197,8 @@ def test_members_that_agree_have_nothing_to_disagree_about(rig, rig_family, comm
 
 
 @pytest.mark.parametrize("count", [7, 70])
-def test_threads_and_widths_change_no_bit(rig, rig_family, committee, count):
-    drawn, stream = Drawn(rig, rig_family, count), np.random.default_rng(2)
+def test_threads_and_widths_change_no_bit(rig_setting, committee, count):
+    drawn, stream = Drawn(rig_setting, count), np.random.default_rng(2)
     noise = stream.normal(0.0, 0.05, (4, STEPS + 1, 2))
     measure = _core.Quality("iae", [1.0, 0.1], effort=0.1, effort_rate=0.1)
 
@@ -213,13 +214,13 @@ def test_threads_and_widths_change_no_bit(rig, rig_family, committee, count):
                 assert same_bits(a, b)
 
 
-def test_a_candidate_is_judged_alike_whoever_flies_beside_it(rig, rig_family, committee):
-    drawn, measure = Drawn(rig, rig_family, 40), _core.Quality("ise", [1.0, 1.0], effort=1.0)
+def test_a_candidate_is_judged_alike_whoever_flies_beside_it(rig_setting, committee):
+    drawn, measure = Drawn(rig_setting, 40), _core.Quality("ise", [1.0, 1.0], effort=1.0)
     qualities, _ = _core.qualities(committee, drawn.flights, measure, ENVELOPE)
     values, where = _core.disagreements(committee, drawn.flights, [0.1, 0.1])
     for i in (0, 13, 39):
         alone = _core.Flights(
-            rig, rig_family, drawn.genes[i : i + 1], drawn.initial[i : i + 1], drawn.target[i : i + 1], STEPS,
+            rig_setting, drawn.genes[i : i + 1], drawn.initial[i : i + 1], drawn.target[i : i + 1], STEPS,
             excitation=drawn.excitation[i : i + 1],
         )  # fmt: skip
         assert same_bits(_core.qualities(committee, alone, measure, ENVELOPE)[0][..., 0], qualities[..., i])
@@ -259,8 +260,9 @@ def test_flights_that_cannot_be_flown_are_refused(rig, rig_family, wrong):
     given = {**good, "excitation": None, "factor": 10.0, **wrong}
     with pytest.raises(ValueError, match="expected"):
         _core.Flights(
-            rig, rig_family, given["genes"], given["initial"], given["target"], given["steps"],
-            excitation=given["excitation"], divergence_factor=given["factor"],
+            setting_of(rig, rig_family, given["factor"]),
+            given["genes"], given["initial"], given["target"], given["steps"],
+            excitation=given["excitation"],
         )  # fmt: skip
 
 
@@ -289,13 +291,13 @@ JUDGEMENTS = {
 
 
 @pytest.mark.parametrize("call", JUDGEMENTS.values(), ids=JUDGEMENTS)
-def test_judgements_that_make_no_sense_are_refused(rig, rig_family, committee, call):
+def test_judgements_that_make_no_sense_are_refused(rig_setting, committee, call):
     with pytest.raises(ValueError, match="expected"):
-        call(committee, Drawn(rig, rig_family, 2).flights)
+        call(committee, Drawn(rig_setting, 2).flights)
 
 
-def test_a_plant_judges_no_flights_of_another_system(rig, rig_family, quadrotor):
-    drawn = Drawn(rig, rig_family, 2)
+def test_a_plant_judges_no_flights_of_another_system(rig_setting, quadrotor):
+    drawn = Drawn(rig_setting, 2)
     with pytest.raises(ValueError, match="quadrotor: expected 6 states"):
         _core.qualities(quadrotor.dynamics, drawn.flights, _core.Quality("iae", [1.0, 1.0]), ENVELOPE)
 

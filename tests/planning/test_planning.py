@@ -12,6 +12,7 @@ from twinloop import _core
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
+from twinloop.limits import Limits
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
@@ -51,7 +52,7 @@ def planner_of(known, **changes):
     options = options_of("default", {"candidates": 48, "evaluations": 256, "draws": 3, **changes})
     return Planner(
         family_of(known), TASK, quality_of("iae", known), options,
-        divergence_factor=10.0, seed=5, workers=_core.Workers(),
+        limits=Limits(known), seed=5, workers=_core.Workers(),
     )  # fmt: skip
 
 

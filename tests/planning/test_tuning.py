@@ -56,7 +56,7 @@ def test_the_effects_of_commands_are_those_of_a_plain_loop(actuators):
 
 @pytest.mark.parametrize("actuators", ACTUATORS)
 @pytest.mark.parametrize("form", ["increment", "acceleration"])
-def test_a_model_with_actuators_flies_as_a_plain_loop_does(rig, rig_family, form, actuators):
+def test_a_model_with_actuators_flies_as_a_plain_loop_does(rig, rig_setting, form, actuators):
     text = program_text(4, 2, 6, [["r4 = r1 * 0.1", "r5 = r2 * 0.4", "r4 = r4 + r5", "r5 = r3 - r1"]])
     if form == "acceleration":
         text = program_text(4, 1, 6, [["r4 = r2 * 2.0", "r5 = r3 - r1", "r4 = r4 + r5"]])
@@ -64,7 +64,7 @@ def test_a_model_with_actuators_flies_as_a_plain_loop_does(rig, rig_family, form
     model = _core.Model(program, form, rig, actuators)
     assert model.actuators == actuators
     genes, steps = np.random.default_rng(1).uniform(0.0, 2.0, (5, 6)), 20
-    runs = _core.rollout(model, rig_family, genes, _core.Task([0.4, 0.0], [-0.2, 0.0], steps), rig)
+    runs = _core.rollout(model, rig_setting, genes, _core.Task([0.4, 0.0], [-0.2, 0.0], steps))
     for i in range(len(genes)):
         lines = [Line(*actuator) for actuator in actuators]
 
@@ -130,7 +130,7 @@ def test_hidden_states_are_those_of_a_plain_loop(hidden):
 
 @pytest.mark.parametrize("actuators", [[(0.0, 0, None)] * 2, ACTUATORS[1]])
 @pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
-def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_family, form, actuators):
+def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_setting, form, actuators):
     hidden, scales = HIDDEN[2], np.array([1.0, 4.0])
     text = program_text(
         6, 2, 9, [["r6 = r1 * 0.1", "r8 = r2 * r4", "r6 = r6 + r8", "r7 = r3 - r1", "r7 = r7 + r5"]]
@@ -141,7 +141,7 @@ def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_family, 
     model = _core.Model(program, form, rig, actuators, hidden)
     assert model.hidden == hidden and model.actuators == actuators
     genes, steps = np.random.default_rng(1).uniform(0.0, 1.0, (3, 6)), 12
-    runs = _core.rollout(model, rig_family, genes, _core.Task([0.4, 0.0], [-0.2, 0.0], steps), rig)
+    runs = _core.rollout(model, rig_setting, genes, _core.Task([0.4, 0.0], [-0.2, 0.0], steps))
     for i in range(len(genes)):
         lasted = runs.lasted[i]
         effects = _core.command_effects(actuators, hidden, scales, 0.1, runs.commands[i, :lasted])
@@ -177,7 +177,7 @@ def test_hidden_states_that_there_are_none_of_are_refused(rig, hidden):
         _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2)
 
 
-def test_actuators_that_act_at_once_are_none(rig, rig_family):
+def test_actuators_that_act_at_once_are_none(rig, rig_setting):
     program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r2 + 0.0", "r5 = r3 + 0.0"]]))
     plain, direct = (
         _core.Model(program, "absolute", rig),
@@ -185,7 +185,7 @@ def test_actuators_that_act_at_once_are_none(rig, rig_family):
     )
     assert direct.actuators == []
     task, genes = _core.Task([0.4, 0.0], [-0.2, 0.0], 9), np.ones((1, 6))
-    runs = [_core.rollout(model, rig_family, genes, task, rig).states for model in (plain, direct)]
+    runs = [_core.rollout(model, rig_setting, genes, task).states for model in (plain, direct)]
     assert same_bits(*runs)
 
 
@@ -320,13 +320,14 @@ def residuals(values, records):
 
 UNIT = (3, "members", [0])
 CHAIN = [([0], [SENSOR], QUIET, True)]
+LIMITS = _core.Limits(_core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None]))
 
 
 def test_constants_and_a_lag_are_those_that_scipy_finds():
     records = [flown(1), flown(2)]
     start = (-0.8, 1.5, 0.2)
     tuned, left, readings, covariance, members = _core.tune(
-        lagging(*start), CHAIN, records, free=[0, 1], lags=[[0]], iterations=30, draws=400, unit=UNIT
+        lagging(*start), LIMITS, CHAIN, records, free=[0, 1], lags=[[0]], iterations=30, draws=400, unit=UNIT
     )
     expected = least_squares(residuals, start, args=(records,), xtol=1e-12, ftol=1e-12)
     errors = np.sqrt(np.diag(np.linalg.inv(expected.jac.T @ expected.jac)))
@@ -346,7 +347,7 @@ def test_constants_that_do_the_same_are_drawn_as_far_as_the_runs_bear_it():
     model = _core.Model(_core.Program.parse(program_text(2, 1, 4, [page])), "acceleration", signals)
     records = [flown(1, truth=(-1.3, 2.0, 1e-9)), flown(2, truth=(-1.3, 2.0, 1e-9))]
     tuned, left, _, covariance, members = _core.tune(
-        model, CHAIN, records, free=[0, 1, 2], lags=[], iterations=30, draws=200, unit=UNIT
+        model, LIMITS, CHAIN, records, free=[0, 1, 2], lags=[], iterations=30, draws=200, unit=UNIT
     )
     drawn = np.array([member.constants for member in members])
     outer, damping, inner = np.array(tuned.constants), drawn[:, 1], drawn[:, 0] * drawn[:, 2]
@@ -354,13 +355,13 @@ def test_constants_that_do_the_same_are_drawn_as_far_as_the_runs_bear_it():
     assert np.std(drawn[:, 0]) > 0.02 * abs(outer[0])
     # As the runs have it where b c is one constant, within what a hundred draws can tell and halving takes away.
     _, _, _, plain, _ = _core.tune(
-        lagging(-1.0, 2.0, 0.0), CHAIN, records, free=[0, 1], lags=[], iterations=30, draws=0
+        lagging(-1.0, 2.0, 0.0), LIMITS, CHAIN, records, free=[0, 1], lags=[], iterations=30, draws=0
     )
     errors = np.sqrt(np.diag(plain))
     assert 0.1 * errors[0] < np.std(damping) < 1.3 * errors[0]
     assert np.abs(inner - outer[0] * outer[2]).max() < 8.0 * errors[1]
     for member in members[:20]:
-        _, chi, *_ = _core.tune(member, CHAIN, records, free=[], lags=[], iterations=0)
+        _, chi, *_ = _core.tune(member, LIMITS, CHAIN, records, free=[], lags=[], iterations=0)
         assert chi <= left + 3.0 + 3.0 * np.sqrt(6.0) + 1e-6
 
 
@@ -368,39 +369,40 @@ def test_predictions_are_those_of_a_plain_loop_and_a_reading_that_does_not_count
     readings, weights, commands = flown(4)
     weights[37], readings[37] = 0.0, 3.0
     values = (-1.2, 1.9, 0.1)
-    [(errors, states)] = _core.predictions(lagging(*values), CHAIN, [(readings, weights, commands)])
+    [(errors, states)] = _core.predictions(lagging(*values), LIMITS, CHAIN, [(readings, weights, commands)])
     np.testing.assert_allclose(errors[:, 0], residuals(values, [(readings, weights, commands)]), atol=1e-6)
     assert errors[37, 0] == 0.0 and abs(states[37, 0] - 3.0) > 0.5
     _, left, counted, _, _ = _core.tune(
-        lagging(*values), CHAIN, [(readings, weights, commands)], free=[], lags=[], iterations=5
+        lagging(*values), LIMITS, CHAIN, [(readings, weights, commands)], free=[], lags=[], iterations=5
     )
     assert left == pytest.approx((errors**2).sum(), rel=1e-9) and counted == 120
 
 
 def test_only_what_is_free_moves_and_the_rest_stays_to_the_bit():
     start = (-0.8, 2.0, 0.12)
-    tuned, left, *_ = _core.tune(lagging(*start), CHAIN, [flown(1)], free=[0], lags=[], iterations=30)
+    tuned, left, *_ = _core.tune(lagging(*start), LIMITS, CHAIN, [flown(1)], free=[0], lags=[], iterations=30)
     assert tuned.constants[1] == 2.0 and tuned.actuators == [(0.12, 0, 0.0)]
     assert tuned.constants[0] == pytest.approx(-1.3, rel=0.05)
     assert left < (residuals(start, [flown(1)]) ** 2).sum()
-    same, *_ = _core.tune(lagging(*start), CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=0)
+    same, *_ = _core.tune(lagging(*start), LIMITS, CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=0)
     assert same.constants.tolist() == [-0.8, 2.0]
 
 
 def test_a_model_that_diverges_is_told_as_such():
     wild = lagging(40.0, 2.0, 0.1)
     _, left, _, covariance, members = _core.tune(
-        wild, CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=5, draws=2, unit=UNIT
+        wild, LIMITS, CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=5, draws=2, unit=UNIT
     )
     assert left == np.inf and covariance.size == 0
     assert [member.constants.tolist() for member in members] == [[40.0, 2.0]] * 2
-    assert _core.predictions(wild, CHAIN, [flown(1)]) is None
+    assert _core.predictions(wild, LIMITS, CHAIN, [flown(1)]) is None
 
 
 def test_tuning_gives_the_same_bits_for_any_workers():
     def bits(workers):
         model, left, _, covariance, members = _core.tune(
-            lagging(-0.8, 1.5, 0.2), CHAIN, [flown(1), flown(2)], free=[0, 1], lags=[[0]], iterations=6, draws=3,
+            lagging(-0.8, 1.5, 0.2), LIMITS, CHAIN, [flown(1), flown(2)],
+            free=[0, 1], lags=[[0]], iterations=6, draws=3,
             unit=UNIT, workers=workers,
         )  # fmt: skip
         return [*model.constants, left, *covariance.ravel(), *(c for m in members for c in m.constants)]
@@ -425,7 +427,7 @@ def test_tuning_gives_the_same_bits_for_any_workers():
 def test_parts_that_do_not_fit_the_model_are_refused(wrong):
     given = {"chains": CHAIN, "records": [flown(1)], "free": [0], "lags": [], **wrong}
     with pytest.raises(ValueError, match="expected"):
-        _core.tune(lagging(-1.0, 1.0, 0.1), given.pop("chains"), given.pop("records"), iterations=1, **given)
+        _core.tune(lagging(-1.0, 1.0, 0.1), LIMITS, iterations=1, **given)
 
 
 def test_the_time_of_a_hidden_state_is_tuned_with_the_constants():
@@ -454,6 +456,7 @@ def test_the_time_of_a_hidden_state_is_tuned_with_the_constants():
         records.append((readings, np.ones_like(readings), commands))
     tuned, left, readings, covariance, members = _core.tune(
         model(-0.9, 1.5, -0.4, 0.3),
+        LIMITS,
         CHAIN,
         records,
         free=[0, 1, 2],

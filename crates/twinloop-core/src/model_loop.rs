@@ -62,7 +62,7 @@ impl Problem for Models<'_> {
     }
 
     fn judge(&self, genomes: &[Arc<Learnt>], _generation: u64, workers: &Workers) -> Vec<Vec<f64>> {
-        workers.map_flights(self.selected.family(), genomes.len(), |i| {
+        workers.map_flights(self.selected.setting().family(), genomes.len(), |i| {
             let model = Model { code: &genomes[i].code, frame: self.frame };
             of_model(model, self.selected, workers.width())
         })

@@ -3,9 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::controller::Family;
 use crate::error::{Result, invalid};
 use crate::lanes::{groups, interleave, lanes_for};
+use crate::setting::Setting;
 use crate::signals::Signals;
 
 /// A test and what the system did under it.
@@ -59,10 +59,8 @@ pub(crate) struct Loops {
 /// Ω. A value: a further test makes a new one.
 #[derive(Clone, Debug)]
 pub struct SelectedTests {
-    signals: Arc<Signals>,
-    family: Arc<Family>,
+    setting: Arc<Setting>,
     experiments: Vec<Arc<Experiment>>,
-    limits: Vec<f64>,
     /// The transitions of all tests one after another.
     blocks: Vec<Block>,
     /// The rows of each test in them.
@@ -71,26 +69,23 @@ pub struct SelectedTests {
 }
 
 impl SelectedTests {
-    /// No test yet. A run that leaves `divergence_factor` times the scale of a state counts as diverged.
-    pub fn new(signals: Arc<Signals>, family: Arc<Family>, divergence_factor: f64) -> Result<Self> {
-        family.check(&signals)?;
-        let limits = signals.limits(divergence_factor)?;
+    /// No test yet.
+    pub fn new(setting: Arc<Setting>) -> Self {
         let (experiments, blocks, rows, loops) = Default::default();
-        Ok(Self { signals, family, experiments, limits, blocks, rows, loops })
+        Self { setting, experiments, blocks, rows, loops }
     }
 
     /// These and one more.
     pub fn with_test(&self, experiment: Experiment) -> Result<Self> {
         self.check(&experiment)?;
-        let states = self.signals.periods.continued(&experiment.states, self.signals.states());
+        let signals = self.signals();
+        let states = signals.periods.continued(&experiment.states, signals.states());
         let mut experiments = self.experiments.clone();
         experiments.push(Arc::new(Experiment { states, ..experiment }));
-        let (blocks, rows) = transitions(&experiments, self.signals.states(), self.signals.commands());
-        let of_group =
-            |group: Range<usize>| loops(&experiments[group], self.signals.states(), self.signals.commands());
+        let (blocks, rows) = transitions(&experiments, signals.states(), signals.commands());
+        let of_group = |group: Range<usize>| loops(&experiments[group], signals.states(), signals.commands());
         let loops = groups(experiments.len()).into_iter().map(of_group).collect();
-        let (signals, family, limits) = (self.signals.clone(), self.family.clone(), self.limits.clone());
-        Ok(Self { signals, family, experiments, limits, blocks, rows, loops })
+        Ok(Self { setting: self.setting.clone(), experiments, blocks, rows, loops })
     }
 
     /// Number of tests N.
@@ -103,14 +98,14 @@ impl SelectedTests {
         self.experiments.is_empty()
     }
 
-    /// The signals of the system.
-    pub fn signals(&self) -> &Arc<Signals> {
-        &self.signals
+    /// What they were run in.
+    pub fn setting(&self) -> &Setting {
+        &self.setting
     }
 
-    /// The family of the controllers.
-    pub fn family(&self) -> &Family {
-        &self.family
+    /// The signals of the system.
+    pub fn signals(&self) -> &Arc<Signals> {
+        self.setting.signals()
     }
 
     pub(crate) fn experiments(&self) -> impl Iterator<Item = &Experiment> {
@@ -119,11 +114,7 @@ impl SelectedTests {
 
     /// Recorded steps of each test.
     pub fn steps(&self) -> impl Iterator<Item = usize> {
-        self.experiments.iter().map(|experiment| experiment.commands.len() / self.signals.commands())
-    }
-
-    pub(crate) fn limits(&self) -> &[f64] {
-        &self.limits
+        self.experiments.iter().map(|experiment| experiment.commands.len() / self.signals().commands())
     }
 
     pub(crate) fn blocks(&self) -> &[Block] {
@@ -140,7 +131,8 @@ impl SelectedTests {
 
     fn check(&self, experiment: &Experiment) -> Result<()> {
         let Experiment { parameters, target, states, commands, excitation } = experiment;
-        let (n_x, n_u) = (self.signals.states(), self.signals.commands());
+        let (n_x, n_u) = (self.signals().states(), self.signals().commands());
+        let parameters_of_family = self.setting.family().parameters().len();
         let steps = commands.len() / n_u;
         if steps == 0 || commands.len() != steps * n_u || states.len() != (steps + 1) * n_x {
             return invalid(format!(
@@ -152,12 +144,11 @@ impl SelectedTests {
         }
         let rows = target.len() / n_x;
         let follows = rows == 1 || rows > steps;
-        if parameters.len() != self.family.parameters().len() || !target.len().is_multiple_of(n_x) || !follows
-        {
+        if parameters.len() != parameters_of_family || !target.len().is_multiple_of(n_x) || !follows {
             return invalid(format!(
                 "test: expected {} parameters and a target of {n_x} states, or a row of it for each recorded state, \
                  found {} and {}",
-                self.family.parameters().len(),
+                parameters_of_family,
                 parameters.len(),
                 target.len()
             ));

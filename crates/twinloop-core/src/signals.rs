@@ -87,17 +87,4 @@ impl Signals {
     pub fn commands(&self) -> usize {
         self.command_bounds.len()
     }
-
-    /// Magnitude of each state beyond which a run counts as diverged: `factor`, above 0, times its scale; a periodic state
-    /// may turn as often as it likes.
-    pub fn limits(&self, factor: f64) -> Result<Vec<f64>> {
-        if !(factor.is_finite() && factor > 0.0) {
-            return invalid(format!("divergence factor: expected a number above 0, found {factor}"));
-        }
-        let limit = |(state, scale): (usize, &f64)| match self.periods.of(state) {
-            None => scale * factor,
-            Some(_) => f64::INFINITY,
-        };
-        Ok(self.state_scales.iter().enumerate().map(limit).collect())
-    }
 }

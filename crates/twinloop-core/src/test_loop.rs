@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::controller::Family;
+use crate::controller::Parameters;
 use crate::error::{Result, invalid};
 use crate::evolution::{Problem, Search, Snapshot, Variation};
 use crate::model::{Frame, Model};
 use crate::model_loop::Learnt;
 use crate::objective::{discrimination, final_distances, instability};
 use crate::rng::{Purpose, Stream};
-use crate::signals::Signals;
+use crate::setting::Setting;
 use crate::task::Task;
 use crate::workers::Workers;
 
@@ -26,8 +26,6 @@ pub struct TestSettings {
     pub mutant_step: f64,
     /// Standard deviation of a mutation of a candidate, as a share of the gene's range.
     pub mutation_step: f64,
-    /// A run that leaves this times the scale of a state counts as diverged.
-    pub divergence_factor: f64,
 }
 
 impl TestSettings {
@@ -37,7 +35,7 @@ impl TestSettings {
     /// Refuses what no test can be judged with.
     pub fn validated(self) -> Result<Self> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
-        let numbers = [self.distance_cap, self.mutant_step, self.mutation_step, self.divergence_factor];
+        let numbers = [self.distance_cap, self.mutant_step, self.mutation_step];
         if !(1..=Self::MOST_MUTANTS).contains(&self.mutants) || !numbers.into_iter().all(positive) {
             return invalid(format!(
                 "test settings: expected numbers above 0 and at most {} mutants, found {self:?}",
@@ -52,22 +50,19 @@ impl TestSettings {
 struct Tests {
     committee: Vec<Arc<Learnt>>,
     frame: Arc<Frame>,
-    family: Arc<Family>,
+    setting: Arc<Setting>,
     task: Task,
-    limits: Vec<f64>,
     settings: TestSettings,
     seed: u64,
     iteration: u64,
 }
 
 impl Tests {
-    #[allow(clippy::too_many_arguments)]
     fn new(
         committee: Vec<Arc<Learnt>>,
         frame: Arc<Frame>,
-        family: Arc<Family>,
+        setting: Arc<Setting>,
         task: Task,
-        signals: &Signals,
         settings: TestSettings,
         seed: u64,
         iteration: u64,
@@ -76,9 +71,9 @@ impl Tests {
         if committee.is_empty() {
             return invalid("test search: expected a committee of one model or more, found none");
         }
-        family.check(signals)?;
-        if task.initial.len() != family.states() {
-            let (expected, found) = (family.states(), task.initial.len());
+        let signals = setting.signals();
+        if task.initial.len() != signals.states() {
+            let (expected, found) = (signals.states(), task.initial.len());
             return invalid(format!("test search: expected a task of {expected} states, found {found}"));
         }
         let distance = task.distance(&signals.periods);
@@ -88,21 +83,25 @@ impl Tests {
                 "test search: expected a target away from the initial state, at a finite distance, found one of {distance}"
             ));
         }
-        let limits = signals.limits(settings.divergence_factor)?;
-        Ok(Self { committee, frame, family, task, limits, settings, seed, iteration })
+        Ok(Self { committee, frame, setting, task, settings, seed, iteration })
+    }
+
+    /// The box of the candidates.
+    fn parameters(&self) -> &Parameters {
+        self.setting.family().parameters()
     }
 
     /// Final distances (models × candidates) on the first `models` members of the committee.
     fn distances(&self, models: usize, candidates: &[&[f64]], workers: &Workers) -> Vec<Vec<f64>> {
         let members = self.committee[..models].iter();
         let models: Vec<_> = members.map(|learnt| Model { code: &learnt.code, frame: &self.frame }).collect();
-        final_distances(&models, &self.family, candidates, &self.task, &self.limits, workers)
+        final_distances(&models, &self.setting, candidates, &self.task, workers)
     }
 
     /// The steps of one gain that make the mutants of every candidate of a generation.
     fn mutations(&self, generation: u64) -> Vec<(usize, f64)> {
         let mut stream = Stream::new(self.seed, Purpose::Mutants, self.iteration, generation, 0);
-        let genes = self.family.parameters().len();
+        let genes = self.parameters().len();
         let step = self.settings.mutant_step;
         (0..self.settings.mutants).map(|_| (stream.below(genes), step * stream.gaussian())).collect()
     }
@@ -121,12 +120,12 @@ impl Problem for Tests {
     }
 
     fn random(&self, stream: &mut Stream) -> Vec<f64> {
-        self.family.parameters().uniform(stream)
+        self.parameters().uniform(stream)
     }
 
     fn mutate(&self, parent: &Vec<f64>, stream: &mut Stream) -> Vec<f64> {
         let gene = stream.below(parent.len());
-        self.family.parameters().moved(parent, gene, self.settings.mutation_step * stream.gaussian())
+        self.parameters().moved(parent, gene, self.settings.mutation_step * stream.gaussian())
     }
 
     fn crossover(&self, first: &Vec<f64>, second: &Vec<f64>, stream: &mut Stream) -> Vec<f64> {
@@ -141,7 +140,7 @@ impl Problem for Tests {
         let candidates: Vec<&[f64]> = genomes.iter().map(|genome| &genome[..]).collect();
         let by_model = self.distances(self.committee.len(), &candidates, workers);
         let mutations = self.mutations(generation);
-        let parameters = self.family.parameters();
+        let parameters = self.parameters();
         let mutants: Vec<_> = candidates
             .iter()
             .flat_map(|candidate| {
@@ -150,7 +149,7 @@ impl Problem for Tests {
             .collect();
         let mutants: Vec<&[f64]> = mutants.iter().map(|mutant| &mutant[..]).collect();
         let of_mutants = self.distances(1, &mutants, workers).concat();
-        let cap = self.settings.distance_cap * self.task.distance(self.family.periods());
+        let cap = self.settings.distance_cap * self.task.distance(&self.setting.signals().periods);
         let row = |(i, of_mutants): (usize, &[f64])| {
             let on_best = by_model[0][i];
             if on_best.is_infinite() {
@@ -182,9 +181,8 @@ impl TestSearch {
     pub fn start(
         committee: Vec<Arc<Learnt>>,
         frame: Arc<Frame>,
-        family: Arc<Family>,
+        setting: Arc<Setting>,
         task: Task,
-        signals: &Signals,
         settings: TestSettings,
         variation: Variation,
         seed: u64,
@@ -192,7 +190,7 @@ impl TestSearch {
         workers: &Workers,
     ) -> Result<Self> {
         let variation = variation.validated()?;
-        let tests = Tests::new(committee, frame, family, task, signals, settings, seed, iteration)?;
+        let tests = Tests::new(committee, frame, setting, task, settings, seed, iteration)?;
         let search = Search::start(&tests, &variation, seed, iteration, workers);
         let candidates: Vec<&[f64]> = search.population().iter().map(|genome| &genome[..]).collect();
         let on_best = tests.distances(1, &candidates, workers).concat();
@@ -205,9 +203,8 @@ impl TestSearch {
     pub fn restored(
         committee: Vec<Arc<Learnt>>,
         frame: Arc<Frame>,
-        family: Arc<Family>,
+        setting: Arc<Setting>,
         task: Task,
-        signals: &Signals,
         settings: TestSettings,
         variation: Variation,
         snapshot: Snapshot<Vec<f64>>,
@@ -216,8 +213,8 @@ impl TestSearch {
     ) -> Result<Self> {
         let variation = variation.validated()?;
         let (seed, iteration) = (snapshot.seed, snapshot.iteration);
-        let tests = Tests::new(committee, frame, family, task, signals, settings, seed, iteration)?;
-        let parameters = tests.family.parameters();
+        let tests = Tests::new(committee, frame, setting, task, settings, seed, iteration)?;
+        let parameters = tests.parameters();
         if !snapshot.population.iter().chain(&snapshot.members).all(|genes| parameters.hold(genes)) {
             return invalid("test search: expected genes within the bounds of the family, found others");
         }

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use crate::controller::Family;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, with_test_lanes};
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
+use crate::setting::{Limits, Setting};
 use crate::task::Task;
 
 /// One run, step by step. After the step that it lasted to, nothing in it means anything.
@@ -47,17 +47,16 @@ impl<'a> Influences<'a> {
 /// Runs the controller of each parameter vector on the dynamics.
 pub fn record<D: Dynamics>(
     dynamics: &D,
-    family: &Family,
+    setting: &Setting,
     parameters: &[&[f64]],
     task: &Task,
-    limits: &[f64],
     influences: Influences<'_>,
     width: Width,
 ) -> Vec<Trajectory> {
     let runs = groups(parameters.len()).into_iter().flat_map(|group| {
         let influences = influences.of(&group);
         let parameters = &parameters[group];
-        dispatch(width, Record { dynamics, family, parameters, task, limits, influences })
+        dispatch(width, Record { dynamics, setting, parameters, task, influences })
     });
     runs.collect()
 }
@@ -65,30 +64,29 @@ pub fn record<D: Dynamics>(
 /// The same of one controller, one step after the other: for dynamics that have no lanes.
 pub fn record_one<D: Dynamics>(
     dynamics: &D,
-    family: &Family,
+    setting: &Setting,
     parameters: &[f64],
     task: &Task,
-    limits: &[f64],
     influences: Influences<'_>,
 ) -> Option<Trajectory> {
     let parameters = &[parameters];
-    Record { dynamics, family, parameters, task, limits, influences }.lanes::<Scalar>().pop()
+    Record { dynamics, setting, parameters, task, influences }.lanes::<Scalar>().pop()
 }
 
 /// A free run from a state (n_x) under recorded commands (n × n_u, n at least 1), without a controller.
 pub fn replay<D: Dynamics>(
     dynamics: &D,
+    limits: &Limits,
     initial: &[f64],
     commands: &[f64],
     steps: usize,
-    limits: &[f64],
 ) -> Trajectory {
     let rows: Vec<Scalar> = pack(&[commands]);
     let start = Start {
         commands: Commands::Record(&rows),
         initial: &pack::<Scalar, _>(&[initial]),
         steps,
-        limits,
+        limits: limits.magnitudes(),
         noise: &[],
         disturbance: &[],
     };
@@ -97,10 +95,9 @@ pub fn replay<D: Dynamics>(
 
 struct Record<'a, D> {
     dynamics: &'a D,
-    family: &'a Family,
+    setting: &'a Setting,
     parameters: &'a [&'a [f64]],
     task: &'a Task,
-    limits: &'a [f64],
     influences: Influences<'a>,
 }
 
@@ -119,14 +116,14 @@ impl<D: Dynamics> Record<'_, D> {
         let Task { initial, target, steps } = self.task;
         let start = Start {
             commands: Commands::Law {
-                family: self.family,
+                family: self.setting.family(),
                 parameters: &pack::<V, _>(self.parameters),
                 target: &pack::<V, _>(&[target]),
                 excitation: &pack::<V, _>(self.influences.excitation),
             },
             initial: &pack::<V, _>(&[initial]),
             steps: *steps,
-            limits: self.limits,
+            limits: self.setting.limits(),
             noise: &pack::<V, _>(self.influences.noise),
             disturbance: &pack::<V, _>(self.influences.disturbance),
         };

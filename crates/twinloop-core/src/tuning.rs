@@ -12,6 +12,7 @@ use crate::linear_algebra::Cholesky;
 use crate::model::{Frame, Model};
 use crate::regression::{Chain, Noise, Record, Whitening};
 use crate::rng::Stream;
+use crate::setting::Limits;
 use crate::workers::Workers;
 
 /// One chain of states with the noise of its sensors and of its motion.
@@ -46,8 +47,8 @@ pub struct Tuning<'a> {
     pub observer: &'a [Observed],
     /// The runs.
     pub records: &'a [Recorded],
-    /// Magnitude of each state at which a variant has diverged (n_x).
-    pub limits: &'a [f64],
+    /// Within which a variant has not diverged.
+    pub limits: &'a Limits,
     /// Constants of the code that may move.
     pub free: &'a [usize],
     /// Groups of lags, and of times of hidden states, that are one number which may move: commands by number, then
@@ -90,7 +91,7 @@ const HALVES: usize = 16;
 impl Tuning<'_> {
     /// Refuses parts that do not fit each other.
     pub fn check(&self) -> Result<()> {
-        let states = self.limits.len();
+        let states = self.limits.signals().states();
         let mut seen: Vec<usize> =
             self.observer.iter().flat_map(|observed| observed.states.clone()).collect();
         seen.sort_unstable();
@@ -235,7 +236,7 @@ impl Tuning<'_> {
     }
 
     fn whitenings(&self) -> Vec<Vec<Whitening>> {
-        let states = self.limits.len();
+        let states = self.limits.signals().states();
         let of_chain = |record: &Recorded, observed: &Observed| {
             let pick = |values: &[f64]| -> Vec<f64> {
                 values.chunks_exact(states).flat_map(|row| observed.states.iter().map(|&i| row[i])).collect()
@@ -422,7 +423,7 @@ impl Part<'_> {
     fn lanes<V: Vector>(&self) -> Run {
         let Tuning { code, frame, observer, records, limits, .. } = *self.tuning;
         let record = &records[self.record];
-        let (n_x, n_u) = (limits.len(), frame.commands());
+        let (n_x, n_u) = (limits.signals().states(), frame.commands());
         let constants: Vec<&[f64]> = self.variants.iter().map(|variant| &variant.constants[..]).collect();
         let lags: Vec<&[f64]> = self.variants.iter().map(|variant| &variant.lags[..]).collect();
         let model = Model { code, frame };
@@ -484,7 +485,7 @@ impl Part<'_> {
                     *gust = *gust * whitening.kept;
                 }
             }
-            for (state, &limit) in state.iter().zip(limits) {
+            for (state, &limit) in state.iter().zip(limits.magnitudes()) {
                 alive = state.abs().select_less(V::splat(limit), alive, V::splat(0.0));
             }
             if !V::splat(0.0).any_less(alive) {

@@ -11,12 +11,12 @@ use crate::arrays::{
     Cube, Matrix, RowsOrBlocks, Vector, VectorOrRows, optional_blocks, optional_rows, rows, to_cube,
     to_integer_rows, to_vector, vector, views,
 };
-use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
 use crate::law::flown;
 use crate::model::{PyModel, PySignals};
 use crate::objective::fitting;
 use crate::plant::PyQuadrotor;
+use crate::setting::PySetting;
 use crate::workers::{PyWorkers, or_default};
 
 /// Candidate flights of one length, each with its own gains, start, target and excitation.
@@ -27,22 +27,18 @@ pub struct PyFlights(Flights);
 impl PyFlights {
     #[new]
     #[pyo3(signature = (
-        signals, family, parameters, initial_states, target_states, steps, *,
-        excitation = None, divergence_factor = 10.0
+        setting, parameters, initial_states, target_states, steps, *, excitation = None
     ))]
-    #[expect(clippy::too_many_arguments, reason = "what flights differ by, named by keyword in Python")]
     fn new(
-        signals: &PySignals,
-        family: &PyFamily,
+        setting: &PySetting,
         parameters: Matrix<'_>,
         initial_states: Matrix<'_>,
         target_states: RowsOrBlocks<'_>,
         steps: usize,
         excitation: Option<Cube<'_>>,
-        divergence_factor: f64,
     ) -> Result<Self> {
-        let (n_x, n_u) = (signals.0.states(), signals.0.commands());
-        let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
+        let (n_x, n_u) = (setting.0.signals().states(), setting.0.signals().commands());
+        let parameters = rows("parameters", &parameters, setting.0.family().parameters().len())?;
         let initial = rows("initial states", &initial_states, n_x)?;
         let target = target_states.each();
         let count = parameters.len();
@@ -67,8 +63,7 @@ impl PyFlights {
                 excitation,
             })
             .collect();
-        let (signals, family) = (signals.0.clone(), family.0.clone());
-        Ok(Self(Flights::new(signals, family, &candidates, steps, divergence_factor)?))
+        Ok(Self(Flights::new(setting.0.clone(), &candidates, steps)?))
     }
 
     #[getter]

@@ -17,6 +17,7 @@ mod rng;
 mod rollout;
 mod search;
 mod selected;
+mod setting;
 mod tuning;
 mod workers;
 
@@ -56,6 +57,8 @@ mod _core {
     use crate::search::{PyModelSearch, PyTestSearch, PyTestSettings, PyVariation};
     #[pymodule_export]
     use crate::selected::PySelectedTests;
+    #[pymodule_export]
+    use crate::setting::{PyLimits, PySetting};
     #[pymodule_export]
     use crate::tuning::{predictions, tune};
     #[pymodule_export]

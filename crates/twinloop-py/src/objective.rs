@@ -5,12 +5,12 @@ use pyo3::prelude::*;
 use twinloop_core::{Model, Signals};
 
 use crate::arrays::{Matrix, rows, to_rows, to_vector, views};
-use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
 use crate::law::flown;
-use crate::model::{PyModel, PySignals};
-use crate::rollout::{PyTask, fits};
+use crate::model::PyModel;
+use crate::rollout::{self, PyTask};
 use crate::selected::PySelectedTests;
+use crate::setting::PySetting;
 use crate::workers::{PyWorkers, or_default};
 
 /// The models that a list of Python objects holds.
@@ -72,29 +72,24 @@ pub fn closed_loop<'py>(
 
 /// Distance of the last state to the target, a row for each model; infinite where the run diverged.
 #[pyfunction]
-#[pyo3(signature = (models, family, parameters, task, signals, *, divergence_factor = 10.0, workers = None))]
-#[expect(clippy::too_many_arguments, reason = "what a roll-out needs, named by keyword in Python")]
+#[pyo3(signature = (models, setting, parameters, task, *, workers = None))]
 pub fn final_distances<'py>(
     py: Python<'py>,
     models: Models<'py>,
-    family: &PyFamily,
+    setting: &PySetting,
     parameters: Matrix<'py>,
     task: &PyTask,
-    signals: &PySignals,
-    divergence_factor: f64,
     workers: Option<&PyWorkers>,
 ) -> Result<Bound<'py, PyArray2<f64>>> {
     let workers = or_default(workers)?;
-    let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
-    let models = fitting(&models, &signals.0)?;
-    fits(family, task, signals)?;
+    let (setting, task) = (&*setting.0, rollout::fitting(task, &setting.0)?);
+    let parameters = rows("parameters", &parameters, setting.family().parameters().len())?;
+    let models = fitting(&models, setting.signals())?;
     if !parameters.iter().flatten().all(|x| x.is_finite()) {
         return Err(misuse("parameters: expected finite numbers, found NaN or an infinite one".into()));
     }
-    let limits = signals.0.limits(divergence_factor)?;
-    let distances = flown(py, || {
-        twinloop_core::final_distances(&models, &family.0, &views(&parameters), &task.0, &limits, &workers)
-    })?;
+    let distances =
+        flown(py, || twinloop_core::final_distances(&models, setting, &views(&parameters), task, &workers))?;
     Ok(to_rows(py, [models.len(), parameters.len()], distances.concat()))
 }
 

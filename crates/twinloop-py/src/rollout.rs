@@ -5,17 +5,18 @@ use std::cell::RefCell;
 use numpy::{PyArray1, PyArray3};
 use pyo3::prelude::*;
 use twinloop_core::{
-    AnyDynamics, Dynamics, Influences, Signals, Task, Trajectory, Vector as Lanes, record, record_one,
+    AnyDynamics, Dynamics, Influences, Setting, Signals, Task, Trajectory, Vector as Lanes, record,
+    record_one,
 };
 
 use crate::arrays::{
     Cube, Matrix, Vector, VectorOrRows, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
 };
-use crate::controller::PyFamily;
-use crate::error::{CoreError, Result, misuse};
+use crate::error::{Result, misuse};
 use crate::law::{flown, raised};
-use crate::model::{PyModel, PySignals};
+use crate::model::PyModel;
 use crate::plant::PyQuadrotor;
+use crate::setting::{PyLimits, PySetting};
 use crate::workers::{PyWorkers, or_default};
 
 /// Where runs start, where they should end, how long they last.
@@ -84,32 +85,29 @@ impl PyRuns {
 /// Closes the loop of each controller around the dynamics.
 #[pyfunction]
 #[pyo3(signature = (
-    dynamics, family, parameters, task, signals, *,
-    noise = None, excitation = None, disturbance = None, divergence_factor = 10.0, workers = None
+    dynamics, setting, parameters, task, *, noise = None, excitation = None, disturbance = None, workers = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "what a roll-out needs, named by keyword in Python")]
 pub fn rollout(
     py: Python<'_>,
     dynamics: &Bound<'_, PyAny>,
-    family: &PyFamily,
+    setting: &PySetting,
     parameters: Matrix<'_>,
     task: &PyTask,
-    signals: &PySignals,
     noise: Option<Cube<'_>>,
     excitation: Option<Cube<'_>>,
     disturbance: Option<Cube<'_>>,
-    divergence_factor: f64,
     workers: Option<&PyWorkers>,
 ) -> PyResult<PyRuns> {
     let workers = or_default(workers)?;
-    let parameters = rows("parameters", &parameters, family.0.parameters().len())?;
-    let (steps, states, commands) = (task.0.steps, signals.0.states(), signals.0.commands());
-    fits(family, task, signals)?;
+    let (setting, task) = (&*setting.0, fitting(task, &setting.0)?);
+    let signals = setting.signals();
+    let parameters = rows("parameters", &parameters, setting.family().parameters().len())?;
+    let (steps, states, commands) = (task.steps, signals.states(), signals.commands());
     let count = parameters.len();
     let noise = optional_blocks("noise", noise, [count, steps + 1, states])?;
     let excitation = optional_blocks("excitation", excitation, [count, steps, commands])?;
     let disturbance = optional_blocks("disturbance", disturbance, [count, steps, states])?;
-    let limits = signals.0.limits(divergence_factor).map_err(CoreError::from)?;
     let numbers = [&parameters, &noise, &excitation, &disturbance];
     if !numbers.into_iter().flatten().flatten().all(|x| x.is_finite()) {
         return Err(misuse("rollout: expected finite numbers, found NaN or an infinite one".into()).into());
@@ -117,15 +115,15 @@ pub fn rollout(
     let (parameters, noise) = (views(&parameters), views(&noise));
     let (excitation, disturbance) = (views(&excitation), views(&disturbance));
     let influences = Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
-    let (family, task, width) = (&*family.0, &task.0, workers.width());
-    let runs = if let Some(known) = known(dynamics, &signals.0)? {
-        flown(py, || record(&known, family, &parameters, task, &limits, influences, width))?
+    let width = workers.width();
+    let runs = if let Some(known) = known(dynamics, signals)? {
+        flown(py, || record(&known, setting, &parameters, task, influences, width))?
     } else {
         let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
         let mut runs = Vec::new();
         for (i, parameters) in parameters.iter().enumerate() {
             let influences = influences.of(&(i..i + 1));
-            runs.extend(record_one(&step, family, parameters, task, &limits, influences));
+            runs.extend(record_one(&step, setting, parameters, task, influences));
             raised()?;
             if let Some(error) = step.failure.take() {
                 return Err(error);
@@ -138,16 +136,14 @@ pub fn rollout(
 
 /// A free run from a state under commands, each held for one period, without a controller.
 #[pyfunction]
-#[pyo3(signature = (dynamics, initial, commands, signals, *, divergence_factor = 10.0))]
 pub fn replay(
     py: Python<'_>,
     dynamics: &Bound<'_, PyAny>,
+    limits: &PyLimits,
     initial: Vector<'_>,
     commands: Matrix<'_>,
-    signals: &PySignals,
-    divergence_factor: f64,
 ) -> Result<PyRuns> {
-    let signals = &signals.0;
+    let (limits, signals) = (&limits.0, limits.0.signals());
     let (states, width) = (signals.states(), signals.commands());
     let (initial, commands) = (vector(&initial), rows("commands", &commands, width)?);
     let steps = commands.len();
@@ -161,8 +157,8 @@ pub fn replay(
             initial.len()
         )));
     };
-    let (commands, limits) = (commands.concat(), signals.limits(divergence_factor)?);
-    let run = py.detach(|| twinloop_core::replay(&dynamics, &initial, &commands, steps, &limits));
+    let commands = commands.concat();
+    let run = py.detach(|| twinloop_core::replay(&dynamics, limits, &initial, &commands, steps));
     Ok(PyRuns { runs: vec![run], steps, states, commands: width })
 }
 
@@ -177,12 +173,11 @@ fn known<'a>(dynamics: &'a Bound<'_, PyAny>, signals: &Signals) -> Result<Option
     Ok(Some(AnyDynamics::Quadrotor(&plant.get().0)))
 }
 
-/// Refuses controllers or a task that are not for the signals.
-pub fn fits(family: &PyFamily, task: &PyTask, signals: &PySignals) -> Result<()> {
-    family.0.check(&signals.0)?;
-    let (expected, found) = (signals.0.states(), task.0.initial.len());
+/// The task, unless it is not for the signals of the setting.
+pub fn fitting<'a>(task: &'a PyTask, setting: &Setting) -> Result<&'a Task> {
+    let (expected, found) = (setting.signals().states(), task.0.initial.len());
     if found == expected {
-        return Ok(());
+        return Ok(&task.0);
     }
     Err(misuse(format!("task: expected {expected} states, found {found}; make it for these signals")))
 }

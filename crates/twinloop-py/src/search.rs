@@ -10,7 +10,6 @@ use twinloop_core::{
 };
 
 use crate::arrays::{Matrix, rows, to_matrix, to_vector};
-use crate::controller::PyFamily;
 use crate::error::{Result, misuse};
 use crate::law::flown;
 use crate::model::{PyModel, PySignals};
@@ -18,6 +17,7 @@ use crate::pareto::{distance, matrix as objectives_of};
 use crate::program::{PyGrammar, PyProgram};
 use crate::rollout::PyTask;
 use crate::selected::PySelectedTests;
+use crate::setting::PySetting;
 use crate::workers::PyWorkers;
 
 /// How a generation is made out of the last.
@@ -263,7 +263,6 @@ impl PyTestSettings {
     #[new]
     #[pyo3(signature = (
         *, control_quality = false, distance_cap = 3.0, mutants = 10, mutant_step = 0.05, mutation_step = 0.1,
-        divergence_factor = 10.0,
     ))]
     fn new(
         control_quality: bool,
@@ -271,16 +270,8 @@ impl PyTestSettings {
         mutants: usize,
         mutant_step: f64,
         mutation_step: f64,
-        divergence_factor: f64,
     ) -> Result<Self> {
-        let settings = TestSettings {
-            control_quality,
-            distance_cap,
-            mutants,
-            mutant_step,
-            mutation_step,
-            divergence_factor,
-        };
+        let settings = TestSettings { control_quality, distance_cap, mutants, mutant_step, mutation_step };
         Ok(Self(settings.validated()?))
     }
 }
@@ -296,21 +287,20 @@ impl PyTestSearch {
     fn start(
         py: Python<'_>,
         committee: Vec<Bound<'_, PyModel>>,
-        family: &PyFamily,
+        setting: &PySetting,
         task: &PyTask,
-        signals: &PySignals,
         settings: &PyTestSettings,
         variation: &PyVariation,
         seed: u64,
         iteration: u64,
         workers: &PyWorkers,
     ) -> Result<Self> {
-        let (committee, frame) = judges(&committee, signals)?;
-        let (family, task, settings, variation) =
-            (family.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
+        let (committee, frame) = judges(&committee, setting.0.signals())?;
+        let (setting, task, settings, variation) =
+            (setting.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
         let search = flown(py, || {
             TestSearch::start(
-                committee, frame, family, task, &signals.0, settings, variation, seed, iteration, &workers.0,
+                committee, frame, setting, task, settings, variation, seed, iteration, &workers.0,
             )
         })??;
         Ok(Self(search))
@@ -320,9 +310,8 @@ impl PyTestSearch {
     #[expect(clippy::too_many_arguments, reason = "what a search is made with, and what it consists of")]
     fn restored(
         committee: Vec<Bound<'_, PyModel>>,
-        family: &PyFamily,
+        setting: &PySetting,
         task: &PyTask,
-        signals: &PySignals,
         settings: &PyTestSettings,
         variation: &PyVariation,
         counters: Counters,
@@ -333,16 +322,16 @@ impl PyTestSearch {
         archive_objectives: Matrix<'_>,
         workers: &PyWorkers,
     ) -> Result<Self> {
-        let (committee, frame) = judges(&committee, signals)?;
-        let (family, task, settings, variation) =
-            (family.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
+        let (committee, frame) = judges(&committee, setting.0.signals())?;
+        let (setting, task, settings, variation) =
+            (setting.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
         let genes = |genes: &Matrix<'_>| -> Result<Vec<Arc<Vec<f64>>>> {
-            Ok(rows("genes", genes, family.parameters().len())?.into_iter().map(Arc::new).collect())
+            Ok(rows("genes", genes, setting.family().parameters().len())?.into_iter().map(Arc::new).collect())
         };
         let (population, members) = (genes(&population)?, genes(&archive)?);
         let parts = snapshot(counters, population, &population_objectives, members, &archive_objectives)?;
         let search = TestSearch::restored(
-            committee, frame, family, task, &signals.0, settings, variation, parts, flat, &workers.0,
+            committee, frame, setting, task, settings, variation, parts, flat, &workers.0,
         )?;
         Ok(Self(search))
     }
@@ -423,9 +412,9 @@ fn to_genes<'py>(py: Python<'py>, tests: &[Arc<Vec<f64>>]) -> Bound<'py, PyArray
 }
 
 /// The committee of a test search, with the frame that its models share.
-fn judges(committee: &[Bound<'_, PyModel>], signals: &PySignals) -> Result<(Vec<Arc<Learnt>>, Arc<Frame>)> {
+fn judges(committee: &[Bound<'_, PyModel>], signals: &Signals) -> Result<(Vec<Arc<Learnt>>, Arc<Frame>)> {
     let frame = one_frame(committee)?;
-    committee.iter().try_for_each(|model| model.get().fits(&signals.0))?;
+    committee.iter().try_for_each(|model| model.get().fits(signals))?;
     Ok((committee.iter().map(|model| model.get().learnt.clone()).collect(), frame))
 }
 

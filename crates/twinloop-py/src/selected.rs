@@ -6,9 +6,8 @@ use pyo3::prelude::*;
 use twinloop_core::{Experiment, SelectedTests};
 
 use crate::arrays::{Matrix, Vector, VectorOrRows, optional_rows, rows, vector};
-use crate::controller::PyFamily;
 use crate::error::Result;
-use crate::model::PySignals;
+use crate::setting::PySetting;
 
 /// The tests that were run on the system, with their trajectories.
 #[pyclass(frozen, name = "SelectedTests", module = "twinloop._core")]
@@ -17,10 +16,8 @@ pub struct PySelectedTests(pub Arc<SelectedTests>);
 #[pymethods]
 impl PySelectedTests {
     #[new]
-    #[pyo3(signature = (signals, family, divergence_factor = 10.0))]
-    fn new(signals: &PySignals, family: &PyFamily, divergence_factor: f64) -> Result<Self> {
-        let selected = SelectedTests::new(signals.0.clone(), family.0.clone(), divergence_factor)?;
-        Ok(Self(Arc::new(selected)))
+    fn new(setting: &PySetting) -> Self {
+        Self(Arc::new(SelectedTests::new(setting.0.clone())))
     }
 
     #[pyo3(signature = (parameters, target, states, commands, excitation = None))]

@@ -2,12 +2,13 @@
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use twinloop_core::{Chain, Learnt, Noise, Observed, Recorded, Tuning};
+use twinloop_core::{Chain, Learnt, Noise, Observed, Recorded, Signals, Tuning};
 
 use crate::arrays::{Matrix, rows, to_matrix};
 use crate::error::{Result, misuse};
 use crate::model::PyModel;
 use crate::rng::Name;
+use crate::setting::PyLimits;
 use crate::workers::{PyWorkers, or_default};
 
 /// States, sensor variances, (process variance, gust variance, memory) and whether features are derivatives, for each
@@ -15,6 +16,12 @@ use crate::workers::{PyWorkers, or_default};
 type Chains = Vec<(Vec<usize>, Vec<f64>, (f64, f64, f64), bool)>;
 /// Readings, weights and commands of each run.
 type Records<'py> = Vec<(Matrix<'py>, Matrix<'py>, Matrix<'py>)>;
+
+/// The signals of the limits, unless the model is for others.
+fn fitting<'a>(model: &PyModel, limits: &'a PyLimits) -> Result<&'a Signals> {
+    model.fits(limits.0.signals())?;
+    Ok(limits.0.signals())
+}
 
 fn observer(chains: Chains, dt: f64) -> Result<Vec<Observed>> {
     let of_chain = |(states, sensors, (process, gust, memory), integrated): (
@@ -52,14 +59,14 @@ const MOST_DRAWS: usize = 1_000_000;
 /// free values, and members drawn from it.
 #[pyfunction]
 #[pyo3(signature = (
-    model, chains, records, *, free, lags, iterations, draws = 0, unit = None, divergence_factor = 10.0,
-    workers = None,
+    model, limits, chains, records, *, free, lags, iterations, draws = 0, unit = None, workers = None,
 ))]
 #[expect(clippy::too_many_arguments, reason = "what tuning needs, named by keyword in Python")]
 #[expect(clippy::type_complexity, reason = "a model, χ², readings, covariance, and the free values")]
 pub fn tune<'py>(
     py: Python<'py>,
     model: &PyModel,
+    limits: &PyLimits,
     chains: Chains,
     records: Records<'py>,
     free: Vec<usize>,
@@ -67,11 +74,10 @@ pub fn tune<'py>(
     iterations: usize,
     draws: usize,
     unit: Option<Name>,
-    divergence_factor: f64,
     workers: Option<&PyWorkers>,
 ) -> Result<(PyModel, f64, usize, Bound<'py, PyArray2<f64>>, Vec<PyModel>)> {
     let workers = or_default(workers)?;
-    let signals = model.signals();
+    let signals = fitting(model, limits)?;
     let effective = Learnt::new(model.learnt.program.effective());
     let observer = observer(chains, signals.dt)?;
     let records = recorded(&records, signals.states(), signals.commands())?;
@@ -80,7 +86,7 @@ pub fn tune<'py>(
         frame: &model.frame,
         observer: &observer,
         records: &records,
-        limits: &signals.limits(divergence_factor)?,
+        limits: &limits.0,
         free: &free,
         lags: &lags,
     };
@@ -112,29 +118,28 @@ pub fn tune<'py>(
 /// Whitened prediction errors (n + 1, n_x) and states once each reading was used (n + 1, n_x) of each run; none where
 /// the model diverges on one of them.
 #[pyfunction]
-#[pyo3(signature = (model, chains, records, *, divergence_factor = 10.0, workers = None))]
+#[pyo3(signature = (model, limits, chains, records, *, workers = None))]
 #[expect(clippy::type_complexity, reason = "two matrices for each run")]
 pub fn predictions<'py>(
     py: Python<'py>,
     model: &PyModel,
+    limits: &PyLimits,
     chains: Chains,
     records: Records<'py>,
-    divergence_factor: f64,
     workers: Option<&PyWorkers>,
 ) -> Result<Option<Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)>>> {
     let workers = or_default(workers)?;
-    let signals = model.signals();
+    let signals = fitting(model, limits)?;
     let observer = observer(chains, signals.dt)?;
     let n_x = signals.states();
     let records = recorded(&records, n_x, signals.commands())?;
-    let limits = signals.limits(divergence_factor)?;
     let core = model.core();
     let tuning = Tuning {
         code: core.code,
         frame: core.frame,
         observer: &observer,
         records: &records,
-        limits: &limits,
+        limits: &limits.0,
         free: &[],
         lags: &[],
     };

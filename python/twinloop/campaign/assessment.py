@@ -82,7 +82,7 @@ def rmse(twin: Twin, experiments: Sequence[Experiment]) -> Floats:
     for run in experiments:
         test = twin.as_flown(run.replayed, run.trajectory)
         # Without the committee's band, which `twin.simulate` would draw for each flight.
-        simulated = fly(twin.model, test, divergence_factor=twin.divergence_factor).states[1:]
+        simulated = fly(twin.model, test, limits=twin.limits).states[1:]
         flown = run.trajectory.states[1 : len(simulated) + 1]
         squares += np.square(twin.signals.difference(flown, simulated[: len(flown)])).sum(axis=0)
         rows += len(flown)
@@ -118,7 +118,7 @@ def _repeated(twin: Twin, setup: Setup, test: Test, gusts: bool) -> list[float]:
         draws = [(seen, moved if gusts else None) for seen, moved in zip(noise, moves, strict=True)]
     values = []
     for seen, moved in draws:
-        run = fly(twin.model, test, noise=seen, disturbance=moved, divergence_factor=twin.divergence_factor)
+        run = fly(twin.model, test, noise=seen, disturbance=moved, limits=twin.limits)
         lasted = run.steps == test.steps
         values.append(setup.quality.flown(run, test.target_state) if lasted else math.nan)
     return values

@@ -236,9 +236,7 @@ class Logbook(Recorded, kind="logbook"):
             InvalidInput: a test of another campaign, or a trajectory that cannot be learnt from.
         """
         known, signals = self.known(test), self.setup.signals
-        recorded = check_recorded(
-            trajectory, signals, known.steps, self.setup.options.divergence_factor, least
-        )
+        recorded = check_recorded(trajectory, self.setup.limits, known.steps, least)
         recorded = continued(recorded, signals, known.initial_state)
         _check_first_reading(recorded, known)
         before = judge(_with_run(self._none(known), known, recorded))
@@ -260,7 +258,7 @@ class Logbook(Recorded, kind="logbook"):
             InvalidInput: a trajectory that cannot be learnt from.
         """
         signals = self.setup.signals
-        recorded = check_recorded(trajectory, signals, None, self.setup.options.divergence_factor)
+        recorded = check_recorded(trajectory, self.setup.limits, None)
         recorded = continued(recorded, signals, recorded.states[0])
         replayed = driven(signals, recorded.states[0], recorded.commands)
         before = judge(_with_run(self._none(replayed), replayed, recorded))
@@ -457,13 +455,7 @@ class Logbook(Recorded, kind="logbook"):
         )
 
     def _enter(self, run: Experiment) -> None:
-        check_recorded(
-            run.trajectory,
-            self.setup.signals,
-            run.replayed.steps,
-            self.setup.options.divergence_factor,
-            least=1,
-        )
+        check_recorded(run.trajectory, self.setup.limits, run.replayed.steps, least=1)
         if run.attached:
             self.attached = _with_run(self.attached or self._none(run.replayed), run.replayed, run.trajectory)
         else:
@@ -478,9 +470,7 @@ class Logbook(Recorded, kind="logbook"):
     def _none(self, test: Test) -> _core.SelectedTests:
         """No selected tests yet, of the family of a test."""
         with engine_input():
-            return _core.SelectedTests(
-                self.setup.signals.engine, test.family.engine, self.setup.options.divergence_factor
-            )
+            return _core.SelectedTests(self.setup.limits.setting(test.family))
 
     def known(self, test: object) -> Test:
         """A test of this campaign.

@@ -22,6 +22,7 @@ from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.identification.terms.formulas import parsed_term
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import told
+from twinloop.limits import Limits
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS, Quality, quality_of
 from twinloop.records import Record, Recorded, checked_record, plain, read
@@ -67,6 +68,16 @@ class Setup(Recorded, kind="setup"):
     def task(self) -> _core.Task:
         """Start, target and length, for the native engine."""
         return _core.Task(self.initial_state, self.target_state, self.steps)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Where simulated runs count as diverged."""
+        return Limits(self.signals, self.options.divergence_factor)
+
+    @cached_property
+    def setting(self) -> _core.Setting:
+        """What tests are flown in, for the native engine."""
+        return self.limits.setting(self.family)
 
     @property
     def final_target(self) -> Floats:
@@ -126,7 +137,7 @@ class Setup(Recorded, kind="setup"):
 
     def none_selected(self) -> _core.SelectedTests:
         """No tests yet, for the native engine."""
-        return _core.SelectedTests(self.signals.engine, self.family.engine, self.options.divergence_factor)
+        return _core.SelectedTests(self.setting)
 
 
 def checked(
@@ -198,7 +209,7 @@ def checked(
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
     for what, state in (("initial_state", start), *(("target_state", row) for row in np.atleast_2d(target))):
-        _check_reachable(f"Campaign, {what}", state, signals, chosen.divergence_factor)
+        _check_reachable(f"Campaign, {what}", state, setup.limits)
         if isinstance(chosen, DefaultOptions):
             _check_inside(f"Campaign, {what}", state, signals, chosen.margin)
     _check_use(chosen, signals)
@@ -261,11 +272,10 @@ def _purpose(
     return "both", quality_of("final_distance", signals)
 
 
-def _check_reachable(what: str, values: Floats, signals: Signals, divergence_factor: float) -> None:
+def _check_reachable(what: str, values: Floats, limits: Limits) -> None:
     """Refuses a start or target where every run would have been cut."""
-    for value, state in zip(values, signals.states, strict=True):
-        limit = divergence_factor * state.scale
-        if abs(value) >= limit and not state.periodic:
+    for value, state, limit in zip(values, limits.signals.states, limits.states, strict=True):
+        if abs(value) >= limit:
             raise InvalidInput(
                 f"{what}: expected {state.name} within {limit:g} {state.unit}, the divergence factor times its scale,"
                 f" found {value:g}; give it in the unit that is declared, or declare a larger scale."

@@ -10,6 +10,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
+from twinloop.limits import Limits
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -23,7 +24,7 @@ def fly(
     *,
     noise: Floats | None = None,
     disturbance: Floats | None = None,
-    divergence_factor: float = 10.0,
+    limits: Limits | None = None,
 ) -> Trajectory:
     """Closes the loop of the test's controller around dynamics, with the test's excitation.
 
@@ -33,7 +34,7 @@ def fly(
         noise: what the sensors add to each state (n + 1, n_x), in the units of the states; None: nothing.
         disturbance: what is added to the true state after each step (n, n_x), such as process noise or gusts,
             in the units of the states; None: nothing.
-        divergence_factor: multiple of a state's scale beyond which the run counts as diverged and is cut.
+        limits: where the run counts as diverged and is cut; None: at ten times a state's scale.
 
     Returns:
         The measured run, with the true states beside it; cut before the step that diverged.
@@ -41,29 +42,25 @@ def fly(
     Raises:
         InvalidInput: the engine refused the arguments.
     """
-    signals = test.family.signals
+    within = limits or Limits(test.family.signals)
     with engine_input():
         runs = _core.rollout(
             dynamics,
-            test.family.engine,
+            within.setting(test.family),
             test.genes[np.newaxis],
             test.task,
-            signals.engine,
             noise=_one(noise),
             excitation=_one(test.excitation),
             disturbance=_one(disturbance),
-            divergence_factor=divergence_factor,
         )
-    return _trajectory(runs, test.steps, signals, divergence_factor)
+    return _trajectory(runs, test.steps, within)
 
 
 def fly_commands(
     dynamics: _core.Model | _core.Quadrotor,
     initial_state: Floats,
     commands: Floats,
-    signals: Signals,
-    *,
-    divergence_factor: float = 10.0,
+    limits: Limits,
 ) -> Trajectory:
     """A free run under given commands, without a controller.
 
@@ -71,8 +68,7 @@ def fly_commands(
         dynamics: an engine's model or plant.
         initial_state: where it starts (n_x,), in the units of the states.
         commands: each held for a period (n, n_u), n at least 1, in their units, sent as they are.
-        signals: of the dynamics.
-        divergence_factor: multiple of a state's scale beyond which the run counts as diverged and is cut.
+        limits: where the run counts as diverged and is cut, with the signals of the dynamics.
 
     Returns:
         The run; cut before the step that diverged.
@@ -81,19 +77,17 @@ def fly_commands(
         InvalidInput: the engine refused the arguments.
     """
     with engine_input():
-        runs = _core.replay(
-            dynamics, initial_state, commands, signals.engine, divergence_factor=divergence_factor
-        )
-    return _trajectory(runs, len(commands), signals, divergence_factor)
+        runs = _core.replay(dynamics, limits.engine, initial_state, commands)
+    return _trajectory(runs, len(commands), limits)
 
 
-def _trajectory(runs: _core.Runs, steps: int, signals: Signals, divergence_factor: float) -> Trajectory:
+def _trajectory(runs: _core.Runs, steps: int, limits: Limits) -> Trajectory:
     """The first of the runs."""
     lasted = int(runs.lasted[0])
     completed = lasted == steps
-    reason = "" if completed else _why_cut(runs.states[0, lasted], lasted, signals, divergence_factor)
+    reason = "" if completed else _why_cut(runs.states[0, lasted], lasted, limits)
     return Trajectory(
-        signals.dt * np.arange(lasted + 1, dtype=np.float64),
+        limits.signals.dt * np.arange(lasted + 1, dtype=np.float64),
         runs.measured[0, : lasted + 1],
         runs.commands[0, :lasted],
         ended="completed" if completed else "diverged",
@@ -124,14 +118,13 @@ def driven(signals: Signals, initial_state: Floats, commands: Floats) -> Test:
     )
 
 
-def _why_cut(last: Floats, lasted: int, signals: Signals, divergence_factor: float) -> str:
+def _why_cut(last: Floats, lasted: int, limits: Limits) -> str:
     """When a run was cut, and the state that was the furthest off a period before."""
-    scales = [np.inf if state.periodic else state.scale for state in signals.states]
-    worst = int(np.argmax(np.abs(last) / scales))
-    state = signals.states[worst]
+    worst = int(np.argmax(np.abs(last) / limits.states))
+    state = limits.signals.states[worst]
     return (
-        f"a state left {divergence_factor:g} times its scale, or stopped being finite,"
-        f" {(lasted + 1) * signals.dt:.3g} s after the start; before that {state.name} was at"
+        f"a state left {limits.divergence_factor:g} times its scale, or stopped being finite,"
+        f" {(lasted + 1) * limits.signals.dt:.3g} s after the start; before that {state.name} was at"
         f" {last[worst]:.3g} {state.unit}".rstrip()
     )
 

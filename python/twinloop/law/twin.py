@@ -22,6 +22,7 @@ from twinloop.law.law import Law
 from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import Noise
+from twinloop.limits import Limits
 from twinloop.records import Recorded, checked_record, from_text, read, to_text
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -80,7 +81,12 @@ class Twin(Recorded, kind="twin"):
         self.model = model
         self.signals = signals
         self.errors = ErrorTable(errors)
-        self.divergence_factor = divergence_factor
+        self.limits = Limits(signals, divergence_factor)
+
+    @property
+    def divergence_factor(self) -> float:
+        """Multiple of a state's scale beyond which a simulated run counts as diverged."""
+        return self.limits.divergence_factor
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
@@ -217,7 +223,7 @@ class Twin(Recorded, kind="twin"):
         if initial_state is not None:
             start = floats("Initial state", initial_state, (self.signals.n_x,))
             test = dataclasses.replace(test, initial_state=start)
-        run = fly(self.model, test, divergence_factor=self.divergence_factor)
+        run = fly(self.model, test, limits=self.limits)
         spread = self.spread(test)
         if spread is None or self.noise is None:
             return run
@@ -255,19 +261,18 @@ class Twin(Recorded, kind="twin"):
             return None
         noise, moves = self.noise.drawn(DRAWS, test.steps, Unit(self.seed).part(0).stream("band"))
         excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
+        setting = self.limits.setting(test.family)
         runs = []
         for member in self.members:
             with engine_input():
                 drawn = _core.rollout(
                     member,
-                    test.family.engine,
+                    setting,
                     np.tile(test.genes, (DRAWS, 1)),
                     test.task,
-                    self.signals.engine,
                     noise=noise,
                     disturbance=moves,
                     excitation=excitation,
-                    divergence_factor=self.divergence_factor,
                 )
             runs.append(drawn.states)
         states = np.concatenate(runs)
@@ -352,13 +357,7 @@ class Twin(Recorded, kind="twin"):
         if len(u) == 0:
             return Trajectory(np.zeros(1), state[np.newaxis], u)
         low, high = np.array([command.bounds for command in self.signals.commands]).T
-        return fly_commands(
-            self.model,
-            state,
-            np.clip(u, low, high),
-            self.signals,
-            divergence_factor=self.divergence_factor,
-        )
+        return fly_commands(self.model, state, np.clip(u, low, high), self.limits)
 
     def fit(self, trajectory: Trajectory) -> FitTable:
         """How well the twin's free run under the recorded commands, from the first reading, follows a record.
@@ -372,7 +371,7 @@ class Twin(Recorded, kind="twin"):
         Raises:
             InvalidInput: other columns, or no step.
         """
-        recorded = check_recorded(trajectory, self.signals, None, self.divergence_factor, least=1)
+        recorded = check_recorded(trajectory, self.limits, None, least=1)
         free = self.simulate_commands(recorded.states[0], recorded.commands).states
         read = continued(recorded, self.signals, recorded.states[0]).states[1:]
         lasted = len(free) > len(read)

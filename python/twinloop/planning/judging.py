@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.flights import candidates, qualities
+from twinloop.limits import Limits
 from twinloop.planning.quality import Quality
 from twinloop.streams import Unit
 
@@ -107,7 +108,7 @@ class Judge:
         family: of the controllers.
         task: of the flights.
         quality: what is minimised.
-        divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
+        limits: where a flight counts as diverged.
         seed: of the campaign.
         workers: how the work is carried out.
     """
@@ -118,7 +119,7 @@ class Judge:
         task: Task,
         quality: Quality,
         *,
-        divergence_factor: float,
+        limits: Limits,
         seed: int,
         workers: _core.Workers,
     ) -> None:
@@ -126,7 +127,7 @@ class Judge:
         self.signals = family.signals
         self.task = task
         self.quality = quality
-        self.divergence_factor = divergence_factor
+        self.limits = limits
         self.unit = Unit(seed)
         self.workers = workers
 
@@ -182,5 +183,5 @@ class Judge:
             target = np.tile(target, (len(genes), 1, 1))
         return candidates(
             self.family, genes, initial, target, self.task.steps,
-            excitation=excitation, divergence_factor=self.divergence_factor,
+            excitation=excitation, limits=self.limits,
         )  # fmt: skip

@@ -13,6 +13,7 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.elementary import log, power
 from twinloop.flights import disagreements
+from twinloop.limits import Limits
 from twinloop.planning.candidates import Candidates, candidates
 from twinloop.planning.excitation import binary, chirps
 from twinloop.planning.gains import nearby, tune_gains
@@ -89,7 +90,7 @@ class Planner(Judge):
         task: of the flights.
         quality: what is minimised.
         options: of the planning.
-        divergence_factor: multiple of a state's scale beyond which a flight counts as diverged.
+        limits: where a flight counts as diverged.
         seed: of the campaign.
         workers: how the work is carried out.
         watch: called now and then, with what is being done.
@@ -102,14 +103,12 @@ class Planner(Judge):
         quality: Quality,
         options: PlanningOptions,
         *,
-        divergence_factor: float,
+        limits: Limits,
         seed: int,
         workers: _core.Workers,
         watch: Callable[[str], None] = lambda step: None,
     ) -> None:
-        super().__init__(
-            family, task, quality, divergence_factor=divergence_factor, seed=seed, workers=workers
-        )
+        super().__init__(family, task, quality, limits=limits, seed=seed, workers=workers)
         self.options = options
         self.watch = watch
 

@@ -52,7 +52,7 @@ pub fn disagreements<D: Dynamics + Sync>(
     }
     let mut found = Vec::with_capacity(flights.len());
     for batch in flights.groups.chunks(BATCH) {
-        let runs = workers.map_flights(&flights.family, batch.len() * members.len(), |unit| {
+        let runs = workers.map_flights(flights.setting.family(), batch.len() * members.len(), |unit| {
             let (group, member) = (&batch[unit / members.len()], &members[unit % members.len()]);
             dispatch(workers.width(), Fly { member, flights, group })
         });

@@ -13,10 +13,10 @@ pub use quality::{Quality, QualityKind};
 
 use std::sync::Arc;
 
-use crate::controller::Family;
 use crate::error::{Result, invalid};
 use crate::lanes::{Vector, groups, interleave, lanes_for, vectors};
 use crate::rollout::{Commands, Start};
+use crate::setting::Setting;
 use crate::signals::Signals;
 use crate::task::{Task, is_target};
 
@@ -36,24 +36,15 @@ pub struct Candidate {
 /// Candidates of one length, laid out for lanes.
 #[derive(Clone, Debug)]
 pub struct Flights {
-    signals: Arc<Signals>,
-    family: Arc<Family>,
+    setting: Arc<Setting>,
     steps: usize,
-    limits: Vec<f64>,
     groups: Vec<Group>,
 }
 
 impl Flights {
-    /// Candidates that fly `steps` steps each, all with an excitation or none of them, all to constant targets or none. A flight that leaves
-    /// `divergence_factor` times the scale of a state counts as diverged.
-    pub fn new(
-        signals: Arc<Signals>,
-        family: Arc<Family>,
-        candidates: &[Candidate],
-        steps: usize,
-        divergence_factor: f64,
-    ) -> Result<Self> {
-        family.check(&signals)?;
+    /// Candidates that fly `steps` steps each, all with an excitation or none of them, all to constant targets or none.
+    pub fn new(setting: Arc<Setting>, candidates: &[Candidate], steps: usize) -> Result<Self> {
+        let (signals, family) = (setting.signals(), setting.family());
         if candidates.is_empty() || !(1..=Task::MOST_STEPS).contains(&steps) {
             return invalid(format!(
                 "flights: expected at least one candidate of 1 to {} steps, found {} of {steps}",
@@ -61,7 +52,6 @@ impl Flights {
                 candidates.len()
             ));
         }
-        let limits = signals.limits(divergence_factor)?;
         let excitation = if candidates[0].excitation.is_empty() { 0 } else { steps * signals.commands() };
         let target = candidates[0].target.len();
         if !is_target(target, signals.states(), steps) {
@@ -85,7 +75,7 @@ impl Flights {
         }
         let groups =
             groups(candidates.len()).into_iter().map(|group| Group::new(&candidates[group])).collect();
-        Ok(Self { signals, family, steps, limits, groups })
+        Ok(Self { setting, steps, groups })
     }
 
     /// Number of candidates, K.
@@ -105,7 +95,7 @@ impl Flights {
 
     /// The signals of the system.
     pub fn signals(&self) -> &Arc<Signals> {
-        &self.signals
+        self.setting.signals()
     }
 
     /// What a roll-out of a group starts from.
@@ -113,14 +103,14 @@ impl Flights {
     fn start<'a, V: Vector>(&'a self, lanes: &'a GroupLanes<V>, noise: &'a [V]) -> Start<'a, V> {
         Start {
             commands: Commands::Law {
-                family: &self.family,
+                family: self.setting.family(),
                 parameters: &lanes.parameters,
                 target: &lanes.target,
                 excitation: &lanes.excitation,
             },
             initial: &lanes.initial,
             steps: self.steps,
-            limits: &self.limits,
+            limits: self.setting.limits(),
             noise,
             disturbance: &[],
         }

@@ -72,7 +72,7 @@ pub fn qualities<D: Dynamics + Sync>(
     }
     draws.check(flights)?;
     let (groups, count) = (flights.groups.len(), draws.count());
-    let judged = workers.map_flights(&flights.family, dynamics.len() * count * groups, |unit| {
+    let judged = workers.map_flights(flights.setting.family(), dynamics.len() * count * groups, |unit| {
         let (draw, group) = (unit / groups % count, &flights.groups[unit % groups]);
         let dynamics = &dynamics[unit / groups / count];
         let row = |rows: &[&'_ [f64]]| rows.get(draw).map_or(vec![], |row| row.to_vec());

@@ -32,14 +32,14 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
         let states = self.selected.signals().states();
         let start = Start {
             commands: Commands::Law {
-                family: self.selected.family(),
+                family: self.selected.setting().family(),
                 parameters: &vectors::<V>(&loops.parameters),
                 target: &vectors::<V>(&loops.target),
                 excitation: &vectors::<V>(&loops.excitation),
             },
             initial: &vectors::<V>(&loops.initial),
             steps: loops.steps.iter().copied().max().unwrap_or(0),
-            limits: self.selected.limits(),
+            limits: self.selected.setting().limits(),
             noise: &[],
             disturbance: &[],
         };

@@ -1,37 +1,35 @@
 //! Final distance: how far from its target a closed loop ends, δ = ‖η_n − η_d‖.
 
-use crate::controller::Family;
 use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_test_lanes};
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
+use crate::setting::Setting;
 use crate::task::{Task, target_at};
 use crate::workers::Workers;
 
 /// Final distances of each controller on each of the dynamics (dynamics × controllers); infinite where the run diverged.
 pub fn final_distances<D: Dynamics + Sync>(
     dynamics: &[D],
-    family: &Family,
+    setting: &Setting,
     parameters: &[&[f64]],
     task: &Task,
-    limits: &[f64],
     workers: &Workers,
 ) -> Vec<Vec<f64>> {
     let groups = groups(parameters.len());
-    let distances = workers.map_flights(family, dynamics.len() * groups.len(), |unit| {
+    let distances = workers.map_flights(setting.family(), dynamics.len() * groups.len(), |unit| {
         let (dynamics, group) = (&dynamics[unit / groups.len()], groups[unit % groups.len()].clone());
         let parameters = &parameters[group];
-        dispatch(workers.width(), OfGroup { dynamics, family, parameters, task, limits })
+        dispatch(workers.width(), OfGroup { dynamics, setting, parameters, task })
     });
     distances.chunks(groups.len().max(1)).map(<[_]>::concat).collect()
 }
 
 struct OfGroup<'a, D> {
     dynamics: &'a D,
-    family: &'a Family,
+    setting: &'a Setting,
     parameters: &'a [&'a [f64]],
     task: &'a Task,
-    limits: &'a [f64],
 }
 
 impl<D: Dynamics> Kernel for OfGroup<'_, D> {
@@ -50,18 +48,18 @@ impl<D: Dynamics> OfGroup<'_, D> {
         let target: Vec<V> = pack(&[target]);
         let start = Start {
             commands: Commands::Law {
-                family: self.family,
+                family: self.setting.family(),
                 parameters: &pack::<V, _>(self.parameters),
                 target: &target,
                 excitation: &[],
             },
             initial: &pack::<V, _>(&[initial]),
             steps: *steps,
-            limits: self.limits,
+            limits: self.setting.limits(),
             noise: &[],
             disturbance: &[],
         };
-        let periods = self.family.periods();
+        let periods = &self.setting.signals().periods;
         let target = target_at(&target, initial.len(), *steps);
         let mut last = LastStep { periods, steps: *steps, target, squared: V::splat(0.0) };
         let lasted = rollout(self.dynamics, &start, &mut last);

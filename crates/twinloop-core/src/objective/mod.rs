@@ -66,7 +66,7 @@ pub fn k_steps(
 
 /// Closed loop of each model on each selected test (models × N).
 pub fn closed_loops(models: &[Model<'_>], selected: &SelectedTests, workers: &Workers) -> Vec<Vec<Outcome>> {
-    workers.map_flights(selected.family(), models.len(), |i| {
+    workers.map_flights(selected.setting().family(), models.len(), |i| {
         dispatch(workers.width(), ClosedLoop { dynamics: models[i], selected })
     })
 }

@@ -68,7 +68,7 @@ proptest! {
         let frame = Frame::new(form, &world.signals);
         let model = Model { code: &Code::new(&program), frame: &frame };
         let task = Task::new(initial, target, steps).unwrap();
-        let limits = world.signals.limits(10.0).unwrap();
+        let setting = world.setting(10.0);
         let rows = |count: usize, factor: f64| -> Vec<Vec<f64>> {
             gains.iter().map(|g| (0..count).map(|i| factor * g[i % 6]).collect()).collect()
         };
@@ -77,14 +77,14 @@ proptest! {
         let (noise, excitation, disturbance) = (slices(&noise), slices(&excitation), slices(&disturbance));
         let influences =
             Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
-        let runs = |width| record(&model, &world.family, &slices(&gains), &task, &limits, influences, width);
+        let runs = |width| record(&model, &setting, &slices(&gains), &task, influences, width);
         let equal = |a: &[Trajectory], b: &[Trajectory]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same_run(a, b))
         };
         prop_assert!(same_with_every_width(runs, equal));
         let distances = |width| {
             let workers = Workers::new(1, width).unwrap();
-            final_distances(&[model, model], &world.family, &slices(&gains), &task, &limits, &workers)
+            final_distances(&[model, model], &setting, &slices(&gains), &task, &workers)
         };
         prop_assert!(same_with_every_width(distances, all_rows_same));
     }

@@ -1,11 +1,9 @@
 //! What models are judged by, against a computation test by test and step by step.
 
-use std::sync::Arc;
-
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Experiment, Form, Frame, Model, Outcome, Program, SelectedTests, Signals, Width, Workers,
-    closed_loops, of_model, open_loops,
+    Code, Experiment, Form, Frame, Model, Outcome, Program, SelectedTests, Width, Workers, closed_loops,
+    of_model, open_loops,
 };
 
 use crate::oracle::{Pids, close, run, step};
@@ -27,10 +25,10 @@ fn expected_open_loop(world: &World, form: Form, program: &Program, experiment: 
 
 fn expected_closed_loop(world: &World, form: Form, program: &Program, experiment: &Experiment) -> f64 {
     let (recorded, n) = (rows(experiment), experiment.commands.len() / COMMANDS);
-    let limits = world.signals.limits(10.0).unwrap();
+    let limits = world.limits(10.0);
     let step = |state: &[f64], command: &[f64]| step(world, program, form, state, command);
     let controller = Pids::new(world, &experiment.parameters);
-    let run = run(step, controller, [recorded[0], &experiment.target], n, &limits, &[]);
+    let run = run(step, controller, [recorded[0], &experiment.target], n, limits.magnitudes(), &[]);
     if run.lasted < n {
         return 1e6 * (2.0 - run.lasted as f64 / n as f64);
     }
@@ -179,9 +177,7 @@ fn a_prediction_that_is_not_finite_is_worth_a_run_that_diverges_at_once() {
 
 #[test]
 fn an_error_beyond_the_largest_number_is_worth_a_run_that_diverges_at_once() {
-    let World { signals, family, .. } = World::new();
-    let vast = Signals { state_scales: vec![1e200; STATES], ..(*signals).clone() };
-    let selected = SelectedTests::new(Arc::new(vast), family, 10.0).unwrap().with_test(still(3)).unwrap();
+    let selected = World::new().within(vec![1e200; STATES]).selected(&[still(3)]);
     let text = "program inputs=5 outputs=3 registers=8\npage 1\nr5 = r5 + 1e200\n";
     assert_eq!(objectives(Form::Increment, &text.parse().unwrap(), &selected), [vec![2e6], vec![2e6]]);
 }

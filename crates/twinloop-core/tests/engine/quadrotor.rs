@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Dynamics, Family, Gyroscopic, Influences, Mixer, Pid, Quadrotor, Scalar, Task, Trajectory, Vector, Width,
-    record, step_rows,
+    Dynamics, Family, Gyroscopic, Influences, Limits, Mixer, Periods, Pid, Quadrotor, Scalar, Setting,
+    Signals, Task, Trajectory, Vector, Width, record, step_rows,
 };
 
 use crate::oracle::rk4;
@@ -42,7 +42,18 @@ fn first_flight(gyroscopic: Gyroscopic) -> Trajectory {
     let target = vec![degrees(-30.0), degrees(30.0), degrees(-70.0), 0.0, 0.0, 0.0];
     let task = Task::new(vec![0.0; 6], target, 100).unwrap();
     let gains = [0.03, 0.004, 0.024, 0.03, 0.004, 0.024, 0.052, 0.004, 0.0416];
-    record(&plant, &family, &[&gains], &task, &[1e9; 6], Influences::default(), Width::widest()).remove(0)
+    let signals = Signals {
+        dt: 0.02,
+        state_scales: vec![1.0; 6],
+        command_bounds: vec![(0.0, 300.0); 4],
+        command_scales: vec![300.0; 4],
+        derivative_of: vec![None; 6],
+        kinematics: None,
+        periods: Periods::default(),
+    };
+    let limits = Limits::new(Arc::new(signals.validated().unwrap()), 1e9).unwrap();
+    let setting = Setting::new(limits, Arc::new(family)).unwrap();
+    record(&plant, &setting, &[&gains], &task, Influences::default(), Width::widest()).remove(0)
 }
 
 fn final_distance(flight: &Trajectory) -> f64 {

@@ -16,16 +16,16 @@ fn slices(rows: &[Vec<f64>]) -> Vec<&[f64]> {
 }
 
 /// A learnt system and the runs of several controllers on it.
-struct Setting {
+struct Scene {
     world: World,
     frame: Frame,
     code: Code,
     program: Program,
     task: Task,
-    limits: Vec<f64>,
+    factor: f64,
 }
 
-impl Setting {
+impl Scene {
     fn new(
         form: Form,
         program: Program,
@@ -38,9 +38,9 @@ impl Setting {
             frame: Frame::new(form, &world.signals),
             code: Code::new(&program),
             task: Task::new(initial, target, steps).unwrap(),
-            limits: world.signals.limits(factor).unwrap(),
             world,
             program,
+            factor,
         }
     }
 
@@ -48,7 +48,7 @@ impl Setting {
         let model = Model { code: &self.code, frame: &self.frame };
         let (gains, noise) = (slices(gains), slices(noise));
         let influences = Influences { noise: &noise, ..Influences::default() };
-        record(&model, &self.world.family, &gains, &self.task, &self.limits, influences, Width::widest())
+        record(&model, &self.world.setting(self.factor), &gains, &self.task, influences, Width::widest())
     }
 
     fn expected(&self, gains: &[f64], noise: &[f64]) -> crate::oracle::Run {
@@ -56,7 +56,8 @@ impl Setting {
         let step = |state: &[f64], command: &[f64]| {
             step(&self.world, &self.program, self.frame.form(), state, command)
         };
-        run(step, Pids::new(&self.world, gains), [initial, target], *steps, &self.limits, noise)
+        let limits = self.world.limits(self.factor);
+        run(step, Pids::new(&self.world, gains), [initial, target], *steps, limits.magnitudes(), noise)
     }
 }
 
@@ -101,14 +102,14 @@ proptest! {
         factor in 0.5..10.0,
         noisy in any::<bool>(),
     ) {
-        let setting = Setting::new(form, program, ends, steps, factor);
+        let scene = Scene::new(form, program, ends, steps, factor);
         let noise = |gains: &Vec<f64>| (0..(steps + 1) * STATES).map(|i| 0.1 * gains[i % 6]).collect::<Vec<f64>>();
         let noise: Vec<Vec<f64>> = if noisy { gains.iter().map(noise).collect() } else { vec![] };
-        let runs = setting.record(&gains, &noise);
+        let runs = scene.record(&gains, &noise);
         prop_assert_eq!(runs.len(), gains.len());
         for (l, (found, gains)) in runs.iter().zip(&gains).enumerate() {
             let noise = noise.get(l).map_or(&[][..], |noise| noise);
-            let expected = setting.expected(gains, noise);
+            let expected = scene.expected(gains, noise);
             prop_assert_eq!(found.lasted, expected.lasted);
             for (found, expected) in [
                 (&found.states, &expected.states),
@@ -135,11 +136,11 @@ proptest! {
         gains in gains(),
         steps in 1..25_usize,
     ) {
-        let setting = Setting::new(form, program, ends, steps, 10.0);
-        let run = setting.record(&[gains], &[]).remove(0);
-        let model = Model { code: &setting.code, frame: &setting.frame };
+        let scene = Scene::new(form, program, ends, steps, 10.0);
+        let run = scene.record(&[gains], &[]).remove(0);
+        let model = Model { code: &scene.code, frame: &scene.frame };
         let sent = run.commands.len() / 2;
-        let again = replay(&model, &setting.task.initial, &run.commands, sent, &setting.limits);
+        let again = replay(&model, &scene.world.limits(10.0), &scene.task.initial, &run.commands, sent);
         prop_assert_eq!(again.lasted, run.lasted.min(sent));
         prop_assert!(all_same(&again.states, &run.states));
     }
@@ -150,13 +151,13 @@ proptest! {
         ends in [state(), state()],
         gains in prop::collection::vec(gains(), 1..12),
     ) {
-        let mut setting = Setting::new(form, program, ends, 12, 10.0);
-        let inside = setting.record(&gains, &[]);
-        let bounds = setting.world.signals.command_bounds.clone();
-        let law = Arc::new(Outside(setting.world.family.clone()));
+        let mut scene = Scene::new(form, program, ends, 12, 10.0);
+        let inside = scene.record(&gains, &[]);
+        let bounds = scene.world.signals.command_bounds.clone();
+        let law = Arc::new(Outside(scene.world.family.clone()));
         let family = Family::foreign(law, vec![free(-1.0, 5.0); GAINS], STATES, bounds).unwrap();
-        setting.world.family = Arc::new(family);
-        for (found, expected) in setting.record(&gains, &[]).iter().zip(&inside) {
+        scene.world.family = Arc::new(family);
+        for (found, expected) in scene.record(&gains, &[]).iter().zip(&inside) {
             prop_assert_eq!(found.lasted, expected.lasted);
             let lasted = expected.lasted;
             prop_assert!(all_same(&found.states[..(lasted + 1) * STATES], &expected.states[..(lasted + 1) * STATES]));
@@ -171,11 +172,11 @@ proptest! {
         gains in prop::collection::vec(gains(), 32),
         place in 0..32_usize,
     ) {
-        let setting = Setting::new(form, program, ends, 12, 10.0);
-        let alone = setting.record(&gains[place..=place], &[]).remove(0);
+        let scene = Scene::new(form, program, ends, 12, 10.0);
+        let alone = scene.record(&gains[place..=place], &[]).remove(0);
         for size in [4, 8, 32] {
             let start = place / size * size;
-            let beside = setting.record(&gains[start..start + size], &[]).swap_remove(place % size);
+            let beside = scene.record(&gains[start..start + size], &[]).swap_remove(place % size);
             prop_assert_eq!(beside.lasted, alone.lasted);
             prop_assert!(all_same(&beside.states[..(alone.lasted + 1) * STATES], &alone.states[..(alone.lasted + 1) * STATES]));
             prop_assert!(all_same(&beside.commands[..alone.lasted * 2], &alone.commands[..alone.lasted * 2]));
@@ -188,11 +189,11 @@ proptest! {
         ends in [state(), state()],
         gains in prop::collection::vec(gains(), 1..40),
     ) {
-        let setting = Setting::new(form, program, ends, 20, 10.0);
-        for (run, gains) in setting.record(&gains, &[]).iter().zip(gains) {
-            let mut controller = Controller::new(setting.world.family.clone(), gains).unwrap();
+        let scene = Scene::new(form, program, ends, 20, 10.0);
+        for (run, gains) in scene.record(&gains, &[]).iter().zip(gains) {
+            let mut controller = Controller::new(scene.world.family.clone(), gains).unwrap();
             for t in 0..run.lasted {
-                let command = controller.command(&run.measured[t * STATES..][..STATES], &setting.task.target);
+                let command = controller.command(&run.measured[t * STATES..][..STATES], &scene.task.target);
                 prop_assert!(all_same(&command.unwrap(), &run.commands[t * 2..][..2]));
             }
         }
@@ -207,16 +208,16 @@ proptest! {
     ) {
         let form = models[0].0;
         let models = models.into_iter().filter(|one| one.0 == form);
-        let settings: Vec<Setting> =
-            models.map(|(_, program)| Setting::new(form, program, ends.clone(), steps, 3.0)).collect();
-        let Setting { world, task, limits, .. } = &settings[0];
-        let dynamics: Vec<Model<'_>> = settings.iter().map(|s| Model { code: &s.code, frame: &s.frame }).collect();
-        let found = final_distances(&dynamics, &world.family, &slices(&gains), task, limits, &one_worker());
-        prop_assert_eq!(found.len(), settings.len());
-        for (found, setting) in found.iter().zip(&settings) {
+        let scenes: Vec<Scene> =
+            models.map(|(_, program)| Scene::new(form, program, ends.clone(), steps, 3.0)).collect();
+        let Scene { world, task, .. } = &scenes[0];
+        let dynamics: Vec<Model<'_>> = scenes.iter().map(|s| Model { code: &s.code, frame: &s.frame }).collect();
+        let found = final_distances(&dynamics, &world.setting(3.0), &slices(&gains), task, &one_worker());
+        prop_assert_eq!(found.len(), scenes.len());
+        for (found, scene) in found.iter().zip(&scenes) {
             prop_assert_eq!(found.len(), gains.len());
             for (found, gains) in found.iter().zip(&gains) {
-                let run = setting.expected(gains, &[]);
+                let run = scene.expected(gains, &[]);
                 let last = run.states[run.lasted].iter().zip(&task.target);
                 let distance = last.map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt();
                 let expected = if run.lasted < steps { f64::INFINITY } else { distance };
@@ -230,13 +231,12 @@ proptest! {
 fn a_lane_that_diverges_does_not_end_its_neighbours() {
     // Lane l commands 0.1 + its gain, so the first state, 0 at first, grows by as much at each step and leaves 1.
     for lanes in [1_usize, 2, 4, 5, 8, 9, 31, 32, 33, 40, 64, 65] {
-        let mut setting =
-            Setting::new(Form::Increment, drift(), [vec![0.0; 3], vec![1.0, 0.0, 0.0]], 30, 1.0);
+        let mut scene = Scene::new(Form::Increment, drift(), [vec![0.0; 3], vec![1.0, 0.0, 0.0]], 30, 1.0);
         // A controller that asks for K_P · (1 − 0) would see the state; the derivative gain of a zero rate sees nothing.
-        setting.limits = vec![1.0, 1e9, 1e9];
+        scene.world = scene.world.within(vec![1.0, 1e9, 1e9]);
         let gains: Vec<Vec<f64>> =
             (0..lanes).map(|l| vec![0.02 * (l % 7) as f64, 0.0, 0.0, 0.0, 0.0, 0.0]).collect();
-        for (run, gains) in setting.record(&gains, &[]).iter().zip(&gains) {
+        for (run, gains) in scene.record(&gains, &[]).iter().zip(&gains) {
             let (mut x, mut expected) = (0.0_f64, 0);
             while expected < 30 {
                 x += 0.1 + gains[0] * (1.0 - x);
@@ -260,10 +260,9 @@ fn a_run_lasts_until_the_state_reaches_a_limit_or_stops_being_a_number() {
             .parse()
             .unwrap();
     let lasted = |program: &Program, limit: f64| {
-        let mut setting =
-            Setting::new(Form::Increment, program.clone(), [vec![0.0; 3], vec![1.0; 3]], 20, 1.0);
-        setting.limits = vec![limit, f64::INFINITY, f64::INFINITY];
-        setting.record(&[vec![0.0; 6]], &[])[0].lasted
+        let mut scene = Scene::new(Form::Increment, program.clone(), [vec![0.0; 3], vec![1.0; 3]], 20, 1.0);
+        scene.world = scene.world.within(vec![limit, f64::INFINITY, f64::INFINITY]);
+        scene.record(&[vec![0.0; 6]], &[])[0].lasted
     };
     assert_eq!(lasted(&counting, 1.0), 7);
     assert_eq!(lasted(&counting, 1.0625), 8);
@@ -277,10 +276,10 @@ fn noise_is_what_the_controller_reads_and_never_what_the_system_does() {
     // Commands do not matter to this model, so noise must leave every true state where it was.
     let program: Program =
         "program inputs=5 outputs=3 registers=8\npage 1\nr5 = r0 * 0.5\nr6 = r1 - 0.25\n".parse().unwrap();
-    let setting = Setting::new(Form::Absolute, program, [vec![0.5; 3], vec![1.0; 3]], 10, 100.0);
+    let scene = Scene::new(Form::Absolute, program, [vec![0.5; 3], vec![1.0; 3]], 10, 100.0);
     let gains = vec![vec![1.0, 0.5, 0.25, 1.0, 0.5, 0.25]; 3];
     let noise: Vec<Vec<f64>> = (0..3).map(|l| vec![0.01 * l as f64; 11 * STATES]).collect();
-    let (quiet, noisy) = (setting.record(&gains, &[]), setting.record(&gains, &noise));
+    let (quiet, noisy) = (scene.record(&gains, &[]), scene.record(&gains, &noise));
     for (l, (quiet, noisy)) in quiet.iter().zip(&noisy).enumerate() {
         assert_eq!(quiet.states, quiet.measured);
         assert_eq!(quiet.states, noisy.states);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use twinloop_core::{Experiment, SelectedTests, Signals};
+use twinloop_core::{Experiment, Limits, Setting, Signals};
 
 use crate::worlds::{COMMANDS, GAINS, STATES, World};
 
@@ -53,15 +53,6 @@ fn recordings_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn a_divergence_factor_that_is_no_positive_number_is_refused() {
-    let World { signals, family, .. } = World::new();
-    for factor in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = SelectedTests::new(signals.clone(), family.clone(), factor).unwrap_err().to_string();
-        assert_eq!(error, format!("divergence factor: expected a number above 0, found {factor}"));
-    }
-}
-
-#[test]
 fn controllers_of_another_system_are_refused() {
     let World { signals, family, .. } = World::new();
     let fewer_states =
@@ -69,7 +60,8 @@ fn controllers_of_another_system_are_refused() {
     let more_commands =
         Signals { command_bounds: vec![(0.0, 1.0); 3], command_scales: vec![1.0; 3], ..(*signals).clone() };
     for signals in [fewer_states, more_commands] {
-        let error = SelectedTests::new(Arc::new(signals), family.clone(), 10.0).unwrap_err().to_string();
+        let error = Setting::new(Limits::new(Arc::new(signals), 10.0).unwrap(), family.clone());
+        let error = error.unwrap_err().to_string();
         assert!(error.contains("controllers of"), "{error}");
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use twinloop_core::pareto::{Distance, dominates};
 use twinloop_core::{
-    Form, Frame, Learnt, Model, Search, Signals, Task, TestSearch, TestSettings, Variation, Width, Workers,
+    Form, Frame, Learnt, Model, Search, Task, TestSearch, TestSettings, Variation, Width, Workers,
     final_distances,
 };
 
@@ -32,7 +32,6 @@ fn settings() -> TestSettings {
         mutants: 6,
         mutant_step: 0.05,
         mutation_step: 0.1,
-        divergence_factor: 10.0,
     }
 }
 
@@ -70,21 +69,18 @@ impl Setup {
         Frame::new(Form::Increment, &self.world.signals)
     }
 
-    fn try_start(self, signals: &Signals, seed: u64, workers: &Workers) -> twinloop_core::Result<TestSearch> {
-        let frame = Arc::new(self.frame());
-        let family = self.world.family.clone();
+    fn try_start(self, seed: u64, workers: &Workers) -> twinloop_core::Result<TestSearch> {
+        let (frame, setting) = (Arc::new(self.frame()), self.world.setting(10.0));
         let Self { committee, settings, variation, task, .. } = self;
-        TestSearch::start(committee, frame, family, task, signals, settings, variation, seed, 1, workers)
+        TestSearch::start(committee, frame, setting, task, settings, variation, seed, 1, workers)
     }
 
     fn start(self, seed: u64, workers: &Workers) -> TestSearch {
-        let signals = self.world.signals.clone();
-        self.try_start(&signals, seed, workers).unwrap()
+        self.try_start(seed, workers).unwrap()
     }
 
     fn refusal(self) -> String {
-        let signals = self.world.signals.clone();
-        self.try_start(&signals, 1, &one_worker()).err().unwrap().to_string()
+        self.try_start(1, &one_worker()).err().unwrap().to_string()
     }
 
     /// Final distances (models × candidates) of a population.
@@ -93,8 +89,7 @@ impl Setup {
         let models: Vec<Model<'_>> =
             self.committee.iter().map(|learnt| Model { code: &learnt.code, frame: &frame }).collect();
         let candidates: Vec<&[f64]> = population.iter().map(|genome| &genome[..]).collect();
-        let limits: Vec<f64> = self.world.signals.state_scales.iter().map(|scale| 10.0 * scale).collect();
-        final_distances(&models, &self.world.family, &candidates, &self.task, &limits, &one_worker())
+        final_distances(&models, &self.world.setting(10.0), &candidates, &self.task, &one_worker())
     }
 }
 
@@ -259,30 +254,16 @@ fn misuse_is_refused_with_a_reason() {
     let variation = Variation { population: 0, ..variation() };
     assert!(Setup { variation, ..Setup::of(disagreeing()) }.refusal().contains("population of 2"));
     type Spoil = fn(&mut TestSettings);
-    let table: [Spoil; 6] = [
+    let table: [Spoil; 5] = [
         |s| s.mutants = 0,
         |s| s.distance_cap = 0.0,
         |s| s.distance_cap = f64::INFINITY,
         |s| s.mutant_step = -1.0,
         |s| s.mutation_step = f64::NAN,
-        |s| s.divergence_factor = 0.0,
     ];
     for spoil in table {
         let mut setup = Setup::of(disagreeing());
         spoil(&mut setup.settings);
         assert!(setup.refusal().contains("test settings: expected numbers above 0"));
-    }
-}
-
-#[test]
-fn a_family_for_another_system_is_refused() {
-    let signals = |world: &World| (*world.signals).clone();
-    let world = World::new();
-    let fewer = Signals { state_scales: vec![1.0; 2], derivative_of: vec![None; 2], ..signals(&world) };
-    let more =
-        Signals { command_bounds: vec![(0.0, 1.0); 3], command_scales: vec![1.0; 3], ..signals(&world) };
-    for signals in [fewer, more] {
-        let error = Setup::of(disagreeing()).try_start(&signals, 1, &one_worker()).err().unwrap().to_string();
-        assert!(error.contains("controllers of"), "{error}");
     }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Axis, Experiment, Family, Form, Gain, Grammar, Instruction, Mixer, Operand, Operation, Page, Periods,
-    Pid, Program, SelectedTests, Shape, Signals, Width, Workers,
+    Axis, Experiment, Family, Form, Gain, Grammar, Instruction, Limits, Mixer, Operand, Operation, Page,
+    Periods, Pid, Program, SelectedTests, Setting, Shape, Signals, Width, Workers,
 };
 
 /// Three states, the second the derivative of the first; two commands; one axis with a rate and one without.
@@ -56,8 +56,22 @@ impl World {
         Shape::new(inputs, outputs, 3).unwrap()
     }
 
+    pub fn limits(&self, divergence_factor: f64) -> Limits {
+        Limits::new(self.signals.clone(), divergence_factor).unwrap()
+    }
+
+    pub fn setting(&self, divergence_factor: f64) -> Arc<Setting> {
+        Arc::new(Setting::new(self.limits(divergence_factor), self.family.clone()).unwrap())
+    }
+
+    /// The same, where a run has diverged at these magnitudes of the states.
+    pub fn within(self, magnitudes: Vec<f64>) -> Self {
+        let signals = Signals { state_scales: magnitudes, ..(*self.signals).clone() };
+        Self { signals: Arc::new(signals), ..self }
+    }
+
     pub fn no_tests(&self) -> SelectedTests {
-        SelectedTests::new(self.signals.clone(), self.family.clone(), 10.0).unwrap()
+        SelectedTests::new(self.setting(10.0))
     }
 
     pub fn selected(&self, experiments: &[Experiment]) -> SelectedTests {

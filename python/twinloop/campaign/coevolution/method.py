@@ -170,10 +170,9 @@ class Coevolution:
         return committee(self.models, self.options.committee_size)
 
     def _predicted(self, genes: Floats) -> float:
-        factor = self.options.divergence_factor
         task, row = self.setup.task, genes[np.newaxis]
         distances = final_distances(
-            [self.models.best_model], self.setup.family, row, task, divergence_factor=factor
+            [self.models.best_model], self.setup.family, row, task, limits=self.setup.limits
         )
         return float(distances[0, 0])
 

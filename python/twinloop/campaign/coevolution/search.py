@@ -10,6 +10,7 @@ from twinloop import _core
 from twinloop.campaign.presets import Options
 from twinloop.controllers import Family
 from twinloop.errors import engine_input
+from twinloop.limits import Limits
 from twinloop.signals import Signals
 
 CHUNK_SECONDS = 0.3
@@ -120,7 +121,6 @@ def settings_of_tests(options: Options) -> _core.TestSettings:
             mutants=options.mutants,
             mutant_step=options.mutant_step,
             mutation_step=options.test_mutation_step,
-            divergence_factor=options.divergence_factor,
         )
 
 
@@ -179,9 +179,8 @@ def start_tests(
     with engine_input():
         return _core.TestSearch.start(
             committee(models, options.committee_size),
-            family.engine,
+            Limits(family.signals, options.divergence_factor).setting(family),
             task,
-            family.signals.engine,
             settings_of_tests(options),
             variation(options, options.test_population),
             seed,

@@ -10,6 +10,7 @@ from twinloop.campaign.coevolution.search import committee, grammar, settings_of
 from twinloop.campaign.presets import Options
 from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
+from twinloop.limits import Limits
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -147,9 +148,8 @@ class TestSnapshot(Recorded, kind="test_search"):
         with engine_input():
             return _core.TestSearch.restored(
                 committee(models, options.committee_size),
-                family.engine,
+                Limits(family.signals, options.divergence_factor).setting(family),
                 task,
-                family.signals.engine,
                 settings_of_tests(options),
                 variation(options, options.test_population),
                 _counters(self),

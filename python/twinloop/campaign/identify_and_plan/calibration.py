@@ -13,6 +13,7 @@ from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.law.flight import fly
 from twinloop.law.twin import NINE_OF_TEN, Twin
+from twinloop.limits import Limits
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -91,7 +92,7 @@ def calibrated(spread: float, predicted: float, flights: Iterable[Experiment]) -
     return max(spread, share * abs(predicted)) if isfinite(predicted) else spread
 
 
-def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergence_factor: float) -> Floats:
+def left_of_flights(model: _core.Model, flights: Iterable[Experiment], limits: Limits) -> Floats:
     """What free runs of a model leave of flights that it was learnt from.
 
     From one reading to the next, exact readings leave their own rounding; over a flight, that of the twin adds up, and
@@ -100,7 +101,7 @@ def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergenc
     Args:
         model: that follows the flights to the end.
         flights: at least one.
-        divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
+        limits: where a simulated run counts as diverged.
 
     Returns:
         Standard deviations (n_x,) of normal numbers, nine of ten of which would be as small as nine of ten errors of a
@@ -110,7 +111,7 @@ def left_of_flights(model: _core.Model, flights: Iterable[Experiment], divergenc
     for flight in flights:
         states = flight.trajectory.states
         test = dataclasses.replace(flight.replayed, initial_state=states[0])
-        free = fly(model, test, divergence_factor=divergence_factor).states
+        free = fly(model, test, limits=limits).states
         rows = min(len(states), len(free))
         errors = test.family.signals.difference(states[:rows], free[:rows])
         left.append(np.quantile(np.abs(errors), 0.9, axis=0))

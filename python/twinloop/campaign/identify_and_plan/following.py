@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.errors import engine_input
+from twinloop.limits import Limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Following:
 def following(
     models: Sequence[_core.Model],
     flights: Sequence[Experiment],
-    divergence_factor: float,
+    limits: Limits,
     workers: _core.Workers,
 ) -> Following:
     """Flies each model as the system was flown, from where each flight began to where its record ends.
@@ -48,7 +49,7 @@ def following(
     Args:
         models: m of them.
         flights: N of them, at least one.
-        divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
+        limits: where a run counts as diverged.
         workers: how the work is carried out.
 
     Returns:
@@ -58,7 +59,7 @@ def following(
     frozen = np.empty(len(flights))
     for j, flight in enumerate(flights):
         test, states, steps = flight.replayed, flight.trajectory.states, flight.trajectory.steps
-        signals = test.family.signals
+        signals, setting = limits.signals, limits.setting(test.family)
         scales = np.array([state.scale for state in signals.states])
         frozen[j] = np.square(signals.difference(states[1:], states[0]) / scales).mean()
         excitation = None if test.excitation is None else test.excitation[np.newaxis, :steps]
@@ -66,12 +67,10 @@ def following(
             with engine_input():
                 runs = _core.rollout(
                     model,
-                    test.family.engine,
+                    setting,
                     test.genes[np.newaxis],
                     _core.Task(states[0], test.target_state, steps),
-                    signals.engine,
                     excitation=excitation,
-                    divergence_factor=divergence_factor,
                     workers=workers,
                 )
             lasted[i, j] = runs.lasted[0] / steps

@@ -131,7 +131,7 @@ class IdentifyAndPlan:
             task,
             setup.quality,
             options,
-            divergence_factor=options.divergence_factor,
+            limits=setup.limits,
             seed=setup.seed,
             workers=workers,
             watch=self._watch,
@@ -177,9 +177,7 @@ class IdentifyAndPlan:
             workers=self.workers,
             watch=self._watch,
         )
-        followed = following(
-            identified.members, book.experiments, self.options.divergence_factor, self.workers
-        )
+        followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
         free, frozen = followed.free, followed.frozen
         # A member that cannot follow the flights that it was learnt from is no member (E-SINDy's stability filter).
         wrong = (free > np.maximum(WRONG * frozen, 4.0 * free[0])).any(axis=1)
@@ -273,18 +271,18 @@ class IdentifyAndPlan:
         return self._twin(latest, book, errors(latest.identified.model, book, self.workers))
 
     def _twin(self, known: Learnt, book: Logbook, rows: Sequence[TestErrors]) -> Twin:
-        found, divergence = known.identified, self.options.divergence_factor
+        found = known.identified
         noise = found.noise(self.setup.signals)
         inflation = OF_PARTS if found.of_parts else factor(known.needed)
         if found.exact:
             # What follows exact readings to rounding is the law: its members are too sure of nothing.
-            left = left_of_flights(found.model, book.experiments[: known.told], divergence)
+            left = left_of_flights(found.model, book.experiments[: known.told], self.setup.limits)
             noise, inflation = replace(noise, sensors=left), 1.0
         return Twin(
             found.model,
             self.setup.signals,
             rows,
-            divergence,
+            self.options.divergence_factor,
             members=known.believed,
             noise=noise,
             seed=self.setup.seed,
@@ -331,9 +329,9 @@ class IdentifyAndPlan:
         with engine_input():
             found = _core.predictions(
                 latest.identified.model,
+                self.setup.limits.engine,
                 [chain.engine for chain in latest.identified.chains],
                 [(run.states, run.weights, run.commands) for run in runs],
-                divergence_factor=self.options.divergence_factor,
                 workers=self.workers,
             )
         return None if found is None else tuple(errors for errors, _ in found)

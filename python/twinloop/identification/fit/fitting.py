@@ -20,6 +20,7 @@ from twinloop.identification.terms.bounds import Limits, bounded_model, excludes
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import Told
 from twinloop.law.actuation import Actuation
+from twinloop.limits import Limits as RunLimits
 from twinloop.signals import Bounds, Signals
 from twinloop.streams import Unit
 
@@ -77,6 +78,7 @@ class Fitting:
         self.signals = signals
         self.form = options.form_for(signals)
         self.options = options
+        self.run_limits = RunLimits(signals, options.divergence_factor)
         self.unit = unit
         self.workers = workers
 
@@ -235,6 +237,7 @@ class Fitting:
             with engine_input():
                 tuned, left, readings, covariance, drawn = _core.tune(
                     model,
+                    self.run_limits.engine,
                     [chain.engine for chain in observer],
                     [(run.states, run.weights, run.commands) for run in self.runs],
                     free=[place for place in free if place not in held] if self.options.tuning else [],
@@ -242,7 +245,6 @@ class Fitting:
                     iterations=steps,
                     draws=draws,
                     unit=self.unit.part(number, turn).named("members") if draws else None,
-                    divergence_factor=self.options.divergence_factor,
                     workers=self.workers,
                 )
             model, beyond = bounded_model(tuned, limits)
@@ -260,9 +262,9 @@ class Fitting:
         with engine_input():
             return _core.predictions(
                 model,
+                self.run_limits.engine,
                 [chain.engine for chain in observer],
                 [(run.states, run.weights, run.commands) for run in self.runs],
-                divergence_factor=self.options.divergence_factor,
                 workers=self.workers,
             )
 

@@ -1,0 +1,57 @@
+"""Where a simulated run counts as diverged, made once and handed on to whatever flies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.controllers import Family
+from twinloop.errors import engine_input
+from twinloop.signals import Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Signals, and how far from 0 their states may get in a simulated run.
+
+    Args:
+        signals: of the system.
+        divergence_factor: multiple of a state's scale beyond which a run counts as diverged, above 0.
+
+    Raises:
+        InvalidInput: a factor that is no number above 0.
+    """
+
+    signals: Signals
+    divergence_factor: float = 10.0
+
+    def __post_init__(self) -> None:
+        with engine_input():
+            _ = self.engine  # the engine refuses now rather than at the first flight
+
+    @cached_property
+    def engine(self) -> _core.Limits:
+        """The same for the native engine."""
+        return _core.Limits(self.signals.engine, self.divergence_factor)
+
+    @cached_property
+    def states(self) -> Floats:
+        """Magnitude of each state (n_x,), SI units, radians; infinite for a periodic one."""
+        scales = [np.inf if state.periodic else state.scale for state in self.signals.states]
+        return self.divergence_factor * np.array(scales)
+
+    def setting(self, family: Family) -> _core.Setting:
+        """What the native engine flies controllers in.
+
+        Args:
+            family: of the controllers.
+
+        Raises:
+            InvalidInput: it is for other signals.
+        """
+        with engine_input():
+            return _core.Setting(self.engine, family.engine)
