@@ -18,7 +18,14 @@ from twinloop import _core
 from twinloop.errors import NotAvailable
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.exports.c_source import c_source
-from twinloop.law.exports.checks import c_controller, c_simulation, python_controller, python_simulation
+from twinloop.law.exports.checks import (
+    c_controller,
+    c_simulation,
+    casadi_simulation,
+    control_simulation,
+    python_controller,
+    python_simulation,
+)
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.exports.python_source import python_source
 from twinloop.law.noise import LastingDisturbance, Noise
@@ -40,6 +47,43 @@ def test_the_python_module_simulates_what_the_twin_does_in_another_process(which
     expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).states
     found = np.array(json.loads(done.stdout))[: len(expected)]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@ALL
+@pytest.mark.parametrize("kind", ["casadi", "control"])
+def test_modules_for_other_packages_simulate_what_the_twin_does(which, kind, tmp_path):
+    pytest.importorskip(kind)
+    twin = TWINS[which]()
+    (path,) = twin.export(tmp_path / "taken.py", kind=kind)
+    flight = flown(twin, seed=7)
+    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).states
+    simulate = {"casadi": casadi_simulation, "control": control_simulation}[kind](path.read_text())
+    found = simulate(flight.states[0], 2.0 * flight.commands)[: len(expected)]
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("which", ["acceleration", "actuators and hidden states", "kinematics"])
+def test_casadi_differentiates_a_step_as_the_twin_does(which):
+    pytest.importorskip("casadi")
+    twin, names = TWINS[which](), {}
+    exec(twin.export("casadi"), names)
+    step = names["step"]
+    state, command = np.full(twin.signals.n_x, 0.3), np.full(twin.signals.n_u, 0.7)
+    memory = names["start"](command)
+    slopes = step.jacobian()(state, command, memory, 0.0, 0.0)[0].full()
+    for i in range(len(state)):
+        ahead, behind = (
+            twin.predict(state + sign * 1e-6 * np.eye(len(state))[i], command) for sign in (1.0, -1.0)
+        )
+        np.testing.assert_allclose(slopes[:, i], (ahead - behind) / 2e-6, rtol=1e-6, atol=1e-8)
+
+
+def test_a_missing_package_is_named_and_force_needs_none(monkeypatch):
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    twin = TWINS["acceleration"]()
+    with pytest.raises(NotAvailable, match=r"twinloop\[casadi\]"):
+        twin.export("casadi")
+    assert "import casadi as ca" in twin.export("casadi", force=True)
 
 
 @needs_cc

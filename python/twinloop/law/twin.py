@@ -147,17 +147,19 @@ class Twin(Recorded, kind="twin"):
         | `python` | `.py` | `simulate(initial_state, commands)` and a class with `step`; it needs nothing but Python |
         | `c` | `.c`, `.h` | C99 with one period a call; no allocation, nothing but <math.h> |
         | `fmu3`, `fmu2` | `.fmu` | for co-simulation by FMI 3.0 or 2.0: C sources, and a binary for this machine |
+        | `casadi` | `.py` | CasADi functions of one period, `start` and `step` |
+        | `control` | `.py` | `system`, a nonlinear system of python-control |
         | `sympy` | `.py` | a script that makes SymPy expressions; divisions are plain ones |
         | `latex` | `.tex` | equations for a paper, multiplied out, with six digits |
         | `json` | `.json` | the twin itself, with its flights: `twinloop.load_twin` reads it back to the bit |
 
-        Python, C and FMUs are run on the commands of the flights that the twin was learnt from and compared with the
-        twin; SymPy is evaluated at their states. Differences above 1e-9 of a state's scale are refused (1e-3 in single
-        precision).
+        Modules of Python, C and FMUs are run on the commands of the flights that the twin was learnt from and compared
+        with the twin; SymPy is evaluated at their states. Differences above 1e-9 of a state's scale are refused (1e-3
+        in single precision).
 
         Args:
             to: a kind, or the path of a file with the suffix of one.
-            kind: of the file where its suffix does not say it: "sympy", "fmu2".
+            kind: of the file where its suffix does not say it: "casadi", "control", "fmu2", "sympy".
             precision: of C, "double" or "float".
             force: also a twin that does not follow its own flights, and without the comparison.
 

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -69,6 +70,53 @@ def python_simulation(source: str) -> Simulation:
     names: dict[str, Any] = {}
     exec(compile(source, "exported twin", "exec"), names)
     return lambda state, commands: np.array(names["simulate"](state.tolist(), commands.tolist()))
+
+
+def casadi_simulation(source: str) -> Simulation:
+    """What an exported module of CasADi functions simulates.
+
+    Args:
+        source: of the module, written by us.
+
+    Raises:
+        NotAvailable: CasADi is missing.
+    """
+    _needed("casadi", "casadi")
+    return python_simulation(source)
+
+
+def control_simulation(source: str) -> Simulation:
+    """What python-control simulates with an exported system.
+
+    Args:
+        source: of the module, written by us.
+
+    Raises:
+        NotAvailable: python-control is missing.
+    """
+    control = _needed("control", "control")
+    names: dict[str, Any] = {}
+    exec(compile(source, "exported twin", "exec"), names)
+    system = names["system"]
+
+    def simulate(state: Floats, commands: Floats) -> Floats:
+        start = np.concatenate([state, np.zeros(system.nstates - len(state))])
+        times = names["DT"] * np.arange(len(commands) + 1)
+        held = np.concatenate([commands, commands[-1:]])
+        run = control.input_output_response(system, times, held.T, start)
+        return np.asarray(run.outputs, dtype=np.float64).reshape(len(state), -1).T
+
+    return simulate
+
+
+def _needed(module: str, extra: str) -> Any:
+    try:
+        return import_module(module)
+    except ImportError as missing:
+        raise NotAvailable(
+            f"Export: expected the package {module!r} to check it with, found none; pip install 'twinloop[{extra}]', or"
+            " pass force=True."
+        ) from missing
 
 
 def c_simulation(header: str, source: str, name: str, law: Law, precision: str) -> Simulation:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,16 +14,20 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.law.exports.c_source import c_source
+from twinloop.law.exports.casadi_source import casadi_source
 from twinloop.law.exports.checks import (
     Simulation,
     c_controller,
     c_simulation,
+    casadi_simulation,
     check_controller,
     check_simulation,
     check_sympy,
+    control_simulation,
     python_controller,
     python_simulation,
 )
+from twinloop.law.exports.control_source import control_source
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.exports.fmu.running import fmu_simulation
 from twinloop.law.exports.fmu.unit import archived, built, unit_of
@@ -39,11 +43,19 @@ SUFFIXES = {
     "fmu2": ".fmu",
     "latex": ".tex",
     "sympy": ".py",
+    "casadi": ".py",
+    "control": ".py",
     "json": ".json",
 }
 """Kinds of exports, with the suffix of their files."""
 Contents = dict[str, str] | dict[str, bytes]
 """Of files, by their suffixes."""
+MODULES: dict[str, tuple[str, Callable[[Law], str], Callable[[str], Simulation]]] = {
+    "python": ("Python", python_source, python_simulation),
+    "casadi": ("CasADi", casadi_source, casadi_simulation),
+    "control": ("python-control", control_source, control_simulation),
+}
+"""Kinds that are modules of Python: what they are called, how they are written, and how they are run."""
 FMUS = {"fmu3": 3, "fmu2": 2}
 """Versions of FMI."""
 PRECISIONS = ("double", "float")
@@ -130,10 +142,11 @@ def exported(source: Source, kind: str, name: str, precision: str = "double") ->
         if source.check:
             check_sympy(text, law, flights)
         return {".py": text}
-    if kind == "python":
-        text = python_source(law)
+    if kind in MODULES:
+        what, write, simulated = MODULES[kind]
+        text = write(law)
         if source.check:
-            check_simulation("Python", python_simulation(text), source.simulate, law, flights, "double")
+            check_simulation(what, simulated(text), source.simulate, law, flights, "double")
         return {".py": text}
     name = c_name(name)
     if kind in FMUS:

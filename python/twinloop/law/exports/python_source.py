@@ -225,9 +225,8 @@ def python_source(law: Law) -> str:
     """
     actuators, hidden = law.actuation.actuators, law.actuation.hidden
     direct = not hidden and all(actuator.direct for actuator in actuators)
-    signals = law.signals
     head = [
-        f'"""A twin of {", ".join(signals.state_names)}, learnt by Twinloop {__version__}.',
+        f'"""A twin of {", ".join(law.signals.state_names)}, learnt by Twinloop {__version__}.',
         "",
         "It needs nothing but Python.",
         "",
@@ -236,37 +235,50 @@ def python_source(law: Law) -> str:
         "",
         "import math",
         "",
+        *layout(law, actuated=not direct),
+    ]
+    steps = [_STEPS[law.form]]
+    if law.form == "acceleration":
+        steps = [_INTEGRATED, _STEPS[law.form] if law.signals.kinematics is None else _TURNED]
+    parts = ["\n".join(head) + "\n", _HELPERS, outputs_source(law, PYTHON, ("math",)), *steps]
+    return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE])
+
+
+def layout(law: Law, actuated: bool) -> list[str]:
+    """What a law's signals and actuators are, as assignments in Python.
+
+    Args:
+        law: of a twin.
+        actuated: whether actuators and hidden states are written, too.
+    """
+    signals, actuators = law.signals, law.actuation.actuators
+    lines = [
         f"STATES = {tuple((state.name, state.unit) for state in signals.states)!r}  # names and units",
         f"COMMANDS = {tuple((command.name, command.unit) for command in signals.commands)!r}",
         f"BOUNDS = {tuple(command.bounds for command in signals.commands)!r}  # of the commands, in their units",
         f"SCALES = {tuple(command.size for command in signals.commands)!r}  # what the equations see as 1",
         f"DT = {signals.dt!r}  # s, a period",
     ]
-    if not direct:
-        head += [
+    if actuated:
+        lines += [
             f"LAGS = {tuple(actuator.lag for actuator in actuators)!r}  # s, of each command",
             f"DELAYS = {tuple(actuator.delay for actuator in actuators)!r}  # periods",
             f"RESTS = {tuple(actuator.rest for actuator in actuators)!r}  # at the start; None: the first one",
-            f"HIDDEN = {tuple(tuple(each) for each in hidden)!r}"
+            f"HIDDEN = {tuple(tuple(each) for each in law.actuation.hidden)!r}"
             "  # commands that fill it, whether squared, level at rest, time (s)",
         ]
-    head += [
+    lines += [
         f"# {name} is read {offset:+.6g} s after the states that the equations drive; all are given at one time."
         for name, offset in zip(signals.state_names, law.offsets, strict=True)
         if offset != 0.0
     ]
-    steps = [_STEPS[law.form]]
-    if law.form == "acceleration":
-        body = signals.kinematics
-        if body is not None:
-            angles, rates = (
-                tuple(map(signals.state_names.index, names)) for names in (body.angles, body.rates)
-            )
-            head += [f"ANGLES = {angles!r}  # roll, pitch and yaw", f"RATES = {rates!r}  # of the body"]
-            steps = [_TURNED]
-        steps.insert(0, _INTEGRATED)
-    parts = ["\n".join(head) + "\n", _HELPERS, _outputs(law), *steps]
-    return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE])
+    if law.form == "acceleration" and signals.kinematics is not None:
+        body, place = signals.kinematics, signals.state_names.index
+        lines += [
+            f"ANGLES = {tuple(map(place, body.angles))!r}  # roll, pitch and yaw",
+            f"RATES = {tuple(map(place, body.rates))!r}  # of the body",
+        ]
+    return lines
 
 
 def equation_roots(law: Law) -> tuple[int, ...]:
@@ -307,13 +319,20 @@ def joined(terms: Sequence[Term], between: str) -> str:
     return text + "".join(f"{between if size > 80 else ' '}{sign} {term}" for sign, term in rest)
 
 
-def _outputs(law: Law) -> str:
+def outputs_source(law: Law, dialect: Dialect, taken: Sequence[str]) -> str:
+    """What the equations give, as a function of Python.
+
+    Args:
+        law: of a twin.
+        dialect: how operations are written.
+        taken: names that these use.
+    """
     roots = stepped_roots(law)
-    symbols = [f"{name}_" if name == "math" or name.startswith("_") else name for name in law.symbols]
+    symbols = [f"{name}_" if name in taken or name.startswith("_") else name for name in law.symbols]
     prefix = "t"
     while any(name.startswith(prefix) and name[len(prefix) :].isdigit() for name in symbols):
         prefix += "_"
-    writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, PYTHON)
+    writer = Writer(law.expressions, roots, symbols, EXACT, prefix, True, dialect)
     states, seen = symbols[: law.signals.n_x], symbols[law.signals.n_x :]
     lines = [
         "",

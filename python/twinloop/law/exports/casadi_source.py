@@ -1,0 +1,218 @@
+"""A law as a Python file that builds CasADi functions, for optimal control and sensitivities."""
+
+from __future__ import annotations
+
+from twinloop._core import __version__
+from twinloop.law.exports.python_source import layout, outputs_source
+from twinloop.law.law import Law
+from twinloop.law.writing import Dialect
+
+CASADI = Dialect(
+    {
+        "abs": "ca.fabs({})",
+        "sqrt": "ca.sqrt(ca.fabs({}))",
+        "min": "ca.fmin({}, {})",
+        "max": "ca.fmax({}, {})",
+        **{function: f"ca.{function}({{}})" for function in ("sin", "cos", "tanh", "exp")},
+        "upright": "_upright({})",
+    },
+    division="_divided({}, {})",
+)
+
+_HELPERS = '''
+def _divided(a, b):
+    """Protected: a where b is all but 0; neither branch divides by 0, nor do their derivatives."""
+    return a / ca.if_else(ca.fabs(b) > 1e-6, b, 1.0)
+
+
+def _wrapped(a, period):
+    """An angle within half a period of 0."""
+    return ca.remainder(a, period)
+
+
+def _upright(a):
+    """A cosine of the pitch, kept from 0."""
+    return ca.if_else(ca.fabs(a) >= 1e-3, a, ca.copysign(1e-3, a))
+
+
+def _along(a, b, share):
+    return [first + share * second for first, second in zip(a, b)]
+'''
+
+_EFFECTS = '''
+def _levels(seen):
+    """What fills each hidden state."""
+    return [
+        sum(seen[i] * seen[i] if squared else seen[i] for i in commands) * (1.0 / len(commands))
+        for commands, squared, _, _ in HIDDEN
+    ]
+
+
+def _start(u):
+    """What is remembered before the first command u: queues, effects, hidden states and their levels at rest."""
+    held = [value if rest is None else rest for value, rest in zip(u, RESTS)]
+    queues = [value for value, delay in zip(held, DELAYS) for _ in range(delay)]
+    levels = _levels([value * (1.0 / scale) for value, scale in zip(u, SCALES)])
+    rests = [level if rest is None else rest for level, (_, _, rest, _) in zip(levels, HIDDEN)]
+    return [*queues, *held, *[0.0] * len(HIDDEN), *rests]
+
+
+def _effects(memory, u):
+    """Effects of commands and hidden states at start, middle and end of a period, and what is remembered then."""
+    memory, queues, ends_, hidden_ = list(memory), [], [], []
+    arrived = []
+    for value, delay in zip(u, DELAYS):
+        waiting = [*memory[:delay], value]
+        del memory[:delay]
+        arrived.append(waiting[0])
+        queues += waiting[1:]
+    held, memory = memory[: len(u)], memory[len(u) :]
+    hidden, rests = memory[: len(HIDDEN)], memory[len(HIDDEN) :]
+    starts, middles, ends = [], [], []
+    for before, value, lag, scale in zip(held, arrived, LAGS, SCALES):
+        half = math.exp(-0.5 * DT / lag) if lag > 0.0 else 0.0
+        start = before if lag > 0.0 else value
+        middle = value + (start - value) * half
+        end = value + (middle - value) * half
+        ends_.append(end)
+        for seen, effect in zip((starts, middles, ends), (start, middle, end)):
+            seen.append(effect * (1.0 / scale))
+    levels = _levels([value * (1.0 / scale) for value, scale in zip(u, SCALES)])
+    for start, level, rest, (_, _, _, time) in zip(hidden, levels, rests, HIDDEN):
+        kept = math.exp(-0.5 * DT / time)
+        added = (level - rest) * (time * (1.0 - kept))
+        middle = start * kept + added
+        hidden_.append(middle * kept + added)
+        for seen, value in zip((starts, middles, ends), (start, middle, hidden_[-1])):
+            seen.append(value)
+    return (starts, middles, ends), [*queues, *ends_, *hidden_, *rests]
+'''
+
+_STEPS = {
+    "absolute": '''
+def _step(x, start, middle, end):
+    """The next state."""
+    return _outputs(x, middle)
+''',
+    "increment": '''
+def _step(x, start, middle, end):
+    """The state and what is added to it."""
+    return _along(x, _outputs(x, middle), 1.0)
+''',
+    "acceleration": '''
+def _step(x, start, middle, end):
+    """One Runge-Kutta step of order four."""
+    return _integrated(_outputs, x, start, middle, end)
+''',
+}
+
+_INTEGRATED = """
+def _integrated(slope, x, start, middle, end):
+    first = slope(x, start)
+    second = slope(_along(x, first, 0.5 * DT), middle)
+    third = slope(_along(x, second, 0.5 * DT), middle)
+    fourth = slope(_along(x, third, DT), end)
+    return [
+        value + DT / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        for value, a, b, c, d in zip(x, first, second, third, fourth)
+    ]
+"""
+
+_TURNED = '''
+def _quaternion(roll, pitch, yaw):
+    (sr, sp, sy), (cr, cp, cy) = ([f(0.5 * angle) for angle in (roll, pitch, yaw)] for f in (ca.sin, ca.cos))
+    return [
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    ]
+
+
+def _angles(a, b, c, d, before):
+    """Roll, pitch and yaw, by whole turns the nearest to what they were."""
+    across, up = 2.0 * (c * d + a * b), a * a - b * b - c * c + d * d
+    roll = ca.atan2(across, up)
+    pitch = ca.atan2(-2.0 * (b * d - a * c), ca.sqrt(across * across + up * up))
+    yaw = ca.atan2(2.0 * (b * c + a * d), a * a + b * b - c * c - d * d)
+    over = ca.cos(before[1]) < 0.0
+    turned = (roll + math.pi, math.pi - pitch, yaw + math.pi)
+    chosen = [ca.if_else(over, other, angle) for angle, other in zip((roll, pitch, yaw), turned)]
+    return [old - ca.remainder(old - new, math.tau) for old, new in zip(before, chosen)]
+
+
+def _step(x, start, middle, end):
+    """One Runge-Kutta step of order four; the attitude goes on as a quaternion, for which no pitch is singular."""
+    before = [x[i] for i in ANGLES]
+
+    def seen(y):
+        states = list(y[:-4])
+        for i, angle in zip(ANGLES, _angles(*y[-4:], before)):
+            states[i] = angle
+        return states
+
+    def slope(y, u):
+        states, (a, b, c, d) = seen(y), y[-4:]
+        p, q, r = (0.5 * states[i] for i in RATES)
+        turning = [-(b * p + c * q + d * r), a * p + c * r - d * q, a * q - b * r + d * p, a * r + b * q - c * p]
+        return [*_outputs(states, u), *turning]
+
+    return seen(_integrated(slope, [*x, *_quaternion(*before)], start, middle, end))
+'''
+
+_FUNCTIONS = '''
+_x, _u = ca.SX.sym("x", len(STATES)), ca.SX.sym("u", len(COMMANDS))
+_remembered = _start(ca.vertsplit(_u))
+_memory = ca.SX.sym("memory", len(_remembered))
+_seen, _next = _effects(ca.vertsplit(_memory), ca.vertsplit(_u))
+
+start = ca.Function("start", [_u], [ca.vertcat(*_remembered)], ["u"], ["memory"])
+"""What is remembered before the first command u of a run."""
+step = ca.Function(
+    "step",
+    [_x, _u, _memory],
+    [ca.vertcat(*_step(ca.vertsplit(_x), *_seen)), ca.vertcat(*_next)],
+    ["x", "u", "memory"],
+    ["x_next", "memory_next"],
+)
+"""The state a period after x, under commands u within their bounds, and what is remembered then."""
+
+
+def simulate(initial_state, commands):
+    """The states of a free run, the first one among them; what lies beyond a bound of a command is clipped."""
+    states, memory = [[float(value) for value in initial_state]], None
+    for u in commands:
+        clipped = [min(max(value, low), high) for value, (low, high) in zip(u, BOUNDS)]
+        memory = start(clipped) if memory is None else memory
+        following, memory = step(states[-1], clipped, memory)
+        states.append(following.full().ravel().tolist())
+    return states
+'''
+
+
+def casadi_source(law: Law) -> str:
+    """A law as a Python file that imports CasADi.
+
+    Args:
+        law: of a twin.
+
+    Returns:
+        A module with `start`, `step` (CasADi functions of one period) and `simulate(initial_state, commands)`.
+    """
+    head = [
+        f'"""A twin of {", ".join(law.signals.state_names)}, learnt by Twinloop {__version__}, as CasADi functions.',
+        "",
+        "`start(u)` is what is remembered before a run, `step(x, u, memory)` one period of it.",
+        '"""',
+        "",
+        "import math",
+        "",
+        "import casadi as ca",
+        "",
+        *layout(law, actuated=True),
+    ]
+    steps = [_STEPS[law.form]]
+    if law.form == "acceleration":
+        steps = [_INTEGRATED, _STEPS[law.form] if law.signals.kinematics is None else _TURNED]
+    outputs = outputs_source(law, CASADI, ("ca", "math"))
+    return "\n".join(["\n".join(head) + "\n", _HELPERS, outputs, *steps, _EFFECTS, _FUNCTIONS])

@@ -1,0 +1,89 @@
+"""A law as a Python file that builds a nonlinear system of python-control."""
+
+from __future__ import annotations
+
+from twinloop.law.exports.python_source import python_source
+from twinloop.law.law import Law
+
+_NOTHING_REMEMBERED = '''
+_MEMORY = []
+
+
+def _recalled(memory):
+    """A twin; it remembers nothing."""
+    return Twin()
+
+
+def _remembered(twin):
+    return []
+'''
+
+_REMEMBERED = '''
+_MEMORY = [
+    "started",
+    *(f"effect_{name}" for name, _ in COMMANDS),
+    *(f"waiting_{name}_{k}" for (name, _), delay in zip(COMMANDS, DELAYS) for k in range(delay)),
+    *(f"{kind}_{j}" for kind in ("hidden", "level") for j in range(len(HIDDEN))),
+]
+
+
+def _recalled(memory):
+    """A twin that remembers what a state of the system holds; all 0: nothing yet."""
+    twin, values = Twin(), iter(memory)
+    if next(values) > 0.0:
+        twin._started = True
+        twin._held = [next(values) for _ in DELAYS]
+        twin._queues = [[next(values) for _ in range(delay)] for delay in DELAYS]
+        twin._hidden = [next(values) for _ in HIDDEN]
+        twin._levels = [next(values) for _ in HIDDEN]
+    return twin
+
+
+def _remembered(twin):
+    queues = [value for queue in twin._queues for value in queue]
+    return [1.0, *twin._held, *queues, *twin._hidden, *twin._levels]
+'''
+
+_SYSTEM = '''
+def _update(time, states, commands, parameters):
+    """What follows a period later: the states of the twin, then what it remembers."""
+    x, memory = [float(value) for value in states[: len(STATES)]], [float(value) for value in states[len(STATES) :]]
+    twin = _recalled(memory)
+    clipped = [min(max(float(value), low), high) for value, (low, high) in zip(commands, BOUNDS)]
+    following = twin.step(x, clipped)
+    return np.array([*following, *_remembered(twin)])
+
+
+def _outputs_of(time, states, commands, parameters):
+    return states[: len(STATES)]
+
+
+system = control.nlsys(
+    _update,
+    _outputs_of,
+    inputs=[name for name, _ in COMMANDS],
+    outputs=[name for name, _ in STATES],
+    states=[*(f"{name}_state" for name, _ in STATES), *(f"memory_{name}" for name in _MEMORY)],
+    dt=DT,
+    name="twin",
+)
+"""In discrete time; its state is that of the twin, then what that remembers, which is 0 before a run."""
+'''
+
+
+def control_source(law: Law) -> str:
+    """A law as a Python file that imports python-control.
+
+    Args:
+        law: of a twin.
+
+    Returns:
+        The module of `python_source` with `system`, a `control.NonlinearIOSystem` whose outputs are the states.
+    """
+    text = python_source(law)
+    text = text.replace("\nimport math\n", "\nimport math\n\nimport control\nimport numpy as np\n", 1)
+    text = text.replace(
+        "It needs nothing but Python.", "`system` is a nonlinear system of python-control.", 1
+    )
+    direct = not law.actuation.hidden and all(each.direct for each in law.actuation.actuators)
+    return "\n".join([text, _NOTHING_REMEMBERED if direct else _REMEMBERED, _SYSTEM])
