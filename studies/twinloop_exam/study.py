@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
 import time
 import warnings
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -25,6 +21,7 @@ from rich.progress import (
 from twinloop.campaign import available_threads
 from twinloop.errors import RemarkWarning, TwinloopError
 from twinloop.law.twin import Twin
+from twinloop.sweep.workers import HERE, finished
 from twinloop_exam import campaigns
 from twinloop_exam.campaigns import Measured
 from twinloop_exam.held_out import HeldOut
@@ -81,39 +78,18 @@ def work_off(path: Path, jobs: Sequence[Job], processes: int) -> int:
 
 
 def _finished(path: Path, jobs: Sequence[Job], processes: int) -> Iterator[tuple[Job, str | None]]:
-    if processes == 1 or len(jobs) < 2:
-        for job in jobs:
-            yield job, work(path, job, available_threads())
-        return
-    # Several processes that each use all cores for their linear algebra only wait for each other.
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context, initializer=_as_a_worker) as pool:
-        try:
-            threads = max(1, available_threads() // processes)
-            futures = {pool.submit(work, path, job, threads): job for job in jobs}
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    alone = processes == 1 or len(jobs) < 2
+    threads = available_threads() if alone else max(1, available_threads() // processes)
+    done = finished(partial(_worked, path, threads), jobs, HERE if alone else f"local:{processes}")
+    for job, answer in done:
+        yield job, str(answer) if isinstance(answer, BaseException) else answer
 
 
-def _as_a_worker() -> None:
-    """Ctrl-C ends a worker without a word: what it measured is kept, and the main process speaks.
-
-    Nor does a worker outlive the main process, however that ends: it would go on writing into the store.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    warnings.simplefilter("ignore", RemarkWarning)  # what is remarked of twins by the hundred is no news here
-    threading.Thread(target=_end_with_the_main_process, daemon=True).start()
-
-
-def _end_with_the_main_process() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def _worked(path: Path, threads: int, job: Job) -> str | None:
+    with warnings.catch_warnings():
+        # What is remarked of twins by the hundred is no news here.
+        warnings.simplefilter("ignore", RemarkWarning)
+        return work(path, job, threads)
 
 
 def work(path: Path, job: Job, threads: int = 1) -> str | None:

@@ -12,6 +12,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [
     "tutorial.md",
     "reproduction.md",
+    "sweep.md",
     *sorted(
         p.relative_to(DOCS).as_posix() for room in ("concepts", "default") for p in (DOCS / room).glob("*.md")
     ),

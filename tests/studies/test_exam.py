@@ -4,8 +4,6 @@ import dataclasses
 import json
 import math
 import sqlite3
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -672,26 +670,3 @@ def test_every_learner_says_whether_it_can_run():
     assert LEARNERS["paper"].why_missing() is None
     assert Flyer("random-gains").why_missing() is None
     assert "install" in Fitter("x", "least_squares", {}, package="no_such_package").why_missing()
-
-
-WORKER = """
-import multiprocessing, os, time
-from concurrent.futures import ProcessPoolExecutor
-from twinloop_exam.study import _as_a_worker
-
-if __name__ == "__main__":
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, mp_context=context, initializer=_as_a_worker) as pool:
-        print(pool.submit(os.getpid).result(), flush=True)
-        pool.submit(time.sleep, 600).result()
-"""
-
-
-def test_a_worker_does_not_outlive_the_exam(tmp_path):
-    script = tmp_path / "exam.py"
-    script.write_text(WORKER)
-    exam = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-    assert int(exam.stdout.readline()) != exam.pid
-    exam.kill()
-    # The worker has the same standard output: it is closed only once both are gone.
-    assert exam.communicate(timeout=60)[0] == b""

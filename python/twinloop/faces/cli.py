@@ -25,7 +25,11 @@ from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
 from twinloop.systems import BUILT_IN, Quadrotor
 
-STUDIES = {"bench": "twinloop_exam.command", "reproduce": "twinloop.reproduce.command"}
+STUDIES = {
+    "bench": "twinloop_exam.command",
+    "reproduce": "twinloop.reproduce.command",
+    "sweep": "twinloop.sweep.command",
+}
 """Verbs that are loaded when they are called, by the module that holds each."""
 
 

@@ -1,0 +1,115 @@
+"""The verb `twinloop sweep`: many campaigns at once, and a table at the end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from twinloop.campaign.presets import PRESETS
+from twinloop.errors import InvalidInput
+from twinloop.sweep.campaigns import Outcome
+from twinloop.sweep.campaigns import sweep as fly_all
+from twinloop.sweep.jobs import Job, crossed
+from twinloop.sweep.summary import as_text, summarised
+from twinloop.sweep.workers import HERE
+
+
+@click.command()
+@click.argument("systems", nargs=-1, required=True)
+@click.option("--seeds", default="0:5", show_default=True, help="FIRST:LAST+1, or one seed.")
+@click.option(
+    "--presets", default="default", show_default=True, help=f"Comma-separated: {', '.join(PRESETS)}."
+)
+@click.option("--experiments", type=int, default=4, show_default=True, help="Of each campaign.")
+@click.option(
+    "--vary", multiple=True, metavar="NAME=VALUE", help="An option; each further value of it is tried, too."
+)
+@click.option(
+    "--cluster", default=HERE, show_default=True, help="here, local:N, or the address of a Dask scheduler."
+)
+@click.option(
+    "--store", default="sweep.db", show_default=True, metavar="FILE.db|URL", help="Where all is kept."
+)
+@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.pass_context
+def sweep(
+    context: click.Context,
+    systems: tuple[str, ...],
+    seeds: str,
+    presets: str,
+    experiments: int,
+    vary: tuple[str, ...],
+    cluster: str,
+    store: str,
+    as_json: bool,
+) -> None:
+    """Fly campaigns on SYSTEMS over seeds, presets and options; what is kept in the store is not flown again.
+
+    A system is a built-in one, such as quadrotor, quadrotor:noise=0.001 or quadrotor:harsh, or module:object.
+    """
+    jobs = crossed(
+        systems,
+        _seeds(seeds),
+        presets=[name.strip() for name in presets.split(",")],
+        options=_varied(vary),
+        experiments=experiments,
+    )
+    outcomes: list[Outcome] = []
+    try:
+        _work(jobs, store, cluster, outcomes)
+    except KeyboardInterrupt:
+        click.echo(
+            f"Interrupted: what was finished is in {store}; the same command goes on from there.", err=True
+        )
+        context.exit(130)
+    rows = summarised(outcomes)
+    click.echo(json.dumps({"store": store, "groups": rows}) if as_json else as_text(rows), nl=as_json)
+    context.exit(1 if any(outcome.failure is not None for outcome in outcomes) else 0)
+
+
+def _work(jobs: list[Job], store: str, cluster: str, outcomes: list[Outcome]) -> None:
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[last]}"),
+        TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("sweep", total=len(jobs), last="")
+        for outcome in fly_all(jobs, Path(store) if "://" not in store else store, cluster):
+            outcomes.append(outcome)
+            name = outcome.job.name
+            if outcome.failure is not None:
+                bar.console.print(f"Failed: {name}: {outcome.failure}", highlight=False, markup=False)
+            bar.update(task, advance=1, last=name)
+            if not console.is_terminal and outcome.seconds is not None:
+                console.print(f"{len(outcomes)} of {len(jobs)}: {name}", highlight=False, markup=False)
+
+
+def _seeds(text: str) -> list[int]:
+    first, colon, last = text.partition(":")
+    if not first.isdecimal() or (colon and not last.isdecimal()):
+        raise InvalidInput(
+            f"--seeds: expected FIRST:LAST+1 or one seed, found {text!r}; such as --seeds 0:10."
+        )
+    return list(range(int(first), int(last))) if colon else [int(first)]
+
+
+def _varied(changes: tuple[str, ...]) -> dict[str, list[str]]:
+    axes: dict[str, list[str]] = {}
+    for change in changes:
+        name, equals, value = (part.strip() for part in change.partition("="))
+        if not equals:
+            raise InvalidInput(f"--vary: expected NAME=VALUE, found {change!r}; such as --vary moves=1000.")
+        axes.setdefault(name, []).append(value)
+    return axes

@@ -1,0 +1,71 @@
+"""One campaign of a sweep, from its description to its plain record, on whatever machine it runs."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.errors import RemarkWarning, TwinloopError
+from twinloop.records import Record
+from twinloop.sweep.jobs import Job, system_of
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What became of a job.
+
+    Args:
+        record: of the campaign; None if it failed.
+        failure: why it did; None if it did not.
+        seconds: that it took.
+    """
+
+    record: Record | None
+    failure: str | None
+    seconds: float
+
+
+def fly(job: Job, threads: int | None = None) -> Flown:
+    """Makes a campaign, flies it to its end and learns its last flight.
+
+    It depends on nothing but the job, so that it may be repeated after its worker died, with the same bits.
+
+    Args:
+        job: to be done.
+        threads: of the engine, by default all that there are; no result depends on it.
+    """
+    clock = time.monotonic()
+    with warnings.catch_warnings():
+        # What is remarked of twins by the hundred stands in each campaign.
+        warnings.simplefilter("ignore", RemarkWarning)
+        try:
+            campaign = begun(job, system_of(job.system, job.seed), threads)
+            campaign.run(system_of(job.system, job.seed), job.experiments)
+            controller_to_fly(campaign)
+        except TwinloopError as failure:
+            return Flown(None, str(failure), time.monotonic() - clock)
+    return Flown(campaign.to_record(), None, time.monotonic() - clock)
+
+
+def begun(job: Job, system: Any, threads: int | None = None) -> Campaign:
+    """The campaign of a job, before its first experiment.
+
+    Args:
+        job: to be done.
+        system: that it flies.
+        threads: of the engine.
+    """
+    return Campaign(
+        system.signals,
+        controller=system.controller,
+        initial_state=system.initial_state,
+        target_state=system.target_state,
+        duration=system.duration,
+        preset=job.preset,
+        seed=job.seed,
+        options=job.values(),
+        threads=threads,
+    )

@@ -1,0 +1,207 @@
+"""Sweeps: all combinations, the same bits on any cluster, whatever dies meanwhile; what is kept is not flown again."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+import twinloop as tl
+from command import invoke
+from lives import plain
+from twinloop.sweep import crossed, sweep
+from twinloop.sweep.jobs import Job, system_of
+from twinloop.sweep.summary import summarised
+from twinloop.sweep.workers import finished
+
+SMALL = {"model_population": ["20"], "model_generations": ["5", "10"], "test_population": ["10"],
+         "test_generations": ["3"], "committee_size": ["5"], "mutants": ["3"]}  # fmt: skip
+
+
+def small(seeds=range(2), **changes):
+    options = {**SMALL, **changes}
+    return crossed(["quadrotor:noise=0.001"], seeds, presets=["paper"], options=options, experiments=2)
+
+
+def records(outcomes):
+    return {outcome.job.name: plain(outcome.campaign) for outcome in outcomes}
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory):
+    path = tmp_path_factory.mktemp("sweep") / "sweep.db"
+    return path, list(sweep(small(), path))
+
+
+def test_every_combination_is_a_job_of_its_own():
+    jobs = crossed(
+        ["quadrotor", "quadrotor:harsh"], [3, 4], options={"moves": ["100", "200"], "lags": ["false"]}
+    )
+    assert len(jobs) == 8 == len({job.name for job in jobs})
+    assert [job.seed for job in jobs[:4]] == [3, 4, 3, 4]
+    assert jobs[0].values() == {"moves": 100, "lags": False}
+
+
+def test_a_job_is_the_campaign_that_one_would_make_by_hand(here):
+    _, outcomes = here
+    job, campaign = outcomes[0].job, outcomes[0].campaign
+    rig = tl.systems.Quadrotor(noise=1e-3, seed=0)
+    mine = tl.Campaign(
+        rig.signals, controller=rig.controller, initial_state=rig.initial_state, target_state=rig.target_state,
+        duration=rig.duration, preset="paper", seed=0, options=job.values(),
+    ).run(rig, 2)  # fmt: skip
+    mine.best_test  # noqa: B018 - learns the last flight, as a sweep does
+    assert plain(mine) == plain(campaign)
+
+
+def test_what_is_kept_is_not_flown_again(here, monkeypatch):
+    path, outcomes = here
+    monkeypatch.setattr("twinloop.sweep.campaigns.fly", lambda *_, **__: pytest.fail("flown again"))
+    again = list(sweep(small(), path))
+    assert records(again) == records(outcomes)
+    assert all(outcome.seconds is None for outcome in again)
+
+
+def test_a_sweep_that_was_interrupted_goes_on_where_it_was(here, tmp_path):
+    _, outcomes = here
+    running = sweep(small(), tmp_path / "half.db")
+    for _ in range(2):
+        next(running)
+    running.close()
+    rest = list(sweep(small(), tmp_path / "half.db"))
+    assert [outcome.seconds is None for outcome in rest] == [True, True, False, False]
+    assert records(rest) == records(outcomes)
+
+
+def test_another_setup_in_the_store_is_refused(here):
+    path, _ = here
+    longer = [Job(job.system, job.preset, job.seed, job.options, 3) for job in small()]
+    with pytest.raises(tl.InvalidInput, match="3 experiments, found 2"):
+        list(sweep(longer, path))
+
+
+def test_a_cluster_gives_the_same_bits_though_a_worker_is_killed(here, tmp_path):
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    _, outcomes = here
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        killer = threading.Timer(0.3, os.kill, (pids[0], signal.SIGKILL))
+        killer.start()
+        assert records(sweep(small(), tmp_path / "cluster.db", client)) == records(outcomes)
+        killer.join()
+        # The one that died was replaced by another process, and so it was not there for nothing.
+        client.wait_for_workers(2, timeout=30)
+        assert set(client.run(os.getpid).values()) != set(pids)
+
+
+def test_a_job_that_fails_is_said_and_the_others_go_on(tmp_path, monkeypatch):
+    def broken(job, threads=None):
+        from twinloop.sweep.flying import Flown, fly
+
+        return Flown(None, "the motor cut out", 0.1) if job.seed == 0 else fly(job, threads)
+
+    monkeypatch.setattr("twinloop.sweep.campaigns.fly", broken)
+    outcomes = list(sweep(small(model_generations=["5"]), tmp_path / "broken.db"))
+    assert [outcome.failure for outcome in outcomes] == ["the motor cut out", None]
+    (row,) = summarised(outcomes)
+    assert (row["campaigns"], row["failed"]) == (1, 1)
+
+
+def test_quartiles_are_those_of_the_campaigns(here):
+    _, outcomes = here
+    rows = {row["group"]: row for row in summarised(outcomes)}
+    assert len(rows) == 2
+    for group, row in rows.items():
+        best = sorted(
+            min(run.quality for run in outcome.campaign.experiments if run.kept_envelope)
+            for outcome in outcomes
+            if outcome.job.group == group
+        )
+        assert row["best"][0] == best[0] and row["best"][2] == best[1]
+        assert row["left"] == sum(
+            run.left_envelope for o in outcomes if o.job.group == group for run in o.campaign.experiments
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("quadrotr", "did you mean 'quadrotor'"),
+        ("quadrotor:noise=much", "expected a number"),
+        ("quadrotor:drag=1", "noise=NUMBER or harsh"),
+        ("no_such_module:rig", "No module"),
+        ("twinloop:Signals", "function of seed"),
+        ("json:dumps", "function of seed"),
+        ("lives:PLANT", "found none of controller"),
+    ],
+)
+def test_a_system_that_cannot_be_flown_is_refused(text, word):
+    with pytest.raises(tl.InvalidInput, match=word):
+        system_of(text, 0)
+
+
+@pytest.mark.parametrize("cluster", ["local", "local:0", "local:many", "local:2000"])
+def test_a_cluster_that_is_none_is_refused(cluster):
+    with pytest.raises(tl.InvalidInput, match="local:N"):
+        list(finished(len, ["a"], cluster))
+
+
+def test_the_verb_prints_a_table_and_json(tmp_path):
+    store = str(tmp_path / "verb.db")
+    words = [
+        "sweep",
+        "quadrotor",
+        "--presets",
+        "paper",
+        "--seeds",
+        "0:2",
+        "--experiments",
+        "2",
+        "--store",
+        store,
+    ]
+    for name, values in SMALL.items():
+        words += ["--vary", f"{name}={values[0]}"]
+    first = invoke(*words)
+    assert first.exit_code == 0 and "error before learning" in first.stdout
+    (row,) = json.loads(invoke(*words, "--json").stdout)["groups"]
+    assert row["campaigns"] == 2 and row["failed"] == 0 and row["seconds"] is None
+
+
+@pytest.mark.parametrize(
+    "words", [("--seeds", "a"), ("--seeds", "3:1"), ("--vary", "moves"), ("--vary", "mooves=1")]
+)
+def test_misuse_of_the_verb_is_one_sentence(words):
+    answer = invoke("sweep", "quadrotor", *words)
+    assert isinstance(answer.exception, tl.InvalidInput) or answer.exit_code == 2
+
+
+WORKER = """
+import os, time
+from twinloop.sweep.workers import finished
+
+def work(seconds):
+    print(os.getpid(), flush=True)
+    time.sleep(seconds)
+
+if __name__ == "__main__":
+    list(finished(work, [600.0], "local:1"))
+"""
+
+
+def test_a_worker_does_not_outlive_the_process_that_asked_for_it(tmp_path):
+    script = tmp_path / "sweeping.py"
+    script.write_text(WORKER)
+    process = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    assert int(process.stdout.readline()) != process.pid
+    process.kill()
+    # The worker has the same standard output: it is closed only once both are gone.
+    assert process.communicate(timeout=60)[0] == b""
