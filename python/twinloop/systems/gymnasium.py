@@ -143,6 +143,9 @@ class _Run:
         reason = f"the environment ended the episode ({self.ended}) {when:.3g} s after the start"
         return dataclasses.replace(flown, ended="aborted", reason=reason)
 
+    def close(self) -> None:
+        """The environment is kept for the next run."""
+
     def read(self, seen: Any) -> Floats:
         return floats(
             "Gymnasium, state of an observation", self.system._state(seen), (self.system.signals.n_x,)

@@ -65,3 +65,6 @@ class _Run:
 
     def finished(self, flown: Trajectory) -> Trajectory:
         return flown
+
+    def close(self) -> None:
+        pass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from typing import Protocol
 
 import numpy as np
@@ -35,6 +36,10 @@ class Episode(Protocol):
 
     def finished(self, flown: Trajectory) -> Trajectory:
         """The run as it is recorded, once it has ended."""
+        ...
+
+    def close(self) -> None:
+        """Gives back what it holds, however it ended."""
         ...
 
 
@@ -100,14 +105,15 @@ class Stepped(System):
             shape = (test.steps + 1, self._signals.n_x)
             noise = self.noise * run_stream(self.seed, self.runs).standard_normal(shape)
         guard = Guard(episode, self._signals.n_x)
-        try:
-            flown = fly(guard, dataclasses.replace(test, initial_state=episode.start), noise=noise)
-        except SystemFailure:
-            raise
-        except Exception:
-            if guard.failure is not None:
-                raise guard.failure from guard.failure.__cause__
-            raise
+        with closing(episode):
+            try:
+                flown = fly(guard, dataclasses.replace(test, initial_state=episode.start), noise=noise)
+            except SystemFailure:
+                raise
+            except Exception:
+                if guard.failure is not None:
+                    raise guard.failure from guard.failure.__cause__
+                raise
         self.runs += 1
         return episode.finished(flown)
 
