@@ -1,6 +1,6 @@
 """Twinloop: from a handful of experiments to a twin made of readable equations and a tuned controller."""
 
-from twinloop import contracts, controllers, errors, objectives, pareto, systems
+from twinloop import autopilots, contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
 from twinloop.campaign import Campaign
 from twinloop.errors import (
@@ -37,6 +37,7 @@ __all__ = [
     "Twin",
     "TwinloopError",
     "__version__",
+    "autopilots",
     "contracts",
     "controllers",
     "errors",

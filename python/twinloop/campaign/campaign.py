@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop.arrays import Floats, floats, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
+from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
@@ -376,6 +377,14 @@ class Campaign(Lasting, kind="campaign"):
             NotAvailable: nothing was told.
         """
         return checks(self.examine())
+
+    def certificate(self) -> Certificate:
+        """The controller to fly with what speaks for it and what nobody tested, or why it is refused.
+
+        Raises:
+            NotAvailable: nothing was told.
+        """
+        return certificate(self)
 
     def margins(
         self, parameters: Mapping[str, float] | ArrayLike | None = None, broken_at: str = "axes"

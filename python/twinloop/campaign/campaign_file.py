@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from twinloop.autopilots.declared import Declared, declared
 from twinloop.campaign import Campaign
 from twinloop.campaign.presets import PRESETS
 from twinloop.controllers import UnboundFamily
@@ -23,7 +24,10 @@ else:
 
 MOST_BYTES = 10_000_000
 """Of a campaign file."""
-SECTIONS = ("dt", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options")
+SECTIONS = (
+    *("dt", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options"),
+    "autopilot",
+)
 TASK = ("initial_state", "target_state", "duration")
 CAMPAIGN = ("preset", "seed", "goal", "quality")
 TEMPLATE = """\
@@ -67,6 +71,12 @@ duration = 1.0                   # of a test, s
 "angle.kp" = 2.0
 "angle.ki" = 2.0
 "angle.kd" = 0.3
+
+# [autopilot]                    # to certify gains: what it calls them, in which unit, between which limits
+# kind = "px4"                   # or "px4-shell", "ardupilot", "betaflight", "ros2", "json"
+# [autopilot.parameters]         # parameter = scale * gain + offset
+# "angle.kp" = {{ name = "MC_ROLLRATE_P", scale = 0.1, limits = [0.01, 0.5] }}
+# "angle.ki" = false             # a gain that it has not got
 
 [campaign]
 preset = "default"               # or "paper"
@@ -125,21 +135,10 @@ def read_file(path: str | Path) -> CampaignFile:
         InvalidInput: no such file, no TOML, an unknown key, or a value that cannot be used.
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InvalidInput(
-                f"File {path}: expected a campaign file, found one of more than {MOST_BYTES} bytes."
-            )
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as reason:
-        raise InvalidInput(
-            f"File {path}: expected a campaign file, found {reason.strerror}; check its name."
-        ) from reason
-    except (ValueError, RecursionError) as reason:
-        if isinstance(reason, InvalidInput):
-            raise
-        raise InvalidInput(f"File {path}: expected TOML, found: {reason}; mend that line.") from reason
+    found = _toml_of(path)
     _keys(found, SECTIONS, ("dt", "states", "commands", "controller", "task", "first"), str(path))
+    if "autopilot" in found:
+        declared(found["autopilot"], f"File {path}")
     task = _section(found, "task", TASK, TASK)
     rest = _section(found, "campaign", CAMPAIGN, ())
     options = found.get("options", {})
@@ -157,6 +156,41 @@ def read_file(path: str | Path) -> CampaignFile:
         "options": options,
     }
     return CampaignFile(arguments, _section(found, "first", None, ()))
+
+
+def read_autopilot(path: str | Path) -> Declared | None:
+    """What a campaign file, or a file of that alone, declares of an autopilot.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        It, or None where the file has no section [autopilot].
+
+    Raises:
+        InvalidInput: no such file, no TOML, an unknown key, or a value that cannot be used.
+    """
+    path = Path(path)
+    found = _toml_of(path)
+    _keys(found, SECTIONS, (), str(path))
+    return declared(found["autopilot"], f"File {path}") if "autopilot" in found else None
+
+
+def _toml_of(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InvalidInput(
+                f"File {path}: expected a campaign file, found one of more than {MOST_BYTES} bytes."
+            )
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as reason:
+        raise InvalidInput(
+            f"File {path}: expected a campaign file, found {reason.strerror}; check its name."
+        ) from reason
+    except (ValueError, RecursionError) as reason:
+        if isinstance(reason, InvalidInput):
+            raise
+        raise InvalidInput(f"File {path}: expected TOML, found: {reason}; mend that line.") from reason
 
 
 def _members(found: Mapping[str, Any], name: str, kind: type[State] | type[Channel]) -> list[Any]:

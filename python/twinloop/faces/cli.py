@@ -16,6 +16,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.presets import PRESETS, options_of, parsed
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
 from twinloop.faces.by_hand import abandon, ask, attach, new, tell
+from twinloop.faces.certifying import certify
 from twinloop.faces.console import Watch
 from twinloop.faces.exporting import export
 from twinloop.faces.stored import resume, show
@@ -162,6 +163,7 @@ for command in (new, ask, tell, attach, abandon):
 main.add_command(resume)
 main.add_command(show)
 main.add_command(export)
+main.add_command(certify)
 
 
 def _change(preset: str, text: str) -> tuple[str, object]:

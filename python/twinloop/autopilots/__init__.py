@@ -1,0 +1,6 @@
+"""What autopilots call gains, and the files that they read: parameters, and chirps."""
+
+from twinloop.autopilots.files import Autopilot
+from twinloop.autopilots.parameters import Parameter
+
+__all__ = ["Autopilot", "Parameter"]

@@ -1,0 +1,153 @@
+"""The certificate of a controller to fly: what speaks for it, with numbers, and what nobody tested; or a refusal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from twinloop.campaign.examination.check import Checks
+from twinloop.campaign.examination.checking import checks
+from twinloop.campaign.history import Experiment
+from twinloop.controllers.gains import FixedGain, Gain
+from twinloop.law.linear.margins import Margins
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from twinloop.campaign.campaign import Campaign
+
+
+@dataclass(frozen=True)
+class Use:
+    """What a flight uses of the range of a state, beside what was flown before.
+
+    Args:
+        name: of the state.
+        unit: of it.
+        envelope: between which it is safe; None: nothing is declared.
+        foretold: least and largest value of the predicted band.
+        flown: least and largest reading of all flights.
+    """
+
+    name: str
+    unit: str
+    envelope: tuple[float, float] | None
+    foretold: tuple[float, float]
+    flown: tuple[float, float]
+
+    @property
+    def beyond_flown(self) -> bool:
+        """Whether it leads where nobody has flown."""
+        return self.foretold[0] < self.flown[0] or self.foretold[1] > self.flown[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """A controller to fly with what speaks for it, or why there is none.
+
+    Args:
+        checks: all of the campaign.
+        law_gains: of the controllers, with units and bounds.
+        best: the controller to fly; None where there is none.
+        old: the controller that was flown first, to go back to; None where none was.
+        experiments: that it was judged on.
+        members: models of the committee.
+        margins: of its loops; None where they cannot be computed.
+        step: the predicted flight of its task, with a band; None without a controller.
+        uses: of the range of each state.
+        not_tested: what nobody has tested, in sentences.
+    """
+
+    checks: Checks
+    law_gains: tuple[Gain | FixedGain, ...]
+    best: Test | None
+    old: Test | None
+    experiments: tuple[Experiment, ...]
+    members: int
+    margins: Margins | None
+    step: Trajectory | None
+    uses: tuple[Use, ...]
+    not_tested: tuple[str, ...]
+
+    @property
+    def refusals(self) -> tuple[str, ...]:
+        """Why it is refused, in sentences; empty if it is granted."""
+        return tuple(check.sentence for check in self.checks.failed)
+
+    @property
+    def granted(self) -> bool:
+        """Whether the controller may be flown, as far as checks can tell."""
+        return self.best is not None and not self.refusals
+
+
+def certificate(campaign: Campaign) -> Certificate:
+    """The certificate of a campaign's controller.
+
+    Args:
+        campaign: with at least one experiment told.
+
+    Raises:
+        NotAvailable: nothing was told.
+    """
+    found = campaign.examine()
+    best, twin = found.best, found.twin
+    step = None if best is None else twin.simulate(best)
+    uses = () if step is None else _uses(found.experiments, step)
+    return Certificate(
+        checks=checks(found),
+        law_gains=tuple(campaign.family.law_gains),
+        best=best,
+        old=next((run.test for run in found.experiments if run.test is not None), None),
+        experiments=found.experiments,
+        members=len(twin.members),
+        margins=found.margins,
+        step=step,
+        uses=uses,
+        not_tested=() if best is None else tuple(_not_tested(best, found.experiments, found.margins, uses)),
+    )
+
+
+def _uses(experiments: tuple[Experiment, ...], step: Trajectory) -> tuple[Use, ...]:
+    signals = experiments[0].replayed.family.signals
+    low, high = (step.states, step.states) if step.band is None else step.band
+    uses = []
+    for i, state in enumerate(signals.states):
+        flown = [run.trajectory.states[:, i] for run in experiments]
+        uses.append(
+            Use(
+                name=state.name,
+                unit=state.unit,
+                envelope=state.envelope,
+                foretold=(float(low[:, i].min()), float(high[:, i].max())),
+                flown=(min(float(x.min()) for x in flown), max(float(x.max()) for x in flown)),
+            )
+        )
+    return tuple(uses)
+
+
+def _not_tested(
+    best: Test, experiments: tuple[Experiment, ...], margins: Margins | None, uses: tuple[Use, ...]
+) -> list[str]:
+    """What nobody tested, from what is there."""
+    signals = best.family.signals
+    said = []
+    if not any(run.number == best.number for run in experiments):
+        said.append("These gains have not flown: all that is said of them is predicted.")
+    said.append(
+        f"Other starts and targets than the task's, and flights longer than {best.steps * signals.dt:g} s."
+    )
+    said += [
+        f"{use.name} is foretold between {use.foretold[0]:.3g} and {use.foretold[1]:.3g} {use.unit}, and was flown"
+        f" between {use.flown[0]:.3g} and {use.flown[1]:.3g}: the twin goes on from its equations there."
+        for use in uses
+        if use.beyond_flown
+    ]
+    bare = [use.name for use in uses if use.envelope is None]
+    if bare:
+        said.append(
+            f"No envelope is declared for {', '.join(bare)}: nobody looked whether the flight stays safe there."
+        )
+    if margins is None:
+        said.append("Margins of stability: the controller or the twin has no slope at the target.")
+    said.append("Another load, battery, temperature or wind than in these flights, and wear.")
+    return said

@@ -1,0 +1,183 @@
+"""A certificate as a plain dictionary and as one page of HTML, to be printed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from twinloop import __version__
+from twinloop.arrays import Floats
+from twinloop.autopilots import Autopilot
+from twinloop.campaign import Campaign
+from twinloop.campaign.certificate import Certificate
+from twinloop.errors import NotAvailable
+from twinloop.faces.result import plain_dict, quality_unit
+
+WIDTH, HEIGHT = 240.0, 120.0
+"""Of a picture of a state, in its own units."""
+
+
+def facts(
+    campaign: Campaign,
+    found: Certificate,
+    store: str,
+    name: str,
+    autopilot: Autopilot | None,
+    files: Mapping[str, str],
+) -> dict[str, Any]:
+    """A certificate as numbers and texts.
+
+    Args:
+        campaign: that it is of.
+        found: its certificate.
+        store: where the campaign is kept.
+        name: of the campaign.
+        autopilot: that the gains are for; None: none.
+        files: names of the parameter files, as "restore" and "gains"; empty: none was written.
+
+    Returns:
+        A plain dictionary; None for a number that is not finite.
+    """
+    best, quality = found.best, campaign.setup.quality
+    result: dict[str, Any] = {
+        "kind": "certificate",
+        "version": 1,
+        "granted": found.granted,
+        "refusals": found.refusals,
+        "campaign": {
+            "name": name,
+            "store": store,
+            "preset": campaign.setup.preset,
+            "seed": campaign.setup.seed,
+            "twinloop": __version__,
+        },
+        "gains": _gains(found, autopilot),
+        "judged_on": {
+            "experiments": [
+                {"test": run.number, "ended": run.trajectory.ended, "quality": run.quality}
+                for run in found.experiments
+            ],
+            "members": found.members,
+            "checks": [{**dataclasses.asdict(check), "verdict": check.verdict} for check in found.checks],
+        },
+        "margins": None if found.margins is None else dataclasses.asdict(found.margins),
+        "prediction": None,
+        "envelope": [{**dataclasses.asdict(use), "beyond_flown": use.beyond_flown} for use in found.uses],
+        "risk": None if best is None else best.risk,
+        "not_tested": found.not_tested,
+        "autopilot": None,
+    }
+    if best is not None and found.step is not None:
+        result["prediction"] = {
+            "kind": quality.kind,
+            "unit": quality_unit(quality),
+            "quality": best.predicted,
+            "spread": best.spread,
+            "t": found.step.t,
+            "states": found.step.states,
+            "band": found.step.band,
+            "target": best.target_state,
+        }
+    if autopilot is not None:
+        result["autopilot"] = {"kind": autopilot.kind, "files": dict(files), "parameters": []}
+        if files and best is not None and found.old is not None:
+            old = autopilot.values(found.old.parameters)
+            result["autopilot"]["parameters"] = [
+                {"name": each, "new": value, "old": old[each]}
+                for each, value in autopilot.values(best.parameters).items()
+            ]
+    return plain_dict(result)
+
+
+def page(facts: Mapping[str, Any], names: Sequence[str], units: Sequence[str]) -> str:
+    """A certificate as HTML, whole in one file.
+
+    Args:
+        facts: of the certificate.
+        names: of the states.
+        units: of the states.
+
+    Raises:
+        NotAvailable: Jinja2 is missing.
+    """
+    try:
+        import jinja2
+    except ImportError as missing:
+        raise NotAvailable(
+            "Certificate: expected the package jinja2 to write the page with, found none; pip install"
+            " 'twinloop[report]'."
+        ) from missing
+    room = jinja2.Environment(
+        loader=jinja2.PackageLoader("twinloop.faces"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return room.get_template("certificate.html").render(
+        c=facts,
+        title="Gain certificate" if facts["granted"] else "Gain certificate: refused",
+        number=_number,
+        degrees=lambda value: None if value is None else math.degrees(value),
+        plots=_plots(facts["prediction"], names, units),
+    )
+
+
+def _gains(found: Certificate, autopilot: Autopilot | None) -> list[dict[str, Any]]:
+    if found.best is None:
+        return []
+    old = {} if found.old is None else found.old.parameters
+    rows = []
+    for gain in found.law_gains:
+        parameter = None if autopilot is None else autopilot.parameters.get(gain.name)
+        rows.append({
+            "name": gain.name,
+            "unit": gain.unit,
+            "value": found.best.parameters[gain.name],
+            "old": old.get(gain.name),
+            "low": getattr(gain, "low", None),
+            "high": getattr(gain, "high", None),
+            "parameter": None if parameter is None else parameter.name,
+        })  # fmt: skip
+    return rows
+
+
+def _number(value: float | None) -> str:
+    """For a person; what is not finite is without end."""
+    return "∞" if value is None else f"{value:.4g}"
+
+
+def _plots(
+    prediction: Mapping[str, Any] | None, names: Sequence[str], units: Sequence[str]
+) -> list[dict[str, str]]:
+    """Pictures of the predicted states: points of lines, and the same in words."""
+    if prediction is None:
+        return []
+    t, states = np.array(prediction["t"]), np.array(prediction["states"])
+    band = None if prediction["band"] is None else np.array(prediction["band"], dtype=np.float64)
+    target = np.broadcast_to(np.array(prediction["target"]), states.shape) if states.size else states
+    plots = []
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
+        curves = [
+            states[:, i],
+            target[: len(states), i],
+            *([] if band is None else [band[0, :, i], band[1, :, i]]),
+        ]
+        finite = np.concatenate(curves)[np.isfinite(np.concatenate(curves))]
+        low, high = float(finite.min()), float(finite.max())
+        lines = [_points(t, curve, low, high) for curve in curves]
+        area = f"{lines[2]} {' '.join(reversed(lines[3].split()))}" if band is not None else ""
+        ends = f"from {states[0, i]:.3g} to {states[-1, i]:.3g} {unit} in {t[-1]:.3g} s; shown: {low:.3g} to {high:.3g}"
+        plots.append({"name": name, "curve": lines[0], "target": lines[1], "band": area, "words": ends})
+    return plots
+
+
+def _points(t: Floats, values: Floats, low: float, high: float) -> str:
+    across = np.zeros(len(t)) if t[-1] == 0.0 else WIDTH * t / t[-1]
+    up = HEIGHT * (0.5 if high == low else 0.05 + 0.9 * (high - values) / (high - low))
+    up = np.broadcast_to(up, across.shape)
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, up, strict=True) if math.isfinite(y))

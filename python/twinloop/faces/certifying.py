@@ -1,0 +1,106 @@
+"""`twinloop certify`: the certificate of a controller to fly, with the files that set it and that take it back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from twinloop.autopilots import Autopilot
+from twinloop.autopilots.files import FORMATS
+from twinloop.campaign import Campaign
+from twinloop.campaign.campaign_file import read_autopilot
+from twinloop.campaign.certificate import Certificate
+from twinloop.errors import InvalidInput
+from twinloop.faces.certificate import facts, page
+from twinloop.faces.files import write_text
+from twinloop.faces.result import to_json
+
+
+@click.command()
+@click.argument("store", type=Path)
+@click.option(
+    "-o", "--output", type=Path, required=True, metavar="FOLDER", help="Where to write; made if need be."
+)
+@click.option("--autopilot", "kind", help=f"Write parameter files for {', '.join(FORMATS)}.")
+@click.option(
+    "--mapping",
+    type=Path,
+    metavar="FILE.toml",
+    help="What it calls the gains; by default STORE.toml, [autopilot].",
+)
+@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.pass_context
+def certify(
+    context: click.Context,
+    store: Path,
+    output: Path,
+    kind: str | None,
+    mapping: Path | None,
+    name: str | None,
+) -> None:
+    """Certify the controller to fly of STORE, or say why not.
+
+    Writes certificate.html and certificate.json into FOLDER and, with --autopilot, first restore.* with the old gains
+    and then gains.* with the new ones. Exits with 1 where the certificate is refused; then no parameter file is
+    written, and gains.* of an earlier time are removed.
+    """
+    if not store.exists():
+        raise InvalidInput(
+            f"Store {store}: expected a store with a campaign, found no file; run with --store."
+        )
+    autopilot = _autopilot(store, kind, mapping)
+    campaign = Campaign.load(store, name, read_only=True)
+    found = campaign.certificate()
+    texts = _parameter_files(found, autopilot)
+    names = {key: file for key, (file, _) in texts.items()}
+    known = facts(campaign, found, str(store), name or "campaign", autopilot, names)
+    signals = campaign.signals
+    html = page(known, signals.state_names, [state.unit for state in signals.states])
+    output.mkdir(parents=True, exist_ok=True)
+    for suffix in {form.suffix for form in FORMATS.values()}:
+        (output / f"gains{suffix}").unlink(missing_ok=True)
+    # What takes the gains back is there before what sets them, whatever happens between.
+    for file, text in texts.values():
+        write_text(output / file, text)
+    write_text(output / "certificate.json", to_json(known))
+    write_text(output / "certificate.html", html)
+    files = ", ".join(str(output / file) for file, _ in texts.values())
+    if found.granted:
+        click.echo(f"Granted: {output / 'certificate.html'}" + (f"; {files}" if files else "") + ".")
+        return
+    click.echo(f"Refused: {output / 'certificate.html'}. {' '.join(found.refusals)}")
+    context.exit(1)
+
+
+def _autopilot(store: Path, kind: str | None, mapping: Path | None) -> Autopilot | None:
+    file = store.with_suffix(".toml") if mapping is None else mapping
+    declared = read_autopilot(file) if file.exists() or mapping is not None else None
+    chosen = kind if kind is not None or declared is None else declared.kind
+    if declared is not None and chosen is not None:
+        return declared.autopilot(chosen)
+    if kind is not None:
+        raise InvalidInput(
+            f"twinloop certify --autopilot: expected a section [autopilot.parameters] in {file}, found none; declare"
+            " there what it calls each gain."
+        )
+    return None
+
+
+def _parameter_files(found: Certificate, autopilot: Autopilot | None) -> dict[str, tuple[str, str]]:
+    """Names and texts of the parameter files, the one with the old gains first; none where it is refused."""
+    if autopilot is None or not found.granted or found.best is None:
+        return {}
+    if found.old is None:
+        raise InvalidInput(
+            "twinloop certify: expected a flight under gains that can be restored, found none; tell one, or leave"
+            " --autopilot out."
+        )
+    suffix = autopilot.suffix
+    return {
+        "restore": (
+            f"restore{suffix}",
+            autopilot.text(found.old.parameters, "The old gains: load to go back."),
+        ),
+        "gains": (f"gains{suffix}", autopilot.text(found.best.parameters, "The new gains, as certified.")),
+    }

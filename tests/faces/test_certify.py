@@ -1,0 +1,205 @@
+"""The certificate of a controller: granted or refused with its reason, and the files that set gains or restore them."""
+
+import json
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import twinloop as tl
+from conftest import PENDULUM_GAINS
+from lives import CONTROLLER, SIGNALS, SMALL
+from twinloop.campaign.certificate import certificate
+from twinloop.faces.certificate import facts, page
+from twinloop.faces.cli import main
+
+MAPPING = """
+[autopilot]
+kind = "px4"
+[autopilot.parameters]
+"angle.kp" = { name = "MC_PITCH_P", scale = 0.1, limits = [0.0, 1.0] }
+"angle.ki" = { name = "MC_PITCH_I", offset = 0.5 }
+"angle.kd" = "MC_PITCH_D"
+"""
+
+
+class Page(HTMLParser):
+    """Texts and tags of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.texts, self.tags, self.outside = [], [], []
+        self.feed(text)
+        self.text = " ".join(" ".join(self.texts).split())
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.outside += [value for name, value in attributes if name in ("src", "href", "onload", "onclick")]
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """A campaign whose controller is granted, and where it is kept."""
+    pytest.importorskip("sqlalchemy")
+    store = tmp_path_factory.mktemp("rig") / "rig.db"
+    campaign = rig_campaign()
+    campaign.run(plant(), experiments=3)
+    campaign.save(store)
+    assert not campaign.certificate().refusals
+    return campaign, store
+
+
+def swinging(state, command):
+    """A period of a linear pendulum, in small steps."""
+    angle, rate = state
+    for _ in range(50):
+        rate += 0.001 * (11.0 * command[0] - 0.8 * rate - 5.0 * angle)
+        angle += 0.001 * rate
+    return angle, rate
+
+
+def plant():
+    return tl.systems.Simulated(SIGNALS, swinging, default_gains=PENDULUM_GAINS, noise=[0.005, 0.02])
+
+
+def rig_campaign():
+    return tl.Campaign(
+        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
+        options={**SMALL, "draws": 8},
+    )  # fmt: skip
+
+
+def certify(store, folder, *options, mapping=MAPPING):
+    file = store.with_name("mapping.toml")
+    file.write_text(mapping, encoding="utf-8")
+    return CliRunner().invoke(
+        main, ["certify", str(store), "-o", str(folder), "--mapping", str(file), *options]
+    )
+
+
+def parameters(path):
+    rows = [line.split("\t") for line in path.read_text().splitlines() if not line.startswith("#")]
+    return {row[2]: float(row[3]) for row in rows}
+
+
+def test_a_granted_controller_comes_with_its_parameters_and_with_the_old_ones(flown, tmp_path):
+    campaign, store = flown
+    done = certify(store, tmp_path / "made" / "here")
+    assert done.exit_code == 0 and done.stdout.startswith("Granted: "), done.output
+    folder = tmp_path / "made" / "here"
+    best, old = campaign.best_test.parameters, PENDULUM_GAINS
+    for file, gains in (("gains.params", best), ("restore.params", old)):
+        found = parameters(folder / file)
+        expected = {
+            "MC_PITCH_P": 0.1 * gains["angle.kp"],
+            "MC_PITCH_I": gains["angle.ki"] + 0.5,
+            "MC_PITCH_D": gains["angle.kd"],
+        }
+        assert found == {name: pytest.approx(value, rel=1e-6) for name, value in expected.items()}
+    said = json.loads((folder / "certificate.json").read_text())
+    assert said["granted"] and {row["name"]: row["value"] for row in said["gains"]} == best
+    assert {row["name"]: row["old"] for row in said["gains"]} == old
+    assert said["autopilot"]["files"] == {"restore": "restore.params", "gains": "gains.params"}
+    margins = campaign.margins()
+    assert said["margins"]["worst"][0]["phase"] == margins.worst[0].phase
+    step = campaign.twin.simulate(campaign.best_test)
+    np.testing.assert_array_equal(said["prediction"]["states"], step.states)
+    assert [check["name"] for check in said["judged_on"]["checks"]] == [c.name for c in campaign.checks()]
+
+
+def test_the_page_says_the_same_and_needs_no_network(flown, tmp_path):
+    _, store = flown
+    certify(store, tmp_path)
+    html = (tmp_path / "certificate.html").read_text(encoding="utf-8")
+    found, said = Page(html), json.loads((tmp_path / "certificate.json").read_text())
+    assert "script" not in found.tags and not found.outside and "http" not in html.replace("http-equiv", "")
+    assert "Granted" in found.text and "MC_PITCH_P" in found.text
+    for sentence in [*said["not_tested"], *(check["sentence"] for check in said["judged_on"]["checks"])]:
+        assert " ".join(sentence.split()) in found.text
+    assert found.tags.count("svg") == SIGNALS.n_x
+
+
+def test_a_controller_that_fails_a_check_is_refused_and_sets_nothing(flown, tmp_path):
+    pytest.importorskip("sqlalchemy")
+    _, good = flown
+    certify(good, tmp_path / "made")
+    assert (tmp_path / "made" / "gains.params").exists()
+    campaign = rig_campaign()
+    campaign.run(plant(), experiments=1)
+    store = tmp_path / "young.db"
+    campaign.save(store)
+    done = certify(store, tmp_path / "made")
+    assert done.exit_code == 1 and "Fly one more" in done.stdout
+    assert not (tmp_path / "made" / "gains.params").exists()  # nor one of an earlier time
+    said = json.loads((tmp_path / "made" / "certificate.json").read_text())
+    assert not said["granted"] and said["autopilot"]["files"] == {}
+    assert "Do not fly these gains" in Page((tmp_path / "made" / "certificate.html").read_text()).text
+
+
+@pytest.mark.parametrize(
+    ("mapping", "said"),
+    [
+        (MAPPING.replace("[0.0, 1.0]", "[0.0, 0.01]"), "nothing is written"),
+        (MAPPING.replace('"angle.kd" = "MC_PITCH_D"', ""), "'angle.kd'"),
+        (MAPPING.replace("MC_PITCH_D", "MC_PITCH_P"), "twice"),
+        (MAPPING.replace("MC_PITCH_D", "a\\nparam set X 1"), "name of a parameter"),
+        (MAPPING.replace('"px4"', '"px5"'), "autopilot"),
+        ("[autopilot", "TOML"),
+        ("[autopilots]", "autopilot"),
+    ],
+)
+def test_a_mapping_that_cannot_be_used_writes_nothing(flown, tmp_path, mapping, said):
+    done = certify(flown[1], tmp_path / "made", mapping=mapping)
+    assert done.exit_code == 2 and said in done.stderr and done.stderr.count("\n") == 1
+    assert not (tmp_path / "made").exists()
+
+
+def test_the_restore_file_is_written_first(flown, tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr("twinloop.faces.certifying.write_text", lambda path, text: written.append(path.name))
+    certify(flown[1], tmp_path, "--autopilot", "ros2", mapping=MAPPING.replace("MC_", "mc."))
+    assert written[:2] == ["restore.yaml", "gains.yaml"]
+
+
+def test_an_autopilot_without_a_mapping_is_refused_and_without_one_there_is_the_certificate_alone(
+    flown, tmp_path
+):
+    store = flown[1]
+    arguments = ["certify", str(store), "-o", str(tmp_path / "made")]
+    done = CliRunner().invoke(main, [*arguments, "--autopilot", "px4"])
+    assert done.exit_code == 2 and "autopilot.parameters" in done.stderr
+    assert CliRunner().invoke(main, arguments).exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "made").iterdir()) == [
+        "certificate.html",
+        "certificate.json",
+    ]
+
+
+def test_hostile_texts_stay_texts_on_the_page(flown):
+    campaign = flown[0]
+    evil = '"><script>alert(1)</script>\n<img src=x onerror=alert(1)>'
+    known = facts(campaign, certificate(campaign), evil, evil, None, {})
+    known["gains"][0]["name"] = known["not_tested"][0] = evil
+    found = Page(page(known, [evil, evil], [evil, evil]))
+    assert "script" not in found.tags and "img" not in found.tags
+    assert "<script>alert(1)</script>" in found.text
+
+
+def test_nothing_told_is_no_certificate():
+    with pytest.raises(tl.NotAvailable, match="told"):
+        rig_campaign().certificate()
+
+
+def test_a_campaign_file_may_declare_an_autopilot(tmp_path):
+    from twinloop.campaign.campaign_file import read_autopilot, read_file, template
+
+    file = tmp_path / "rig.toml"
+    file.write_text(template("rig.db").partition("[options]")[0] + MAPPING, encoding="utf-8")
+    assert read_file(file).arguments["preset"] == "default"
+    assert read_autopilot(file).kind == "px4"
+    file.write_text(template("rig.db"), encoding="utf-8")
+    assert read_autopilot(file) is None
