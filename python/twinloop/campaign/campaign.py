@@ -32,6 +32,7 @@ from twinloop.objectives import closed_loop
 from twinloop.remarks import warn
 from twinloop.signals import Signals
 from twinloop.systems import System
+from twinloop.systems.patience import run_within
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory
 
@@ -274,7 +275,7 @@ class Campaign(Lasting, kind="campaign"):
         """
         return self._book.status(test)
 
-    def run(self, system: System, experiments: int = 4) -> Campaign:
+    def run(self, system: System, experiments: int = 4, *, timeout: float | None = None) -> Campaign:
         """The whole loop; the last test is that of `ask(last=True)`.
 
         What was asked for, and neither told nor abandoned, is flown first. Where nothing was told, the first test is
@@ -284,6 +285,7 @@ class Campaign(Lasting, kind="campaign"):
             system: anything with `signals` and `run(test)`.
             experiments: runs on the system in all, the first, those told before and those that failed included, those
                 that were attached not.
+            timeout: seconds that the system may take for a test; None: as long as it wants.
 
         Returns:
             The campaign.
@@ -294,6 +296,7 @@ class Campaign(Lasting, kind="campaign"):
             KeyboardInterrupt: Ctrl-C. Nothing that was told is lost: `interrupted` says so, the results give the best
                 so far, and calling again goes on from there with the same bits.
             NotAvailable: there is no first test.
+            SystemFailure: the system did not answer in time, or failed; its test still waits and nothing is lost.
         """
         budget = whole("Campaign.run, experiments", experiments, least=1)
         described = isinstance(getattr(system, "signals", None), Signals)
@@ -316,7 +319,7 @@ class Campaign(Lasting, kind="campaign"):
                 test = self._next(system, last=self._book.runs + 1 == budget)
                 check_signals(test, system.signals)
                 self._report_experiment()
-                self.tell(test, system.run(test))
+                self.tell(test, run_within(system, test, timeout))
         return self
 
     # What came out
