@@ -163,6 +163,7 @@ _DEFAULT_RANGES: dict[str, tuple[float, float]] = {
     "starts": (1, 1000),
     "largest": (1, 200),
     "most_terms": (1, 3000),
+    "most_readings": (10, 10_000_000),
     "longest_delay": (0, 100),
     "tuning_steps": (0, 1000),
     "passes": (1, 10),

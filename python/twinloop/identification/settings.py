@@ -28,6 +28,8 @@ class IdentificationOptions:
         bounded_terms: what is known of constants, such as "rate: sin(angle) in -20 .. -5": the coefficient of a term
             in the equation of a state lies between two numbers, either of which may be left out; bounds that exclude 0
             say that the term is in the law.
+        most_readings: that a twin is learnt from, those of all states at one time counted once; of more, whole flights
+            are left out that are neither recent nor were a surprise.
         operators: that evolved programs may use.
         generations: of evolved features; 0: none.
         restarts: of the evolution.
@@ -59,6 +61,7 @@ class IdentificationOptions:
     seed_terms: tuple[str, ...] = ()
     fixed_terms: tuple[str, ...] = ()
     bounded_terms: tuple[str, ...] = ()
+    most_readings: int = 12_000
     operators: tuple[str, ...] = ("+", "-", "*", "/", "abs", "sqrt", "sin", "cos", "min", "max")
     generations: int = 6
     restarts: int = 1

@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
@@ -18,18 +19,6 @@ AS_FAST = (0.5, 2.0)
 """Times as fast as its derivative says, between which a state is taken to do what was declared."""
 ALIKE = 0.5
 """Correlation with its integrated derivative below which a state is taken to do something else."""
-
-
-def distinct(experiments: Sequence[Experiment]) -> list[Experiment]:
-    """Experiments without those whose record is an earlier one's to the last bit: they tell nothing new.
-
-    Args:
-        experiments: in the order told.
-    """
-    first: dict[tuple[bytes, bytes], Experiment] = {}
-    for run in experiments:
-        first.setdefault((run.trajectory.states.tobytes(), run.trajectory.commands.tobytes()), run)
-    return list(first.values())
 
 
 def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, steps: int) -> list[Remark]:

@@ -19,8 +19,9 @@ from twinloop.campaign.identify_and_plan.calibration import (
     needed_factor,
 )
 from twinloop.campaign.identify_and_plan.choice import Choice
-from twinloop.campaign.identify_and_plan.diagnostics import distinct, doubts
+from twinloop.campaign.identify_and_plan.diagnostics import doubts
 from twinloop.campaign.identify_and_plan.following import following
+from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -165,7 +166,8 @@ class IdentifyAndPlan:
     def _learnt(self, book: Logbook) -> Learnt:
         known, told = self.memory.asked, len(book.experiments)
         needed = () if known is None else self._calibrated(known, book)
-        runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in distinct(book.experiments)]
+        flights = learnt_from(book.experiments, self.options.most_readings)
+        runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights]
         identified = identify_runs(
             runs,
             self.setup.signals,
