@@ -11,6 +11,7 @@ import numpy as np
 
 from twinloop.autopilots.parameters import Parameter, Value, translated
 from twinloop.errors import InvalidInput, unknown
+from twinloop.texts import one_line
 
 Set = dict[str, tuple[Value, bool]]
 """Values by the names of parameters, with whether each is a whole number."""
@@ -162,15 +163,6 @@ class Autopilot:
                 )
             held[name] = (value if whole else float(np.float32(value))), whole
         return held
-
-
-def one_line(text: str) -> str:
-    """A text on one line without control characters, as a comment may hold it.
-
-    Args:
-        text: from anybody.
-    """
-    return " ".join("".join(each if each.isprintable() else " " for each in text).split())
 
 
 def _short(value: Value) -> str:

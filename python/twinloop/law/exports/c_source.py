@@ -10,6 +10,7 @@ from twinloop.law.exports.python_source import joined, stepped_roots
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Writer, decimal
 from twinloop.signals import RigidBody
+from twinloop.texts import one_line
 
 KEYWORDS = frozenset(
     """
@@ -98,7 +99,7 @@ def _source(law: Law, name: str, precision: str) -> str:
 
 def _comment(unit: str) -> str:
     """A unit as a comment may hold it."""
-    return " ".join(unit.replace("*/", "* /").split()) or "1"
+    return one_line(unit).replace("*/", "* /").replace("/*", "/ *") or "1"
 
 
 def _number(value: float, precision: str) -> str:

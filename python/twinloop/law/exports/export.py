@@ -58,6 +58,8 @@ MODULES: dict[str, tuple[str, Callable[[Law], str], Callable[[str], Simulation]]
 """Kinds that are modules of Python: what they are called, how they are written, and how they are run."""
 FMUS = {"fmu3": 3, "fmu2": 2}
 """Versions of FMI."""
+UNFIT = frozenset("\"'<>\\")
+"""What the name of a file may not have: C includes it between quotes."""
 PRECISIONS = ("double", "float")
 
 
@@ -111,6 +113,11 @@ def asked(to: str | Path, kind: str | None) -> tuple[str, Path | None]:
         raise InvalidInput(
             f"Export: expected a path that ends in {SUFFIXES[kind]} for the kind {kind!r}, found {str(path)!r};"
             " change it."
+        )
+    if not path.stem.isprintable() or set(path.stem) & UNFIT:
+        raise InvalidInput(
+            f"Export: expected a file name without quotes, backslashes and control characters, found {path.name!r}; its"
+            " header is included by that name. Choose another one."
         )
     if not path.parent.is_dir():
         raise InvalidInput(f"Export: expected an existing folder, found {str(path.parent)!r}; make it first.")

@@ -11,6 +11,7 @@ from twinloop.law.exports.python_source import equation_roots, joined
 from twinloop.law.expressions import Expressions
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Writer
+from twinloop.texts import one_line
 
 SYMPY = Dialect({
     "abs": "sp.Abs({})", "sqrt": "sp.sqrt(sp.Abs({}))", "min": "sp.Min({}, {})", "max": "sp.Max({}, {})",
@@ -143,7 +144,7 @@ def _notes(law: Law, digits: int) -> list[str]:
     filled = [
         line for line in lines if line.startswith(tuple(f"d {name} / dt" for name in law.hidden_symbols))
     ]
-    return [line[2:] for line in lines if line.startswith("# ")] + filled
+    return [one_line(note) for note in [line[2:] for line in lines if line.startswith("# ")] + filled]
 
 
 def latex_name(name: str) -> str:

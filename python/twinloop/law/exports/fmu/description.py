@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 from twinloop._core import __version__
 from twinloop.arrays import Floats
 from twinloop.law.law import Law
+from twinloop.texts import one_line
 
 Tree = ElementTree.Element
 TIME = 0
@@ -50,11 +51,11 @@ def variables(law: Law, start: Floats, rest: Floats) -> list[Variable]:
     found = [Variable(time, TIME, "independent", {"unit": "s"})]
     for state, value, offset in zip(signals.states, start.tolist(), law.offsets, strict=True):
         late = f"read {offset:+.6g} s after the states that the equations drive" if offset else ""
-        attributes = {"unit": plain(state.unit), "nominal": repr(state.scale), "start": repr(value)}
+        attributes = {"unit": one_line(state.unit), "nominal": repr(state.scale), "start": repr(value)}
         found.append(Variable(state.name, len(found), "output", attributes, late))
     for command, value in zip(signals.commands, rest.tolist(), strict=True):
         low, high = (repr(bound) for bound in command.bounds)
-        attributes = {"unit": plain(command.unit), "min": low, "max": high, "start": repr(value)}
+        attributes = {"unit": one_line(command.unit), "min": low, "max": high, "start": repr(value)}
         found.append(Variable(command.name, len(found), "input", attributes, "held for a period"))
     for name in law.hidden_symbols:
         found.append(Variable(name, len(found), "local", {}, "a hidden state that commands fill"))
@@ -142,15 +143,6 @@ def source_files(version: int, name: str) -> tuple[str, str]:
         name: the model's identifier.
     """
     return f"fmi{version}-functions.c", f"{name}.c"
-
-
-def plain(text: str) -> str:
-    """A text as one line of an attribute: XML has no place for control characters.
-
-    Args:
-        text: such as a unit.
-    """
-    return " ".join("".join(each if each.isprintable() else " " for each in text).split())
 
 
 def _child(parent: Tree, tag: str, attributes: dict[str, str] | None = None) -> Tree:

@@ -1,0 +1,87 @@
+"""A twin that an earlier version saved loads in this one, in another process, and gives the same numbers to the bit.
+
+For each version whose records differ a file is added, never changed, by its own checkout: `write(folder)` below.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from law_twins import SIGNALS, TWINS
+from twinloop.law.accuracy import TestErrors
+from twinloop.law.noise import LastingDisturbance, Noise
+
+FOLDER = Path(__file__).parent / "twins"
+SAVED = sorted(FOLDER.glob("*.json"))
+STEPS = 12
+RUN = """
+import json, sys, twinloop as tl
+saved = json.load(open(sys.argv[1], encoding="utf-8"))
+open(sys.argv[2], "w", encoding="utf-8").write(saved["twin"])
+twin = tl.load_twin(sys.argv[2])
+given = [[float.fromhex(v) for v in row] for row in [saved["start"], *saved["commands"]]]
+states = twin.simulate_commands(given[0], given[1:]).states
+print(json.dumps({"states": [[v.hex() for v in row] for row in states.tolist()], "equations": twin.equations(17)}))
+"""
+
+
+def write(folder=FOLDER):
+    """Saves twins of all kinds with the version at hand, and what they simulate."""
+    for which, name in (("actuators and hidden states", "hidden"), ("kinematics", "body")):
+        bare = TWINS[which]()
+        low, high = np.array([command.bounds for command in bare.signals.commands]).T
+        shares = np.modf(0.3819660112501051 * np.arange(1, STEPS * len(low) + 1))[0].reshape(STEPS, -1)
+        flight = bare.simulate_commands(np.full(bare.signals.n_x, 0.125), low + (high - low) * shares)
+        noise = Noise(
+            np.full(bare.signals.n_x, 1e-3),
+            np.zeros(bare.signals.n_x),
+            (LastingDisturbance((1, 0), True, 0.1, 0.3),) if bare.signals is SIGNALS else (),
+            0.05,
+        )
+        twin = tl.Twin(
+            bare.model, bare.signals, [TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)], members=[bare.model],
+            noise=noise, seed=3, inflation=1.5, offsets=bare.offsets, flights=[flight],
+        )  # fmt: skip
+        saved = {
+            "twin": twin.export("json"),
+            "start": [value.hex() for value in flight.states[0].tolist()],
+            "commands": [[value.hex() for value in row] for row in flight.commands.tolist()],
+            "states": [[value.hex() for value in row] for row in flight.states.tolist()],
+            "equations": twin.equations(17),
+        }
+        text = json.dumps(saved, indent=1) + "\n"
+        (folder / f"{tl.__version__}-{name}.json").write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", SAVED, ids=lambda path: path.stem)
+def test_a_twin_of_an_earlier_version_gives_the_same_numbers_in_another_process(path, tmp_path):
+    saved = json.loads(path.read_text(encoding="utf-8"))
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, path, tmp_path / "twin.json"], capture_output=True, text=True, check=True
+    )
+    found = json.loads(done.stdout)
+    assert len(found["states"]) == STEPS + 1
+    assert found["states"] == saved["states"]
+    assert found["equations"] == saved["equations"]
+
+
+@pytest.mark.parametrize("path", SAVED, ids=lambda path: path.stem)
+def test_all_of_it_comes_back(path, tmp_path):
+    saved = json.loads(path.read_text(encoding="utf-8"))
+    (tmp_path / "twin.json").write_text(saved["twin"], encoding="utf-8")
+    twin = tl.load_twin(tmp_path / "twin.json")
+    assert len(twin.members) == len(twin.flights) == 1 and twin.noise is not None
+    assert (twin.seed, twin.inflation, twin.errors[0].closed_loop) == (3, 1.5, 2e-5)
+    assert twin.export("json") == saved["twin"]  # nothing was lost on the way
+
+
+def test_a_newer_record_is_refused_with_a_sentence(tmp_path):
+    record = json.loads(json.loads(SAVED[0].read_text(encoding="utf-8"))["twin"])
+    (tmp_path / "twin.json").write_text(json.dumps({**record, "version": 99}), encoding="utf-8")
+    with pytest.raises(tl.InvalidInput, match="99"):
+        tl.load_twin(tmp_path / "twin.json")
