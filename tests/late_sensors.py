@@ -4,6 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import twinloop as tl
+from twinloop.controllers import PID, Mixer
 from twinloop.identification.records import Run
 
 DT = 0.04
@@ -59,3 +60,54 @@ def read(law, signals, seed, late=0.0, noise=1e-3, steps=100):
     other = paths[:-1, 1] if late > 0.0 else paths[1:, 1]
     readings = np.where(driven, now, other)
     return Run.of(readings + noise * stream.normal(size=readings.shape), commands[1:-1])
+
+
+def loop_of(signals, genes, start, steps=60):
+    """A test of a PID on each angle, the same gains on all of them, to 0."""
+    angles = [name for i, name in enumerate(signals.state_names) if i not in signals.driven]
+    rates = [name for i, name in enumerate(signals.state_names) if i in signals.driven]
+    gains = {f"{angle}.{term}": (0.0, 8.0) for angle in angles for term in ("kp", "ki", "kd")}
+    axes = list(zip(angles, rates, strict=True))
+    family = PID(axes=axes, gains=gains, output=Mixer(np.eye(len(axes)))).bind(signals)
+    return tl.Test(family, np.tile(genes, len(axes)), start, np.zeros(signals.n_x), steps)
+
+
+def flown(law, signals, test, late=0.0):
+    """Readings and states (n + 1, n_x) of a closed loop of which the controller reads the angles `late` seconds after.
+
+    Before the start everything goes on at its first rates; what is read early the last command has moved.
+    """
+    driven = [i in signals.driven for i in range(signals.n_x)]
+    controller, x = test.family.controller(test.genes), test.initial_state.copy()
+    low, high = np.array([command.bounds for command in signals.commands]).T
+    sizes = np.array([command.size for command in signals.commands])
+    command, paths, states, readings = (low + high) / 2.0, [], [], []
+    for k in range(test.steps + 1):
+        at = k * DT - late
+        if late < 0.0:
+            other = _path(law, x, command / sizes)(-late)
+        elif at < 0.0:
+            drift = solve_ivp(
+                lambda _, y: np.where(driven, 0.0, law(y, np.zeros(signals.n_u))),
+                (0.0, at),
+                test.initial_state,
+                rtol=1e-11,
+                atol=1e-13,
+            )
+            other = drift.y[:, -1]
+        else:
+            period = min(int(at / DT), k - 1) if k else 0
+            other = paths[period](at - period * DT) if k else x
+        states.append(x)
+        readings.append(np.where(driven, x, other))
+        if k < test.steps:
+            command = np.clip(controller.command(readings[-1], test.target_state), low, high)
+            paths.append(_path(law, x, command / sizes))
+            x = paths[-1](DT)
+    return np.array(readings), np.array(states)
+
+
+def _path(law, x, command):
+    return solve_ivp(
+        lambda _, y: law(y, command), (0.0, DT), x, "DOP853", dense_output=True, rtol=1e-11, atol=1e-13
+    ).sol

@@ -40,8 +40,10 @@ def twin_of(lines, form="acceleration", signals=SIGNALS, inputs=4, offsets=(), e
     outputs = len(signals.driven) if form == "acceleration" else signals.n_x
     program = _core.Program.parse(program_text(inputs, outputs, inputs + outputs + 6, [lines]))
     model = _core.Model(program, form, signals.engine, *actuation.values())
+    if offsets:
+        model = model.with_offsets(offsets)
     bare = tl.Twin(model, signals)
-    return tl.Twin(model, signals, errors, offsets=offsets, flights=[flown(bare, seed=i) for i in range(2)])
+    return tl.Twin(model, signals, errors, flights=[flown(bare, seed=i) for i in range(2)])
 
 
 WRAPPING = tl.Signals(

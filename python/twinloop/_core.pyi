@@ -245,8 +245,12 @@ class Model:
         signals: Signals,
         actuators: Sequence[_Actuator] | None = None,
         hidden: Sequence[_Hidden] = ...,
+        offsets: Sequence[float] = ...,
     ) -> Model:
-        """A program of states, commands and hidden states; these need actuators, one a command."""
+        """A program of states, commands and hidden states; these need actuators, one a command.
+
+        offsets (n_x,): by how much later than others each state is read, s; empty: none is.
+        """
     @staticmethod
     def shape(form: str, signals: Signals) -> tuple[int, int]:
         """Inputs and outputs that a program must have for this form."""
@@ -263,6 +267,13 @@ class Model:
     @property
     def constants(self) -> _Floats:
         """Of the effective program, in its order."""
+    @property
+    def offsets(self) -> list[float]:
+        """By how much later than others each state is read (n_x,), s; empty where all are read in time."""
+    def with_offsets(self, offsets: Sequence[float]) -> Model:
+        """The same model, read so much later (n_x,), s: only states that others give may be."""
+    def states_of(self, readings: ArrayLike) -> _Floats:
+        """The states (rows, n_x) whose readings these are, each at the start of a run."""
     def with_constants(self, constants: Sequence[float], lags: Sequence[float] | None) -> Model:
         """The same model without introns, with other constants, and, unless None, other lags and times of
         hidden states."""
@@ -378,6 +389,9 @@ class Runs:
     @property
     def states(self) -> _Floats:
         """True states (m, n + 1, n_x)."""
+    @property
+    def read(self) -> _Floats:
+        """What sensors without noise read of them (m, n + 1, n_x)."""
     @property
     def measured(self) -> _Floats:
         """What the controller read (m, n + 1, n_x)."""

@@ -73,7 +73,7 @@ def normalised_error(simulated: Trajectory, truth: Floats) -> float:
         return 1.0  # a truth that was cut at once tells no twin from one that never moves
     if simulated.steps < steps:
         return PENALTY * (2.0 - simulated.steps / steps)
-    wrong = simulated.states[1 : steps + 1] - truth[1:]
+    wrong = true_states(simulated)[1 : steps + 1] - truth[1:]
     moved = truth[1:] - truth[0]
     frozen = float(np.mean(moved**2))
     error = float(np.mean(wrong**2))

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import twinloop as tl
-from late_sensors import BODY, DT, PENDULUM, read, swinging, turning
+from late_sensors import BODY, DT, PENDULUM, flown, loop_of, read, swinging, turning
 from oracles import same_bits
 from twinloop import _core
 from twinloop.campaign.presets import options_of
@@ -131,3 +131,19 @@ def test_states_share_an_offset_by_unit_and_driven_ones_have_none():
     assert late_groups(signals, every) == [[0], [1, 2]]
     assert late_groups(signals, chains(signals, "increment", np.ones(7))) == []
     assert late_groups(BODY, chains(BODY, "acceleration", np.ones(6))) == [[0, 1, 2]]
+
+
+def test_what_was_found_is_flown_on_the_twin_as_well():
+    runs = [read(turning, BODY, seed, 0.3 * DT, 1e-4) for seed in range(2)]
+    model = learnt(runs, BODY).model
+    assert model.offsets[:3] == pytest.approx([0.3 * DT] * 3, abs=0.02 * DT)
+    errors = []
+    stream = np.random.default_rng(7)
+    for genes in stream.uniform([1.0, 0.2, 0.1], [7.0, 1.0, 1.0], (4, 3)):
+        test = loop_of(BODY, genes, [0.6, -0.5, 0.8, 0.5, -1.0, 0.5])
+        readings, _ = flown(turning, BODY, test, 0.3 * DT)
+        for known in (model, model.with_offsets([0.0] * 6)):
+            off = tl.Twin(known, BODY).simulate(test).states - readings
+            errors.append(np.square(off).mean() / np.square(readings - readings[0]).mean())
+    late, in_time = np.median(np.reshape(errors, (4, 2)), axis=0)
+    assert late < 1e-6 and in_time > 100.0 * late

@@ -44,7 +44,7 @@ def test_the_python_module_simulates_what_the_twin_does_in_another_process(which
         [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, '.')\n{program}"],
         cwd=path.parent, input=given, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).states
+    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).true_states
     found = np.array(json.loads(done.stdout))[: len(expected)]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
@@ -56,7 +56,7 @@ def test_modules_for_other_packages_simulate_what_the_twin_does(which, kind, tmp
     twin = TWINS[which]()
     (path,) = twin.export(tmp_path / "taken.py", kind=kind)
     flight = flown(twin, seed=7)
-    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).states
+    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).true_states
     simulate = {"casadi": casadi_simulation, "control": control_simulation}[kind](path.read_text())
     found = simulate(flight.states[0], 2.0 * flight.commands)[: len(expected)]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
@@ -120,7 +120,7 @@ int main(void)
     )
     done = subprocess.run([tmp_path / "rig"], input=numbers, capture_output=True, text=True, check=True)
     found = np.array(done.stdout.split(), dtype=float).reshape(-1, n_x)
-    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).states
+    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).true_states
     np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9, atol=1e-9)
     assert "malloc" not in files[0].read_text()
 
@@ -207,23 +207,23 @@ def test_a_twin_comes_back_in_another_process_with_the_same_numbers(tmp_path):
     )
     twin = tl.Twin(
         lone.model, SIGNALS, errors, members=[lone.model], noise=noise, seed=3, inflation=1.5,
-        offsets=lone.offsets, flights=lone.flights,
+        flights=lone.flights,
     )  # fmt: skip
     (path,) = twin.export(tmp_path / "twin.json")
     again = tl.load_twin(path)
     assert again.equations(17) == twin.equations(17) and again.errors == twin.errors
-    assert (again.seed, again.inflation, again.offsets) == (3, 1.5, twin.offsets)
+    assert (again.seed, again.inflation, again.model.offsets) == (3, 1.5, [0.003, 0.0])
     assert again.export("json") == path.read_text()
     flight = flown(twin, seed=5)
     program = (
         "import json, sys, twinloop as tl; x, u = json.loads(sys.stdin.read());"
-        "print(json.dumps(tl.load_twin(sys.argv[1]).simulate_commands(x, u).states.tolist()))"
+        "print(json.dumps(tl.load_twin(sys.argv[1]).simulate_commands(x, u).true_states.tolist()))"
     )
-    given = json.dumps([flight.states[0].tolist(), flight.commands.tolist()])
+    given = json.dumps([flight.true_states[0].tolist(), flight.commands.tolist()])
     done = subprocess.run(
         [sys.executable, "-c", program, path], input=given, capture_output=True, text=True, check=True
     )
-    assert np.array(json.loads(done.stdout)).tobytes() == flight.states.tobytes()
+    assert np.array(json.loads(done.stdout)).tobytes() == flight.true_states.tobytes()
 
 
 # Refusals
@@ -275,9 +275,13 @@ def test_a_file_that_holds_no_twin_is_refused(tmp_path):
     with pytest.raises(tl.InvalidInput, match="kind 'twin'"):
         tl.load_twin(path)
     record = twin_of(PENDULUM).to_record()
-    path.write_text(json.dumps({**record, "offsets": [0.1]}))
-    with pytest.raises(tl.InvalidInput, match="damaged"):
-        tl.load_twin(path)
+    # What the first version wrote.
+    path.write_text(json.dumps({**record, "version": 1, "offsets": [0.003, 0.0]}))
+    assert tl.load_twin(path).law.offsets == (0.003, 0.0)
+    for offsets, words in (([0.1], "one for each of 2 states"), ([0.0, 0.1], "no other states give")):
+        path.write_text(json.dumps({**record, "model": {**record["model"], "offsets": offsets}}))
+        with pytest.raises(tl.InvalidInput, match=words):
+            tl.load_twin(path)
 
 
 # Controllers
@@ -357,7 +361,7 @@ def test_a_periodic_state_is_taken_away_as_the_model_sees_it():
     lines = ["r5 = r0 * 0.7", "r5 = r5 * r0", "r6 = r3 + r1", "r5 = r5 - r6", "r6 = r2 * -0.1"]
     twin = twin_of(lines, signals=THREE, inputs=5)
     start, commands = np.array([3.0, 4.0, 0.0]), np.zeros((20, 2))
-    expected = twin.simulate_commands(start, commands).states
+    expected = twin.simulate_commands(start, commands).true_states
     assert expected[-1, 0] > 4.0  # it went round
     found = python_simulation(python_source(twin.law))(start, commands)
     np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9)

@@ -35,7 +35,7 @@ def test_fmpy_finds_no_fault_and_simulates_what_the_twin_does(which, kind, tmp_p
     assert validation.validate_fmu(path) == []
     flight = flown(twin, seed=7)
     names, commands = twin.signals.state_names, 2.0 * flight.commands  # beyond the bounds as well
-    expected = twin.simulate_commands(flight.states[0], commands).states
+    expected = twin.simulate_commands(flight.states[0], commands).true_states
     run = fmpy.simulate_fmu(
         path,
         stop_time=twin.signals.dt * (len(expected) - 1),
@@ -121,7 +121,7 @@ def test_a_state_of_the_fmu_holds_lags_delays_and_hidden_states(kind, lagging):
     for state in (kept, unit.from_bytes(raw)):
         unit.restore(state)
         np.testing.assert_array_equal(unit.run(commands[20:], first=20), expected)
-    whole = twin.simulate_commands([0.1, -0.2], commands).states
+    whole = twin.simulate_commands([0.1, -0.2], commands).true_states
     np.testing.assert_allclose(expected[:, :2], whole[21:], rtol=1e-9, atol=1e-9)
 
 
@@ -142,7 +142,7 @@ def test_several_periods_are_one_step_under_the_same_commands(kind, lagging):
     unit.begin(angle=0.1, rate=-0.2)
     unit.set(torque=0.5, fan=1.0)
     unit.unit.doStep(currentCommunicationPoint=0.0, communicationStepSize=5 * SIGNALS.dt)
-    expected = twin.simulate_commands([0.1, -0.2], np.tile([0.5, 1.0], (5, 1))).states[-1]
+    expected = twin.simulate_commands([0.1, -0.2], np.tile([0.5, 1.0], (5, 1))).true_states[-1]
     np.testing.assert_allclose(unit.get("angle", "rate"), expected, rtol=1e-9)
     assert unit.get(unit.description.modelVariables[0].name) == [5 * SIGNALS.dt]
 

@@ -54,4 +54,31 @@ impl<'a> Dynamics for AnyDynamics<'a> {
             _ => unreachable!("a workspace belongs to the dynamics that made it"),
         }
     }
+
+    #[inline(always)]
+    fn in_time(&self) -> bool {
+        match self {
+            Self::Model(model) => model.in_time(),
+            Self::Quadrotor(plant) => plant.in_time(),
+        }
+    }
+
+    #[inline(always)]
+    fn read<V: Vector>(&self, workspace: &mut AnyWorkspace<'a, V>, state: &[V], reading: &mut [V]) {
+        match (self, workspace) {
+            (Self::Model(model), AnyWorkspace::Model(workspace)) => model.read(workspace, state, reading),
+            (Self::Quadrotor(plant), AnyWorkspace::Quadrotor(workspace)) => {
+                plant.read(workspace, state, reading);
+            }
+            _ => unreachable!("a workspace belongs to the dynamics that made it"),
+        }
+    }
+
+    #[inline(always)]
+    fn state_of<V: Vector>(&self, reading: &[V]) -> Vec<V> {
+        match self {
+            Self::Model(model) => model.state_of(reading),
+            Self::Quadrotor(plant) => plant.state_of(reading),
+        }
+    }
 }

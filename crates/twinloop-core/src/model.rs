@@ -11,6 +11,7 @@ use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
 use crate::lanes::{Vector, vectors};
 use crate::lgp::{Bank, Code, Inputs, Program};
+use crate::sensors::{Recent, Sensors};
 use crate::signals::{RigidBody, Signals};
 
 /// What the outputs of a program mean.
@@ -84,6 +85,7 @@ pub struct Frame {
     /// A model sees a periodic state within half a period of 0.
     periods: Periods,
     actuation: Actuation,
+    sensors: Sensors,
 }
 
 impl Frame {
@@ -101,7 +103,8 @@ impl Frame {
         let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
         let (commands, actuation) = (factors.len(), Actuation::default());
         let (body, periods) = (signals.kinematics, signals.periods.clone());
-        Self { form, dt: signals.dt, commands, factors, slopes, body, periods, actuation }
+        let (dt, sensors) = (signals.dt, Sensors::default());
+        Self { form, dt, commands, factors, slopes, body, periods, actuation, sensors }
     }
 
     /// The same with something between commands and model, an actuator for each command.
@@ -111,6 +114,16 @@ impl Frame {
         // Hidden states are made of commands in units of their scales.
         factors.resize(self.commands + actuation.hidden.len(), 1.0);
         Ok(Self { actuation, factors, ..self })
+    }
+
+    /// The same, read by such sensors.
+    pub fn with_sensors(self, sensors: Sensors) -> Self {
+        Self { sensors, ..self }
+    }
+
+    /// What reads the states.
+    pub fn sensors(&self) -> &Sensors {
+        &self.sensors
     }
 
     /// What stands between commands and model.
@@ -126,8 +139,9 @@ impl Frame {
     /// Whether these signals have the states, commands, period and derivatives of the frame.
     pub fn fits(&self, signals: &Signals) -> bool {
         let plain = Self::new(self.form, signals);
+        let own = self.clone();
         self.factors.starts_with(&plain.factors)
-            && *self == Self { actuation: self.actuation.clone(), factors: self.factors.clone(), ..plain }
+            && *self == Self { actuation: own.actuation, factors: own.factors, sensors: own.sensors, ..plain }
     }
 
     fn states(&self) -> usize {
@@ -196,7 +210,7 @@ impl<'a> Model<'a> {
         state: &mut [V],
         command: &[V],
     ) {
-        let ModelWorkspace { bank, stages, line, turned, seen } = workspace;
+        let ModelWorkspace { bank, stages, line, turned, seen, .. } = workspace;
         let effects = match line {
             None => [command; 3],
             Some(line) => [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]],
@@ -280,6 +294,8 @@ pub struct ModelWorkspace<V: Vector> {
     stages: Stages<V>,
     /// What the actuators hold, where there are any.
     line: Option<Line<V>>,
+    /// What sensors may read yet.
+    recent: Recent<V>,
     /// Of a rigid body: the states and the quaternion of its angles behind them; the states of a stage.
     turned: Vec<V>,
     seen: Vec<V>,
@@ -302,7 +318,7 @@ impl<'a> Model<'a> {
         let body = if states > 0 && self.frame.body.is_some() { states } else { 0 };
         let turned = vec![V::splat(0.0); if body > 0 { body + 4 } else { 0 }];
         let (stages, seen) = (Stages::new(states.max(turned.len())), turned[..body].to_vec());
-        ModelWorkspace { bank, stages, line, turned, seen }
+        ModelWorkspace { bank, stages, line, recent: Recent::new(), turned, seen }
     }
 }
 
@@ -324,6 +340,21 @@ impl Dynamics for Model<'_> {
     fn step<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &mut [V], command: &[V]) {
         self.remember(workspace, command);
         self.advance(workspace, state, command);
+    }
+
+    #[inline(always)]
+    fn in_time(&self) -> bool {
+        self.frame.sensors.in_time()
+    }
+
+    #[inline(always)]
+    fn read<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &[V], reading: &mut [V]) {
+        self.frame.sensors.read(&mut workspace.recent, state, reading);
+    }
+
+    #[inline(always)]
+    fn state_of<V: Vector>(&self, reading: &[V]) -> Vec<V> {
+        if self.in_time() { reading.to_vec() } else { self.frame.sensors.state_of(reading) }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The roll-out: dynamics under the commands of a controller that reads them, or of a record. There is no second one.
 
 use crate::controller::{Controllers, Family};
-use crate::dynamics::{Dynamics, step_apart};
+use crate::dynamics::{Dynamics, read_apart, step_apart};
 use crate::lanes::{Apart, Vector};
 use crate::task::target_at;
 
@@ -15,7 +15,7 @@ pub struct Start<'a, V> {
     pub steps: usize,
     /// Magnitude of each state at which a lane has diverged (n_x).
     pub limits: &'a [f64],
-    /// What the sensors add to the state that the controller reads, (n + 1) × n_x; empty for perfect sensors.
+    /// What the sensors add to the reading of the state, (n + 1) × n_x; empty for sensors without noise.
     pub noise: &'a [V],
     /// What is added to the true state after each step, n × n_x: process noise, gusts; empty for nothing.
     pub disturbance: &'a [V],
@@ -49,6 +49,8 @@ pub struct Seen<'a, V> {
     pub command: &'a [V],
     /// The true state after it (n_x).
     pub next: &'a [V],
+    /// What sensors without noise read of that (n_x).
+    pub read: &'a [V],
 }
 
 /// What looks on. A trait and not a closure, because only a named function can be made to be inlined.
@@ -74,11 +76,16 @@ pub fn rollout<D: Dynamics, V: Vector>(
     };
     let mut state = initial.to_vec();
     let mut reading = initial.to_vec();
+    // What sensors read where that is not the state itself.
+    let mut late = if dynamics.in_time() { vec![] } else { initial.to_vec() };
+    if !late.is_empty() {
+        read_apart(dynamics, &mut workspace, &state, &mut late);
+    }
     let mut command = vec![V::splat(0.0); width];
     let mut alive = V::splat(1.0);
     let mut lasted = vec![steps; V::LANES];
     for step in 0..steps {
-        reading.copy_from_slice(&state);
+        reading.copy_from_slice(if late.is_empty() { &state } else { &late });
         if !noise.is_empty() {
             add(&mut reading, &noise[step * states..]);
         }
@@ -93,7 +100,11 @@ pub fn rollout<D: Dynamics, V: Vector>(
         if !disturbance.is_empty() {
             add(&mut state, &disturbance[step * states..]);
         }
-        watch.see(Seen { step, reading: &reading, command: &command, next: &state });
+        if !late.is_empty() {
+            read_apart(dynamics, &mut workspace, &state, &mut late);
+        }
+        let read = if late.is_empty() { &state } else { &late };
+        watch.see(Seen { step, reading: &reading, command: &command, next: &state, read });
         let before = alive;
         for (state, &limit) in state.iter().zip(limits) {
             // A NaN is not less than the limit, and so counts as gone.

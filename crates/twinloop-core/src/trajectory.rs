@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::dynamics::Dynamics;
-use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, with_test_lanes};
+use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, scalars, with_test_lanes};
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
 use crate::setting::{Limits, Setting};
 use crate::task::Task;
@@ -13,6 +13,8 @@ use crate::task::Task;
 pub struct Trajectory {
     /// True states, (n + 1) × n_x.
     pub states: Vec<f64>,
+    /// What sensors without noise read of them, (n + 1) × n_x.
+    pub read: Vec<f64>,
     /// What the controller read, (n + 1) × n_x.
     pub measured: Vec<f64>,
     /// Commands, n × n_u.
@@ -139,18 +141,31 @@ fn recorded<D: Dynamics, V: Vector>(
     initial: &[f64],
     count: usize,
 ) -> Vec<Trajectory> {
-    let empty = || Trajectory { states: initial.to_vec(), measured: vec![], commands: vec![], lasted: 0 };
+    let empty = || Trajectory {
+        states: initial.to_vec(),
+        read: first_read(dynamics, initial),
+        measured: vec![],
+        commands: vec![],
+        lasted: 0,
+    };
     let mut runs: Vec<_> = (0..count).map(|_| empty()).collect();
     let lasted = rollout(dynamics, start, &mut Recorder(&mut runs));
     for (l, run) in runs.iter_mut().enumerate() {
         let (states, seen) = (initial.len(), run.measured.len());
         for j in 0..states {
             let noise = start.noise.get(seen + j).map_or(0.0, |noise| noise.lane(l));
-            run.measured.push(run.states[seen + j] + noise);
+            run.measured.push(run.read[seen + j] + noise);
         }
         run.lasted = lasted[l];
     }
     runs
+}
+
+/// What sensors without noise read of a first state (n_x).
+fn first_read<D: Dynamics>(dynamics: &D, initial: &[f64]) -> Vec<f64> {
+    let mut read: Vec<Scalar> = scalars(initial);
+    dynamics.read(&mut dynamics.workspace::<Scalar>(), &scalars(initial), &mut read);
+    read.iter().map(|value| value.lane(0)).collect()
 }
 
 /// Keeps every step of the lanes that a run is wanted of.
@@ -163,6 +178,7 @@ impl<V: Vector> Watch<V> for Recorder<'_> {
             run.measured.extend(seen.reading.iter().map(|value| value.lane(l)));
             run.commands.extend(seen.command.iter().map(|value| value.lane(l)));
             run.states.extend(seen.next.iter().map(|value| value.lane(l)));
+            run.read.extend(seen.read.iter().map(|value| value.lane(l)));
         }
     }
 }

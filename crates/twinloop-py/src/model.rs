@@ -5,8 +5,8 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, Dynamics, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Signals, Width,
-    effects, step_rows,
+    Actuation, Actuator, Dynamics, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Sensors, Signals,
+    Width, effects, state_of, step_rows,
 };
 
 use crate::arrays::{Cube, Matrix, Vector, optional_blocks, rows, to_matrix, to_vector, vector, views};
@@ -98,13 +98,14 @@ impl PyModel {
 #[pymethods]
 impl PyModel {
     #[new]
-    #[pyo3(signature = (program, form, signals, actuators = None, hidden = vec![]))]
+    #[pyo3(signature = (program, form, signals, actuators = None, hidden = vec![], offsets = vec![]))]
     fn new(
         program: &PyProgram,
         form: &str,
         signals: &PySignals,
         actuators: Option<Vec<ActuatorParts>>,
         hidden: Vec<HiddenParts>,
+        offsets: Vec<f64>,
     ) -> Result<Self> {
         let form: Form = form.parse()?;
         Model::check(&program.0.program, form, &signals.0, hidden.len())?;
@@ -114,7 +115,28 @@ impl PyModel {
         } else if !hidden.is_empty() {
             return Err(misuse("model: expected actuators with hidden states, found none".into()));
         }
-        Ok(Self::of(program.0.clone(), Arc::new(frame), signals.0.clone()))
+        let model = Self::of(program.0.clone(), Arc::new(frame), signals.0.clone());
+        if offsets.is_empty() { Ok(model) } else { model.with_offsets(offsets) }
+    }
+
+    /// The same model, of which each state is read so many s later (n_x).
+    fn with_offsets(&self, offsets: Vec<f64>) -> Result<PyModel> {
+        let frame = (*self.frame).clone().with_sensors(Sensors::new(&offsets, &self.signals)?);
+        Ok(Self::of(self.learnt.clone(), Arc::new(frame), self.signals.clone()))
+    }
+
+    /// By how much later than others each state is read, s; empty where all are read in time.
+    #[getter]
+    fn offsets(&self) -> Vec<f64> {
+        self.frame.sensors().offsets().to_vec()
+    }
+
+    /// The states (rows, n_x) whose readings these are, each at the start of a run.
+    fn states_of<'py>(&self, py: Python<'py>, readings: Matrix<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        let n_x = self.signals.states();
+        let readings = rows("readings", &readings, n_x)?;
+        let states = readings.iter().flat_map(|reading| state_of(&self.core(), reading)).collect();
+        Ok(to_matrix(py, n_x, states))
     }
 
     /// (lag, delay, rest) of each command's actuator; empty where every command acts at once and nothing is hidden.

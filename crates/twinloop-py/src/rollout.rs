@@ -67,6 +67,11 @@ impl PyRuns {
     }
 
     #[getter]
+    fn read<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
+        self.stack(py, self.steps + 1, self.states, |run| &run.read)
+    }
+
+    #[getter]
     fn measured<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
         self.stack(py, self.steps + 1, self.states, |run| &run.measured)
     }

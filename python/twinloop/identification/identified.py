@@ -54,6 +54,8 @@ class Identified(Recorded, kind="identified"):
     of_parts: bool = False
     remarks: list[Remark] = field(default_factory=list)
 
+    VERSION = 2
+
     @classmethod
     def from_record(cls, record: object, *given: object) -> Identified:
         """What a record was written of.

@@ -129,6 +129,10 @@ class _Learner:
         observer = self._rescaled(tuned.observer, left, readings)
         self.watch("committee")
         members = committee(problem, self.fitting, sums, observer, model, others)
+        if offsets.any():
+            # What flies them from here on is read as the runs were.
+            members = [member.with_offsets(offsets.tolist()) for member in members]
+            model = members[0]
         runs, driven = self.fitting.runs, [chain.states[0] for chain in self.selection.driven]
         bounds = self.selection.told.bounds
         return Identified(

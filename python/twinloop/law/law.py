@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,13 +39,12 @@ class Law:
     offsets: tuple[float, ...]
 
     @staticmethod
-    def of(model: _core.Model, signals: Signals, offsets: Sequence[float] = ()) -> Law:
+    def of(model: _core.Model, signals: Signals) -> Law:
         """The law of a model.
 
         Args:
             model: of the engine.
             signals: what it is a model of.
-            offsets: of the sensors (n_x,), s; empty: none.
 
         Returns:
             Equations with the bits of the model's program.
@@ -54,7 +52,7 @@ class Law:
         expressions = Expressions()
         outputs = expressions.entered(model.program)
         actuation = Actuation.of(model, signals)
-        offsets = tuple(offsets) or (0.0,) * signals.n_x
+        offsets = tuple(model.offsets) or (0.0,) * signals.n_x
         return Law(signals, model.form, expressions, outputs, actuation, offsets)
 
     def model(self) -> _core.Model:
@@ -62,7 +60,12 @@ class Law:
         program = self.expressions.program(self.outputs, self.inputs)
         with engine_input():
             return _core.Model(
-                program, self.form, self.signals.engine, self.actuation.actuators, self.actuation.hidden
+                program,
+                self.form,
+                self.signals.engine,
+                self.actuation.actuators,
+                self.actuation.hidden,
+                self.offsets,
             )
 
     @property

@@ -53,7 +53,6 @@ class Twin(Recorded, kind="twin"):
         seed: of the band's random numbers.
         inflation: factor on the spread of the members, where they were found to be too sure.
         remarks: what a person should know of it and of the data.
-        offsets: by how much later than those of the driven states each state is read (n_x,), s; empty: none.
         flights: that it was learnt from, on which its exports are checked.
     """
 
@@ -67,12 +66,10 @@ class Twin(Recorded, kind="twin"):
         noise: Noise | None = None,
         seed: int = 0,
         inflation: float = 1.0,
-        offsets: Sequence[float] = (),
         flights: Sequence[Trajectory] = (),
         remarks: Sequence[Remark] = (),
     ) -> None:
         self.flights = tuple(flights)
-        self.offsets = tuple(offsets)
         self.inflation = inflation
         self.remarks = tuple(remarks)
         self.members = tuple(members)
@@ -88,36 +85,45 @@ class Twin(Recorded, kind="twin"):
         """Multiple of a state's scale beyond which a simulated run counts as diverged."""
         return self.limits.divergence_factor
 
+    VERSION = 2
+
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
         """Names of the fields that a record has, in order."""
         return (
             *("signals", "model", "errors", "divergence_factor", "members", "noise", "seed", "inflation"),
-            *("offsets", "flights"),
+            "flights",
         )
 
     @classmethod
     def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Twin:
-        found = checked_record(record, cls, cls.recorded_fields(), where)
+        # The first version wrote sensors' offsets beside the models.
+        known = (*cls.recorded_fields(), "offsets")
+        found = checked_record(record, cls, known, where, optional=("offsets",))
         signals = read(Signals, found["signals"], f"{where}.signals")
         given = (signals, *given)
+        models = [read(_core.Model, found["model"], f"{where}.model", given)]
+        models += read(tuple[_core.Model, ...], found["members"], f"{where}.members", given)
+        if found.get("offsets"):
+            with engine_input():
+                late = read(tuple[float, ...], found["offsets"], f"{where}.offsets")
+                models = [model.with_offsets(late) for model in models]
         twin = cls(
-            read(_core.Model, found["model"], f"{where}.model", given),
+            models[0],
             signals,
             read(tuple[TestErrors, ...], found["errors"], f"{where}.errors"),
             number(f"Record {where}.divergence_factor", found["divergence_factor"], above=0.0),
-            read(tuple[_core.Model, ...], found["members"], f"{where}.members", given),
+            models[1:],
             read(Noise | None, found["noise"], f"{where}.noise"),
             read(int, found["seed"], f"{where}.seed"),
             read(float, found["inflation"], f"{where}.inflation"),
-            read(tuple[float, ...], found["offsets"], f"{where}.offsets"),
             read(tuple[Trajectory, ...], found["flights"], f"{where}.flights"),
         )
         widths = {(flight.states.shape[1], flight.commands.shape[1]) for flight in twin.flights}
         noisy = twin.noise is None or len(twin.noise.sensors) == len(twin.noise.moves) == signals.n_x
-        if len(twin.offsets) not in (0, signals.n_x) or widths - {(signals.n_x, signals.n_u)} or not noisy:
+        if widths - {(signals.n_x, signals.n_u)} or not noisy:
             raise InvalidInput(
-                f"Record {where}: expected offsets, noise and flights of {signals.n_x} states and {signals.n_u}"
+                f"Record {where}: expected noise and flights of {signals.n_x} states and {signals.n_u}"
                 " commands, found others; it is damaged."
             )
         return twin
@@ -179,7 +185,7 @@ class Twin(Recorded, kind="twin"):
         record = to_text(self.to_record()) if chosen == "json" else ""
         source = Source(
             self.law,
-            lambda state, commands: self.simulate_commands(state, commands).states,
+            lambda state, commands: _true(self.simulate_commands(state, commands)),
             self.flights,
             record,
             not force,
@@ -190,7 +196,7 @@ class Twin(Recorded, kind="twin"):
     @cached_property
     def law(self) -> Law:
         """Equations, kinematics, actuators, hidden states, sensors' offsets and integrator, as a value."""
-        return Law.of(self.model, self.signals, self.offsets)
+        return Law.of(self.model, self.signals)
 
     def equations(self, digits: int = 6) -> str:
         """The twin as text that SymPy reads, too.
@@ -205,7 +211,7 @@ class Twin(Recorded, kind="twin"):
         Raises:
             InvalidInput: digits out of range.
         """
-        members = [Law.of(member, self.signals, self.offsets) for member in self.members]
+        members = [Law.of(member, self.signals) for member in self.members]
         return equations(self.law, members, digits)
 
     def simulate(self, test: Test, initial_state: ArrayLike | None = None) -> Trajectory:
@@ -216,7 +222,8 @@ class Twin(Recorded, kind="twin"):
             initial_state: where to start (n_x,), SI units, radians; None: where the test does.
 
         Returns:
-            The predicted run, cut where it diverges; with a `band` where a committee stands behind the twin.
+            The predicted run as sensors without noise read it, with the true states beside it, cut where it diverges;
+            with a `band` where a committee stands behind the twin.
 
         Raises:
             InvalidInput: the test is for other signals, or the start for other states.
@@ -244,10 +251,17 @@ class Twin(Recorded, kind="twin"):
             The test; states that were read further from where they were asked to begin than their sensors explain begin
             as they were read.
         """
-        read = flown.states[0]
-        explained = np.zeros_like(read) if self.noise is None else STARTS * self.noise.sensors
-        off = np.abs(self.signals.difference(read, test.initial_state)) > explained
-        return dataclasses.replace(test, initial_state=np.where(off, read, test.initial_state))
+        begun = self._began(flown)
+        explained = np.zeros_like(begun) if self.noise is None else STARTS * self.noise.sensors
+        off = np.abs(self.signals.difference(begun, test.initial_state)) > explained
+        return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
+
+    def _began(self, flown: Trajectory) -> Floats:
+        """The state (n_x,) that a flight's first reading is of."""
+        with engine_input():
+            states: Floats = self.model.states_of(flown.states[:1])
+        began: Floats = states[0]
+        return began
 
     def spread(self, test: Test) -> tuple[Floats, Floats] | None:
         """What members and disturbances, drawn together, make of a test.
@@ -256,8 +270,8 @@ class Twin(Recorded, kind="twin"):
             test: any test for the same signals.
 
         Returns:
-            Mean and variance of the true states (n + 1, n_x) over the runs that last; None where no committee stands
-            behind the twin.
+            Mean and variance of what is read but for the sensors' noise (n + 1, n_x), over the runs that last; None
+            where no committee stands behind the twin.
         """
         if not self.members or self.noise is None:
             return None
@@ -276,7 +290,7 @@ class Twin(Recorded, kind="twin"):
                     disturbance=moves,
                     excitation=excitation,
                 )
-            runs.append(drawn.states)
+            runs.append(drawn.read)
         states = np.concatenate(runs)
         lasted = np.isfinite(states)
         count = np.maximum(1, lasted.sum(axis=0))
@@ -349,17 +363,17 @@ class Twin(Recorded, kind="twin"):
             commands: (n, n_u), in their units, each held for one period; what lies beyond a bound is clipped.
 
         Returns:
-            The predicted run, cut where it diverges.
+            The predicted run as sensors without noise read it, with the true states beside it, cut where it diverges.
 
         Raises:
             InvalidInput: shapes that do not fit.
         """
         state = floats("Initial state", initial_state, (self.signals.n_x,))
         u = floats("Commands", commands, (None, self.signals.n_u))
-        if len(u) == 0:
-            return Trajectory(np.zeros(1), state[np.newaxis], u)
         low, high = np.array([command.bounds for command in self.signals.commands]).T
-        return fly_commands(self.model, state, np.clip(u, low, high), self.limits)
+        sent = np.clip(u if len(u) else [low], low, high)
+        run = fly_commands(self.model, state, sent, self.limits)
+        return run if len(u) else Trajectory(np.zeros(1), run.states[:1], u, true_states=state[np.newaxis])
 
     def fit(self, trajectory: Trajectory) -> FitTable:
         """How well the twin's free run under the recorded commands, from the first reading, follows a record.
@@ -374,7 +388,7 @@ class Twin(Recorded, kind="twin"):
             InvalidInput: other columns, or no step.
         """
         recorded = check_recorded(trajectory, self.limits, None, least=1)
-        free = self.simulate_commands(recorded.states[0], recorded.commands).states
+        free = self.simulate_commands(self._began(recorded), recorded.commands).states
         read = continued(recorded, self.signals, recorded.states[0]).states[1:]
         lasted = len(free) > len(read)
         rows = []
@@ -397,6 +411,10 @@ class Twin(Recorded, kind="twin"):
 
     def __repr__(self) -> str:
         return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"
+
+
+def _true(run: Trajectory) -> Floats:
+    return run.states if run.true_states is None else run.true_states
 
 
 def load_twin(path: str | Path) -> Twin:

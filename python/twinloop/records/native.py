@@ -28,13 +28,14 @@ def read_program(value: object, where: str) -> _core.Program:
 
 
 def model_record(model: _core.Model) -> dict[str, Any]:
-    """A model without its signals: program, form, lags and delays of each command, hidden states."""
-    return {
+    """A model without its signals: program, form, lags and delays of each command, hidden states, sensors' offsets."""
+    record = {
         "program": str(model.program),
         "form": model.form,
         "actuators": [dict(zip(ACTUATOR_KEYS, actuator, strict=True)) for actuator in model.actuators],
         "hidden": [dict(zip(HIDDEN_KEYS, hidden, strict=True)) for hidden in model.hidden],
     }
+    return record | {"offsets": model.offsets} if model.offsets else record
 
 
 def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Model:
@@ -45,7 +46,7 @@ def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Mo
         raise InvalidInput(
             f"Record {where}: expected the signals of the model beside the record, found none; pass them."
         )
-    found = keys(value, MODEL_KEYS, where)
+    found = keys(value, MODEL_KEYS, where, optional=("offsets",))
     program = read_program(found["program"], f"{where}.program")
     actuators = [
         _actuator(item, f"{where}.actuators[{i}]")
@@ -55,9 +56,13 @@ def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Mo
         _hidden(item, f"{where}.hidden[{i}]")
         for i, item in enumerate(read_list(found["hidden"], f"{where}.hidden"))
     ]
+    offsets = [
+        read_number(item, f"{where}.offsets[{i}]")
+        for i, item in enumerate(read_list(found.get("offsets", []), f"{where}.offsets"))
+    ]
     with engine_input():
         form = read_text(found["form"], f"{where}.form")
-        return _core.Model(program, form, signals, actuators or None, hidden)
+        return _core.Model(program, form, signals, actuators or None, hidden, offsets)
 
 
 def _actuator(value: object, where: str) -> tuple[float, int, float | None]:

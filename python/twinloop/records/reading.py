@@ -91,13 +91,16 @@ def read_list(value: object, where: str) -> list[Any]:
     return list(value)
 
 
-def keys(value: object, names: tuple[str, ...], where: str) -> Mapping[str, Any]:
+def keys(
+    value: object, names: tuple[str, ...], where: str, optional: tuple[str, ...] = ()
+) -> Mapping[str, Any]:
     """A dict of exactly these keys.
 
     Args:
         value: plain, from anywhere.
         names: that it must have.
         where: how to call it in an error.
+        optional: that it may have.
 
     Returns:
         The dict.
@@ -108,8 +111,8 @@ def keys(value: object, names: tuple[str, ...], where: str) -> Mapping[str, Any]
     if not isinstance(value, Mapping):
         raise InvalidInput(f"Record {where}: expected a dict, found {shown(value)}.")
     for key in value:
-        if key not in names:
-            raise unknown(f"key in the record {where}", str(key)[:60], names)
+        if key not in names + optional:
+            raise unknown(f"key in the record {where}", str(key)[:60], names + optional)
     missing = [key for key in names if key not in value]
     if missing:
         raise InvalidInput(f"Record {where}: expected {', '.join(missing)}, found none; add them.")

@@ -66,7 +66,7 @@ pub fn disagreements<D: Dynamics + Sync>(
     Ok(found)
 }
 
-/// The true states of a group on one member, n × n_x × lanes.
+/// What is read of a group on one member but for noise, n × n_x × lanes.
 struct Fly<'a, D> {
     member: &'a D,
     flights: &'a Flights,
@@ -102,15 +102,15 @@ impl<D: Dynamics> Fly<'_, D> {
     }
 }
 
-/// Keeps every state after the first, n × n_x × lanes.
+/// Keeps what is read of every state after the first, n × n_x × lanes.
 struct States(Vec<f64>);
 
 impl<V: Vector> Watch<V> for States {
     #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
-        let row = seen.next.len() * V::LANES;
+        let row = seen.read.len() * V::LANES;
         let kept = self.0[seen.step * row..][..row].chunks_exact_mut(V::LANES);
-        for (kept, state) in kept.zip(seen.next) {
+        for (kept, state) in kept.zip(seen.read) {
             state.store(kept);
         }
     }

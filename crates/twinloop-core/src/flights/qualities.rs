@@ -120,7 +120,8 @@ impl<D: Dynamics> OfGroup<'_, D> {
         let mut judge = Judge {
             tally: self.quality.tally(self.flights.signals(), &lanes.target),
             reach: self.envelope.reach(&self.flights.signals().periods, &lanes.initial),
-            noise: if self.measured { &noise } else { &[] },
+            noise: &noise,
+            measured: self.measured,
             reading: lanes.initial.clone(),
         };
         let lasted = rollout(self.dynamics, &self.flights.start(&lanes, &noise), &mut judge);
@@ -140,8 +141,9 @@ impl<D: Dynamics> OfGroup<'_, D> {
 struct Judge<'a, V> {
     tally: Tally<'a, V>,
     reach: Reach<'a, V>,
-    /// Of the readings that the quality is of; empty where it is of the true states.
+    /// Of the readings that the quality is of; empty where there is none.
     noise: &'a [V],
+    measured: bool,
     reading: Vec<V>,
 }
 
@@ -149,13 +151,14 @@ impl<V: Vector> Watch<V> for Judge<'_, V> {
     #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
         self.reach.see(seen.next);
-        if self.noise.is_empty() {
-            return self.tally.add(seen.step, seen.command, seen.next);
+        if !self.measured || self.noise.is_empty() {
+            let shown = if self.measured { seen.read } else { seen.next };
+            return self.tally.add(seen.step, seen.command, shown);
         }
-        let after = self.noise.chunks_exact(seen.next.len()).nth(seen.step + 1);
-        let readings = self.reading.iter_mut().zip(seen.next).zip(after.unwrap_or_default());
-        for ((reading, &state), &noise) in readings {
-            *reading = state + noise;
+        let after = self.noise.chunks_exact(seen.read.len()).nth(seen.step + 1);
+        let readings = self.reading.iter_mut().zip(seen.read).zip(after.unwrap_or_default());
+        for ((reading, &read), &noise) in readings {
+            *reading = read + noise;
         }
         self.tally.add(seen.step, seen.command, &self.reading);
     }

@@ -37,7 +37,7 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
                 target: &vectors::<V>(&loops.target),
                 excitation: &vectors::<V>(&loops.excitation),
             },
-            initial: &vectors::<V>(&loops.initial),
+            initial: &self.dynamics.state_of(&vectors::<V>(&loops.initial)),
             steps: loops.steps.iter().copied().max().unwrap_or(0),
             limits: self.selected.setting().limits(),
             noise: &[],
@@ -69,10 +69,10 @@ struct SquaredError<'a, V> {
 impl<V: Vector> Watch<V> for SquaredError<'_, V> {
     #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
-        let row = seen.next.len() * V::LANES;
+        let row = seen.read.len() * V::LANES;
         let recorded = &self.recorded[(seen.step + 1) * row..][..row];
         let mut sum = V::splat(0.0);
-        for (i, (simulated, recorded)) in seen.next.iter().zip(recorded.chunks_exact(V::LANES)).enumerate() {
+        for (i, (simulated, recorded)) in seen.read.iter().zip(recorded.chunks_exact(V::LANES)).enumerate() {
             let error = self.periods.difference(i, *simulated, V::load(recorded));
             sum = sum + error * error;
         }

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use crate::dynamics::Dynamics;
+use crate::dynamics::{Dynamics, state_of};
 use crate::lanes::{Scalar, Vector, scalars};
 use crate::model::Model;
 use crate::selected::{Experiment, SelectedTests};
@@ -16,7 +16,9 @@ pub(super) fn after_steps(model: Model<'_>, selected: &SelectedTests, horizon: u
     let (n_x, n_u) = (selected.signals().states(), selected.signals().commands());
     let periods = &selected.signals().periods;
     let of_test = |experiment: &Experiment| {
-        let recorded: Vec<&[f64]> = experiment.states.chunks_exact(n_x).collect();
+        // Where readings are late, of the states that they are of.
+        let read = experiment.states.chunks_exact(n_x);
+        let recorded: Vec<Vec<f64>> = read.map(|read| state_of(&model, read)).collect();
         let mut workspace = model.workspace::<Scalar>();
         // Runs on their way, the one that began first in front.
         let mut running = VecDeque::with_capacity(horizon);
@@ -24,13 +26,13 @@ pub(super) fn after_steps(model: Model<'_>, selected: &SelectedTests, horizon: u
         for (states, command) in recorded.windows(2).zip(experiment.commands.chunks_exact(n_u)) {
             let command = scalars(command);
             model.remember(&mut workspace, &command);
-            running.push_back(scalars(states[0]));
+            running.push_back(scalars(&states[0]));
             for state in &mut running {
                 model.advance(&mut workspace, state, &command);
             }
             if running.len() == horizon {
                 let last = running.pop_front().unwrap_or_default();
-                for (i, (&predicted, &read)) in last.iter().zip(states[1]).enumerate() {
+                for (i, (&predicted, &read)) in last.iter().zip(&states[1]).enumerate() {
                     let error = periods.difference(i, predicted, Scalar::splat(read)).lane(0);
                     squares += error * error;
                 }

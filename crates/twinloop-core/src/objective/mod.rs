@@ -35,7 +35,7 @@ pub fn of_model(model: Model<'_>, selected: &SelectedTests, width: Width) -> Vec
 
 /// Open loop of a model on each selected test (N).
 fn open_loop(model: Model<'_>, selected: &SelectedTests, width: Width) -> Vec<f64> {
-    if model.frame.actuation().is_direct() {
+    if model.frame.actuation().is_direct() && model.frame.sensors().in_time() {
         dispatch(width, OpenLoop { model, selected })
     } else {
         after_steps(model, selected, 1)

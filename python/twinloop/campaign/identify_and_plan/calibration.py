@@ -110,7 +110,7 @@ def left_of_flights(model: _core.Model, flights: Iterable[Experiment], limits: L
     left = []
     for flight in flights:
         states = flight.trajectory.states
-        test = dataclasses.replace(flight.replayed, initial_state=states[0])
+        test = dataclasses.replace(flight.replayed, initial_state=model.states_of(states[:1])[0])
         free = fly(model, test, limits=limits).states
         rows = min(len(states), len(free))
         errors = test.family.signals.difference(states[:rows], free[:rows])

@@ -69,11 +69,11 @@ def following(
                     model,
                     setting,
                     test.genes[np.newaxis],
-                    _core.Task(states[0], test.target_state, steps),
+                    _core.Task(model.states_of(states[:1])[0], test.target_state, steps),
                     excitation=excitation,
                     workers=workers,
                 )
             lasted[i, j] = runs.lasted[0] / steps
-            misses = np.square(signals.difference(runs.states[0, 1:], states[1:]) / scales)
+            misses = np.square(signals.difference(runs.read[0, 1:], states[1:]) / scales)
             free[i, j] = misses.mean() if lasted[i, j] == 1.0 else np.inf
     return Following(free, lasted, frozen)

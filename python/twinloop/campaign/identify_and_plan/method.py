@@ -289,7 +289,6 @@ class IdentifyAndPlan:
             noise=noise,
             seed=self.setup.seed,
             inflation=inflation,
-            offsets=found.offsets.tolist(),
             remarks=known.lessons[-1].remarks,
             flights=[run.trajectory for run in book.experiments],
         )

@@ -72,7 +72,7 @@ class Loops:
         """Eigenvalues of the closed loop, in discrete time."""
         plant, law = self.plant, self.controller
         n, m = len(plant.A), len(law.A)
-        seen = np.eye(n)[: self._seen]
+        seen = plant.C[: self._seen]
         whole = np.zeros((n + m, n + m))
         whole[:n, :n] = plant.A + plant.B @ law.D @ seen
         whole[:n, n:] = plant.B @ law.C

@@ -12,6 +12,7 @@ from twinloop.errors import NotAvailable
 from twinloop.law.actuation import Actuation, Actuator
 from twinloop.law.law import Law
 from twinloop.law.linear.jacobian import jacobian
+from twinloop.law.linear.sensors import as_read
 from twinloop.law.linear.state_space import Linear
 
 HALVINGS = 30
@@ -33,7 +34,10 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
     Raises:
         NotAvailable: the law has no derivatives there, or, for continuous time, none at all.
     """
-    found = _period(law, state, command) if discrete else _instant(law, state, command)
+    plain = _period(law, state, command) if discrete else _instant(law, state, command)
+    factors = 1.0 / np.array([each.size for each in law.signals.commands])
+    point = np.concatenate([state, factors * command, np.zeros(len(law.actuation.hidden))])
+    found = as_read(law, plain, _wrapped(law, point))
     if not (np.isfinite(found.A).all() and np.isfinite(found.B).all() and np.isfinite(found.drift).all()):
         raise NotAvailable(
             "Linearisation: expected a law with finite derivatives at the point, found one that overflows or has a"
@@ -84,6 +88,8 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         drift,
         None,
         delays,
+        np.eye(size),
+        np.zeros(size),
     )
 
 
@@ -188,6 +194,8 @@ def _period(law: Law, state: Floats, command: Floats) -> Linear:
         ended.values - before.values,
         law.signals.dt,
         np.zeros(law.signals.n_u),
+        np.eye(size),
+        np.zeros(size),
     )
 
 

@@ -13,10 +13,10 @@ from twinloop.errors import NotAvailable
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """dx/dt = A x + B u, or x[k+1] = A x[k] + B u[k], for departures x and u from a point.
+    """dx/dt = A x + B u, or x[k+1] = A x[k] + B u[k], for departures x and u from a point; C x is read of them.
 
     Behind the states of the signals stand those that actuators and hidden states bring: the effect of a command that
-    lags, a hidden state and, where time is discrete, commands on their way.
+    lags, a hidden state and, where time is discrete, commands on their way and states that a late sensor still reads.
 
     Args:
         A: (n, n), in the units of the states and s.
@@ -29,6 +29,8 @@ class Linear:
             equilibrium.
         dt: period, s; None where time is continuous.
         delays: of each command, s, that A and B do not hold (n_u,); where time is discrete they hold all, and it is 0.
+        C: (n, n), what sensors read of each state: the state itself where they are in time or time is continuous.
+        offsets: by how much later each state is read, s, that C does not hold (n,); 0 where time is discrete.
     """
 
     A: Floats
@@ -40,15 +42,17 @@ class Linear:
     drift: Floats
     dt: float | None
     delays: Floats
+    C: Floats
+    offsets: Floats
 
     def to_control(self) -> Any:
         """The same as a state space of python-control, whose outputs are all states.
 
         Returns:
-            A `control.StateSpace` with the names of the states and commands.
+            A `control.StateSpace` with the names of the states and commands; outputs are what is read of the states.
 
         Raises:
-            NotAvailable: python-control is missing, or time is continuous and a command is delayed.
+            NotAvailable: python-control is missing, or time is continuous and a command or a sensor is delayed.
         """
         try:
             import control
@@ -56,31 +60,34 @@ class Linear:
             raise NotAvailable(
                 "python-control: expected the package `control`, found none; install it with `pip install control`."
             ) from missing
-        if self.delays.any():
+        if self.delays.any() or self.offsets.any():
             raise NotAvailable(
                 "python-control: expected no delays in continuous time, for it has none, found"
-                f" {self.delays.tolist()} s; linearise with discrete=True, where they are states."
+                f" {self.delays.tolist()} s of commands and {self.offsets.tolist()} s of sensors;"
+                " linearise with discrete=True, where they are states."
             )
         dt = 0 if self.dt is None else self.dt
         names = list(self.states)
         return control.ss(
-            *(self.A, self.B, np.eye(len(names)), np.zeros(self.B.shape), dt),
+            *(self.A, self.B, self.C, np.zeros(self.B.shape), dt),
             states=names,
             inputs=list(self.commands),
             outputs=[f"{name}_out" for name in names],
         )
 
     def response(self, frequencies: Floats) -> np.ndarray:
-        """From commands to states.
+        """From commands to what is read of the states.
 
         Args:
             frequencies: (f,), rad/s.
 
         Returns:
-            Complex gains (f, n, n_u), the delays among them.
+            Complex gains (f, n, n_u), the delays and offsets among them.
         """
         s = 1j * frequencies
         points = s if self.dt is None else np.exp(s * self.dt)
         inner = points[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
         lost = np.exp(-s[:, np.newaxis] * self.delays)
-        return np.asarray(np.linalg.solve(inner, self.B.astype(complex)) * lost[:, np.newaxis, :])
+        late = np.exp(-s[:, np.newaxis] * self.offsets)
+        states = np.linalg.solve(inner, self.B.astype(complex)) * lost[:, np.newaxis, :]
+        return np.asarray((self.C @ states) * late[:, :, np.newaxis])

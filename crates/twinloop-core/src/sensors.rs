@@ -1,0 +1,256 @@
+//! Sensors that are late or early: what they read of the course of a run, by the kinematics of the states alone.
+//!
+//! A late sensor reads what was a while ago: between two states of the run it follows the cubic through both and through
+//! their rates, an attitude as a quaternion (Hairer, Nørsett, Wanner 1993, section II.6). An early one reads what will
+//! be, as far as rates tell that go on as they did over the last period. Before a run nothing changed but by its rates.
+
+use std::collections::VecDeque;
+
+use crate::attitude::{angles, quaternion, turning};
+use crate::error::{Result, invalid};
+use crate::lanes::Vector;
+use crate::signals::{RigidBody, Signals};
+
+/// By how much later than others each state is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sensors {
+    /// Of each state, s; empty where all are in time.
+    offsets: Vec<f64>,
+    /// Offsets other than 0 in periods, each with its states.
+    groups: Vec<(f64, Vec<usize>)>,
+    dt: f64,
+    /// The state that is the derivative of each one, where there is one.
+    rates: Vec<Option<usize>>,
+    /// Whether nothing but a model moves the state.
+    driven: Vec<bool>,
+    body: Option<RigidBody>,
+}
+
+impl Sensors {
+    /// Offsets of more periods than this are refused.
+    pub const FARTHEST: f64 = 1000.0;
+
+    /// Those of a system, later by so many s each (n_x): only of states that others give, for these alone say what
+    /// stood between two readings.
+    pub fn new(offsets: &[f64], signals: &Signals) -> Result<Self> {
+        let (states, dt) = (signals.states(), signals.dt);
+        let fits = |(state, &offset): (usize, &f64)| {
+            offset == 0.0 || (signals.is_given(state) && offset.abs() <= Self::FARTHEST * dt)
+        };
+        if offsets.len() != states || !offsets.iter().enumerate().all(fits) {
+            return invalid(format!(
+                "offsets: expected one for each of {states} states, 0 s for those that no other states give and at \
+                 most {} periods for the others, found {offsets:?}",
+                Self::FARTHEST
+            ));
+        }
+        let mut groups: Vec<(f64, Vec<usize>)> = vec![];
+        for (state, periods) in offsets.iter().map(|offset| offset / dt).enumerate() {
+            match groups.iter_mut().find(|(known, _)| *known == periods) {
+                _ if periods == 0.0 => {}
+                Some((_, members)) => members.push(state),
+                None => groups.push((periods, vec![state])),
+            }
+        }
+        if groups.is_empty() {
+            return Ok(Self::default());
+        }
+        let rate = |state| signals.derivative_of.iter().position(|&of| of == Some(state));
+        Ok(Self {
+            offsets: offsets.to_vec(),
+            groups,
+            dt,
+            rates: (0..states).map(rate).collect(),
+            driven: (0..states).map(|state| !signals.is_given(state)).collect(),
+            body: signals.kinematics,
+        })
+    }
+
+    /// Whether every state is read as it is.
+    #[inline(always)]
+    pub fn in_time(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// Of each state, s; empty where all are in time.
+    pub fn offsets(&self) -> &[f64] {
+        &self.offsets
+    }
+
+    /// Puts what is read (n_x) at a state that a run has come to. To be called at each state in turn.
+    #[inline(always)]
+    pub(crate) fn read<V: Vector>(&self, recent: &mut Recent<V>, state: &[V], reading: &mut [V]) {
+        recent.keep(state, self.reach());
+        reading.copy_from_slice(state);
+        let now = recent.seen - 1;
+        for (periods, states) in &self.groups {
+            let at = now as f64 - periods;
+            let found = if at < 0.0 {
+                self.coasted(&recent.states[0], None, at * self.dt)
+            } else if at > now as f64 {
+                self.coasted(state, recent.back(1), -periods * self.dt)
+            } else {
+                let back = libm::ceil(*periods) as usize;
+                let share = back as f64 - periods;
+                match (recent.back(back), recent.back(back - 1)) {
+                    (Some(before), Some(after)) if share > 0.0 => self.between(before, after, share),
+                    (Some(there), _) => there.to_vec(),
+                    (None, _) => unreachable!("as far back as sensors reach all states are kept"),
+                }
+            };
+            for &state in states {
+                reading[state] = found[state];
+            }
+        }
+    }
+
+    /// The state (n_x) whose reading this is, at the start of a run.
+    #[inline(always)]
+    pub(crate) fn state_of<V: Vector>(&self, reading: &[V]) -> Vec<V> {
+        let mut found = reading.to_vec();
+        // Rates first: what they are rates of is moved along them.
+        let order = |state: usize| std::iter::successors(self.rates[state], |&rate| self.rates[rate]).count();
+        let longest = (0..reading.len()).map(order).max().unwrap_or(0);
+        for depth in 0..=longest {
+            for (periods, states) in &self.groups {
+                let moved = self.coasted(&found, None, periods * self.dt);
+                for &state in states.iter().filter(|&&state| order(state) == depth) {
+                    found[state] = moved[state];
+                }
+            }
+        }
+        found
+    }
+
+    /// Periods before now that are kept.
+    fn reach(&self) -> usize {
+        self.groups.iter().fold(1, |most, (periods, _)| most.max(libm::ceil(*periods) as usize))
+    }
+
+    /// A state some time later (s; before 0: earlier) by kinematics alone, the states that are driven going on as they
+    /// did from the one a period before.
+    #[inline(always)]
+    fn coasted<V: Vector>(&self, state: &[V], before: Option<&[V]>, time: f64) -> Vec<V> {
+        let mut rates = state.to_vec();
+        if let Some(before) = before {
+            // Their mean over the time.
+            for (i, rate) in rates.iter_mut().enumerate().filter(|(i, _)| self.driven[*i]) {
+                *rate = *rate + (state[i] - before[i]) * (0.5 * time / self.dt);
+            }
+        }
+        let mut found = state.to_vec();
+        for (i, found) in found.iter_mut().enumerate() {
+            let (mut next, mut factor) = (self.rates[i], 1.0);
+            let mut order = 1.0;
+            while let Some(rate) = next {
+                factor *= time / order;
+                *found = *found + rates[rate] * factor;
+                (next, order) = (self.rates[rate], order + 1.0);
+            }
+        }
+        if let Some(body) = &self.body {
+            let before = body.angles.map(|angle| state[angle]);
+            let turned = turned(quaternion(before), body.rates.map(|rate| rates[rate]), time);
+            put(&mut found, body, turned, before);
+        }
+        found
+    }
+
+    /// What lies between two states of a run a period apart, at a share of it.
+    #[inline(always)]
+    fn between<V: Vector>(&self, before: &[V], after: &[V], share: f64) -> Vec<V> {
+        let cubic = Cubic::at(share, self.dt);
+        let mut found = after.to_vec();
+        for (i, found) in found.iter_mut().enumerate() {
+            if let Some(rate) = self.rates[i] {
+                *found = cubic.of(before[i], before[rate], after[i], after[rate]);
+            }
+        }
+        if let Some(body) = &self.body {
+            let from = body.angles.map(|angle| before[angle]);
+            let begun = quaternion(from);
+            let ended = quaternion(body.angles.map(|angle| after[angle]));
+            // A quaternion and its negative are the same attitude.
+            let along = (0..4).fold(V::splat(0.0), |sum, i| sum + begun[i] * ended[i]);
+            let sign = along.select_less(V::splat(0.0), V::splat(-1.0), V::splat(1.0));
+            let ended = ended.map(|part| part * sign);
+            let first = turning(begun, body.rates.map(|rate| before[rate]));
+            let last = turning(ended, body.rates.map(|rate| after[rate]));
+            let attitude = std::array::from_fn(|i| cubic.of(begun[i], first[i], ended[i], last[i]));
+            put(&mut found, body, attitude, from);
+        }
+        found
+    }
+}
+
+/// The last states of a run, the newest at the end.
+pub(crate) struct Recent<V> {
+    states: VecDeque<Vec<V>>,
+    seen: usize,
+}
+
+impl<V: Vector> Recent<V> {
+    pub fn new() -> Self {
+        Self { states: VecDeque::new(), seen: 0 }
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, state: &[V], reach: usize) {
+        let mut kept = if self.states.len() > reach {
+            self.states.pop_front().unwrap_or_default()
+        } else {
+            Vec::with_capacity(state.len())
+        };
+        kept.clear();
+        kept.extend_from_slice(state);
+        self.states.push_back(kept);
+        self.seen += 1;
+    }
+
+    /// The state some periods before the newest.
+    #[inline(always)]
+    fn back(&self, periods: usize) -> Option<&[V]> {
+        let place = self.states.len().checked_sub(periods + 1)?;
+        Some(&self.states[place])
+    }
+}
+
+/// Weights of Hermite's cubic through two values and their derivatives.
+struct Cubic {
+    values: [f64; 2],
+    slopes: [f64; 2],
+}
+
+impl Cubic {
+    /// At a share of a step.
+    fn at(share: f64, step: f64) -> Self {
+        let rest = 1.0 - share;
+        Self {
+            values: [rest * rest * (1.0 + 2.0 * share), share * share * (3.0 - 2.0 * share)],
+            slopes: [step * share * rest * rest, -step * share * share * rest],
+        }
+    }
+
+    #[inline(always)]
+    fn of<V: Vector>(&self, before: V, begun: V, after: V, ended: V) -> V {
+        before * self.values[0] + after * self.values[1] + begun * self.slopes[0] + ended * self.slopes[1]
+    }
+}
+
+/// A quaternion after some time of turning at body rates that stay.
+#[inline(always)]
+fn turned<V: Vector>(attitude: [V; 4], rates: [V; 3], time: f64) -> [V; 4] {
+    let [p, q, r] = rates;
+    let half = (p * p + q * q + r * r).sqrt() * (0.5 * time);
+    let (cosine, sine) = (half.map(libm::cos), half.map(|x| if x == 0.0 { 1.0 } else { libm::sin(x) / x }));
+    let slope = turning(attitude, rates);
+    std::array::from_fn(|i| attitude[i] * cosine + slope[i] * sine * time)
+}
+
+/// Writes the angles of an attitude, by whole turns the nearest to what they were.
+#[inline(always)]
+fn put<V: Vector>(state: &mut [V], body: &RigidBody, attitude: [V; 4], before: [V; 3]) {
+    for (&at, angle) in body.angles.iter().zip(angles(attitude, before)) {
+        state[at] = angle;
+    }
+}
