@@ -82,11 +82,14 @@ def test_kinematics_are_among_the_equations():
     )
     program = _core.Program.parse(program_text(7, 3, 12, [["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"]]))
     model = tl.Twin(_core.Model(program, "acceleration", body.engine), body)
-    for pitch in (0.4, -1.1):
-        state = np.array([0.3, pitch, -0.2, 0.5, -0.7, 0.9])
-        found = model.linearise(state, [0.3], discrete=True)
-        expected = differences(lambda x: model.predict(x, [0.3]), state, 1e-7)
-        np.testing.assert_allclose(found.A, expected, rtol=1e-4, atol=1e-5)
+    # Upright, all but vertical, turned over; slow and by a radian a period.
+    for pitch in (0.4, -1.1, 1.5, 2.2):
+        for fast in (1.0, 20.0):
+            state = np.array([0.3, pitch, -0.2, 0.5 * fast, -0.7 * fast, 0.9 * fast])
+            found = model.linearise(state, [0.3], discrete=True)
+            expected = differences(lambda x: model.predict(x, [0.3]), state, 1e-6)
+            np.testing.assert_allclose(found.A, expected, rtol=1e-5, atol=1e-6)
+            np.testing.assert_allclose(state + found.drift, model.predict(state, [0.3]), atol=1e-12)
 
 
 ACTUATED = {

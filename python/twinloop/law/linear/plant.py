@@ -11,6 +11,8 @@ from twinloop.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.actuation import Actuation, Actuator
 from twinloop.law.law import Law
+from twinloop.law.linear.attitude import angles, quaternion, turning
+from twinloop.law.linear.dual import Dual
 from twinloop.law.linear.jacobian import jacobian
 from twinloop.law.linear.sensors import as_read
 from twinloop.law.linear.state_space import Linear
@@ -110,27 +112,6 @@ def _level(commands: Sequence[int], squared: bool, scaled: Floats, factors: Floa
 
 
 @dataclass(frozen=True, eq=False)
-class _Dual:
-    """Numbers with their derivatives by everything that a period begins with."""
-
-    values: Floats
-    slopes: Floats
-
-    def __add__(self, other: _Dual) -> _Dual:
-        return _Dual(self.values + other.values, self.slopes + other.slopes)
-
-    def __mul__(self, factor: float | Floats) -> _Dual:
-        of_rows = factor[:, np.newaxis] if isinstance(factor, np.ndarray) else factor
-        return _Dual(self.values * factor, self.slopes * of_rows)
-
-    @staticmethod
-    def stacked(parts: Sequence[_Dual]) -> _Dual:
-        return _Dual(
-            np.concatenate([part.values for part in parts]), np.concatenate([part.slopes for part in parts])
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class _Begun:
     """What a period begins with, each with its derivatives: all of it together is the state of the linear model.
 
@@ -144,11 +125,11 @@ class _Begun:
     """
 
     names: list[str]
-    x: _Dual
-    held: dict[int, _Dual]
-    hidden: _Dual
-    queues: list[list[_Dual]]
-    sent: _Dual
+    x: Dual
+    held: dict[int, Dual]
+    hidden: Dual
+    queues: list[list[Dual]]
+    sent: Dual
 
     @staticmethod
     def of(law: Law, state: Floats, command: Floats) -> _Begun:
@@ -159,19 +140,19 @@ class _Begun:
         names += [f"{name}_{back}_before" for name, a in sent for back in range(a.delay, 0, -1)]
         identity, rows = np.eye(len(names) + signals.n_u), iter(range(len(names)))
 
-        def taken(values: Floats) -> _Dual:
-            return _Dual(values, identity[[next(rows) for _ in values]])
+        def taken(values: Floats) -> Dual:
+            return Dual(values, identity[[next(rows) for _ in values]])
 
         x = taken(state)
         held = {i: taken(command[[i]]) for i, actuator in enumerate(actuators) if actuator.lag > 0.0}
         hidden = taken(np.zeros(len(law.actuation.hidden)))
         queues = [[taken(command[[i]]) for _ in range(a.delay)] for i, a in enumerate(actuators)]
-        return _Begun(names, x, held, hidden, queues, _Dual(command, identity[len(names) :]))
+        return _Begun(names, x, held, hidden, queues, Dual(command, identity[len(names) :]))
 
-    def whole(self) -> _Dual:
+    def whole(self) -> Dual:
         """All of it, in the order of the names."""
         waiting = [part for queue in self.queues for part in queue]
-        return _Dual.stacked([self.x, *self.held.values(), self.hidden, *waiting])
+        return Dual.stacked([self.x, *self.held.values(), self.hidden, *waiting])
 
 
 def _period(law: Law, state: Floats, command: Floats) -> Linear:
@@ -180,9 +161,9 @@ def _period(law: Law, state: Floats, command: Floats) -> Linear:
     effects, held, waiting = _effects(law, begun)
     filled = _filled(law, begun)
     inputs = [
-        _Dual.stacked([of_commands, hidden]) for of_commands, hidden in zip(effects, filled, strict=True)
+        Dual.stacked([of_commands, hidden]) for of_commands, hidden in zip(effects, filled, strict=True)
     ]
-    ended = _Dual.stacked([_stepped(law, begun.x, inputs), *held, filled[2], *waiting])
+    ended = Dual.stacked([_stepped(law, begun.x, inputs), *held, filled[2], *waiting])
     before, size = begun.whole(), len(begun.names)
     return Linear(
         ended.slopes[:, :size],
@@ -199,12 +180,12 @@ def _period(law: Law, state: Floats, command: Floats) -> Linear:
     )
 
 
-def _effects(law: Law, begun: _Begun) -> tuple[list[_Dual], list[_Dual], list[_Dual]]:
+def _effects(law: Law, begun: _Begun) -> tuple[list[Dual], list[Dual], list[Dual]]:
     """Scaled effects of commands at start, middle and end of a period; what lags hold; commands still on their way."""
-    stages: list[list[_Dual]] = [[], [], []]
+    stages: list[list[Dual]] = [[], [], []]
     held, waiting = [], []
     for i, actuator in enumerate(law.actuation.actuators):
-        arrived, *later = [*begun.queues[i], _Dual(begun.sent.values[[i]], begun.sent.slopes[[i]])]
+        arrived, *later = [*begun.queues[i], Dual(begun.sent.values[[i]], begun.sent.slopes[[i]])]
         half = float(np.exp(-0.5 * law.signals.dt / actuator.lag)) if actuator.lag > 0.0 else 0.0
         start = begun.held.get(i, arrived)
         middle = arrived * (1.0 - half) + start * half
@@ -214,44 +195,65 @@ def _effects(law: Law, begun: _Begun) -> tuple[list[_Dual], list[_Dual], list[_D
         held += [end] if i in begun.held else []
         waiting += later
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
-    return [_Dual.stacked(stage) * factors for stage in stages], held, waiting
+    return [Dual.stacked(stage) * factors for stage in stages], held, waiting
 
 
-def _filled(law: Law, begun: _Begun) -> list[_Dual]:
+def _filled(law: Law, begun: _Begun) -> list[Dual]:
     """Hidden states at the start, the middle and the end of a period."""
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
-    stages: list[list[_Dual]] = [[], [], []]
+    stages: list[list[Dual]] = [[], [], []]
     for j, h in enumerate(law.actuation.hidden):
         kept = float(np.exp(-0.5 * law.signals.dt / h.time))
         level, slope = _level(h.commands, h.squared, factors * begun.sent.values, factors)
         over = 0.0 if h.rest is None else level - h.rest
-        added = _Dual(np.array([over]), slope[np.newaxis] @ begun.sent.slopes) * (h.time * (1.0 - kept))
-        start = _Dual(begun.hidden.values[[j]], begun.hidden.slopes[[j]])
+        added = Dual(np.array([over]), slope[np.newaxis] @ begun.sent.slopes) * (h.time * (1.0 - kept))
+        start = Dual(begun.hidden.values[[j]], begun.hidden.slopes[[j]])
         middle = start * kept + added
         for stage, value in zip(stages, (start, middle, middle * kept + added), strict=True):
             stage.append(value)
-    return [_Dual.stacked(stage) if stage else begun.hidden for stage in stages]
+    return [Dual.stacked(stage) if stage else begun.hidden for stage in stages]
 
 
-def _stepped(law: Law, x: _Dual, inputs: Sequence[_Dual]) -> _Dual:
+def _stepped(law: Law, x: Dual, inputs: Sequence[Dual]) -> Dual:
     """The next state under effects and hidden states at the start, the middle and the end of a period."""
 
-    def of(roots: Sequence[int], point: _Dual, stage: int) -> _Dual:
-        whole = _Dual.stacked([point, inputs[stage]])
+    def of(roots: Sequence[int], point: Dual, stage: int) -> Dual:
+        whole = Dual.stacked([point, inputs[stage]])
         values, slopes = jacobian(law.expressions, roots, _wrapped(law, whole.values))
-        return _Dual(values, slopes @ whole.slopes)
+        return Dual(values, slopes @ whole.slopes)
 
     dt = law.signals.dt
     if law.form == "absolute":
         return of(law.outputs, x, 1)
     if law.form == "increment":
         return x + of(law.outputs, x, 1)
-    roots = law.derivatives()
-    first = of(roots, x, 0)
-    second = of(roots, x + first * (0.5 * dt), 1)
-    third = of(roots, x + second * (0.5 * dt), 1)
-    fourth = of(roots, x + third * dt, 2)
-    return x + (first + second * 2.0 + third * 2.0 + fourth) * (dt / 6.0)
+    roots, body = law.derivatives(), law.signals.kinematics
+
+    def slope(point: Dual, stage: int) -> Dual:
+        if body is None:
+            return of(roots, point, stage)
+        states = seen(point)
+        moved = of(roots, states, stage)
+        still = Dual(np.zeros(3), np.zeros((3, moved.slopes.shape[1])))
+        turned = turning(point.rows(range(size, size + 4)), states.rows(rates))
+        return Dual.stacked([moved.put(turns, still), turned])
+
+    def seen(point: Dual) -> Dual:
+        """The states, with the angles of the quaternion behind them."""
+        found = angles(point.rows(range(size, size + 4)), x.values[turns])
+        return point.rows(range(size)).put(turns, found)
+
+    size, begun = len(x.values), x
+    if body is not None:
+        place = law.signals.state_names.index
+        turns, rates = [place(name) for name in body.angles], [place(name) for name in body.rates]
+        begun = Dual.stacked([x, quaternion(x.rows(turns))])
+    first = slope(begun, 0)
+    second = slope(begun + first * (0.5 * dt), 1)
+    third = slope(begun + second * (0.5 * dt), 1)
+    fourth = slope(begun + third * dt, 2)
+    ended = begun + (first + second * 2.0 + third * 2.0 + fourth) * (dt / 6.0)
+    return ended if body is None else seen(ended)
 
 
 def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
