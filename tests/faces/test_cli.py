@@ -280,7 +280,7 @@ def test_misuse_in_a_process_of_its_own_leaves_no_traceback():
     ],
 )
 def test_a_failure_exits_with_its_code_and_one_line(monkeypatch, failure, code):
-    def fail(*arguments):
+    def fail(*arguments, **options):
         raise failure
 
     monkeypatch.setattr("twinloop.campaign.Campaign.run", fail)

@@ -11,11 +11,14 @@ from typing import Any
 from twinloop.autopilots.declared import Declared, declared
 from twinloop.campaign import Campaign
 from twinloop.campaign.presets import PRESETS
+from twinloop.campaign.system_section import SystemSection, said_by, system_section
 from twinloop.controllers import UnboundFamily
-from twinloop.errors import InvalidInput, unknown
+from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.records import read
 from twinloop.signals import Command as Channel
 from twinloop.signals import RigidBody, Signals, State
+from twinloop.systems import System
+from twinloop.systems.named import NAMED, system_named
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -26,7 +29,7 @@ MOST_BYTES = 10_000_000
 """Of a campaign file."""
 SECTIONS = (
     *("dt", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options"),
-    "autopilot",
+    *("autopilot", "system"),
 )
 TASK = ("initial_state", "target_state", "duration")
 CAMPAIGN = ("preset", "seed", "goal", "quality")
@@ -84,6 +87,12 @@ seed = 0
 # goal = "both"                  # "control", "model" or "both"
 # quality = "iae"                # "iae", "ise" or "final_distance"
 
+# [system]                       # what flies by itself: twinloop run {file}; leave it out if a person flies
+# use = "rig:Rig"                # a class in rig.py beside this file, which is run; or a name: {names}
+# timeout = 60.0                 # s that a run may take
+# [system.arguments]             # what it is made with
+# noise = 0.001
+
 [options]                        # every option of the preset, at its default
 """
 
@@ -98,7 +107,8 @@ def template(store: str) -> str:
     lines = [
         f"# {field.name} = {_toml(getattr(options, field.name))}" for field in dataclasses.fields(options)
     ]
-    return TEMPLATE.format(store=store) + "\n".join(lines) + "\n"
+    file, names = Path(store).with_suffix(".toml"), ", ".join(NAMED)
+    return TEMPLATE.format(store=store, file=file, names=names) + "\n".join(lines) + "\n"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,12 +116,18 @@ class CampaignFile:
     """What a campaign file says.
 
     Args:
+        path: of the file.
         arguments: of the campaign.
         first: gains of the first test, by name.
+        flies: what flies by itself; None: a person flies.
+        made: that system, where it had to be made to know its signals.
     """
 
+    path: Path
     arguments: Mapping[str, Any]
     first: Mapping[str, float]
+    flies: SystemSection | None = None
+    made: System | None = None
 
     def campaign(self, **others: Any) -> Campaign:
         """The campaign.
@@ -120,6 +136,24 @@ class CampaignFile:
             others: arguments that no file holds, such as `store` or `threads`.
         """
         return Campaign(**self.arguments, **others)
+
+    def system(self) -> System:
+        """What flies by itself; making it may run code of a user's own.
+
+        Raises:
+            NotAvailable: the file names none, or a package is missing.
+            InvalidInput: no such system, or arguments that it has not.
+        """
+        if self.made is not None:
+            return self.made
+        if self.flies is None:
+            raise NotAvailable(
+                f"File {self.path}: expected a section [system] that names what flies, found none; add it, or fly"
+                f" yourself: twinloop ask {self.path.with_suffix('.db')}."
+            )
+        return system_named(
+            self.flies.use, self.flies.arguments, self.arguments["signals"], self.path.resolve().parent
+        )
 
 
 def read_file(path: str | Path) -> CampaignFile:
@@ -136,26 +170,45 @@ def read_file(path: str | Path) -> CampaignFile:
     """
     path = Path(path)
     found = _toml_of(path)
-    _keys(found, SECTIONS, ("dt", "states", "commands", "controller", "task", "first"), str(path))
     if "autopilot" in found:
         declared(found["autopilot"], f"File {path}")
-    task = _section(found, "task", TASK, TASK)
-    rest = _section(found, "campaign", CAMPAIGN, ())
-    options = found.get("options", {})
-    signals = Signals(
-        states=_members(found, "states", State),
-        commands=_members(found, "commands", Channel),
-        dt=found["dt"],
-        kinematics=_tagged(found["kinematics"], RigidBody) if "kinematics" in found else None,
-    )
+    flies = system_section(found.get("system"))
+    needed = ("dt", "states", "commands", "controller", "task", "first")
+    described = flies is None or "states" in found
+    _keys(found, SECTIONS, needed if flies is None else needed[:3] if described else (), str(path))
+    signals = made = None
+    if described:
+        signals = Signals(
+            states=_members(found, "states", State),
+            commands=_members(found, "commands", Channel),
+            dt=found["dt"],
+            kinematics=_tagged(found["kinematics"], RigidBody) if "kinematics" in found else None,
+        )
+    else:
+        for key in ("dt", "commands", "kinematics"):
+            if key in found:
+                raise InvalidInput(
+                    f"Campaign file, {path}: expected [states] beside {key}, found none; add them, or leave {key}"
+                    " out and take those of the system."
+                )
+    if flies is not None and not all(key in found for key in needed):
+        made = system_named(flies.use, flies.arguments, signals, path.resolve().parent)
+        signals = made.signals
+    own = made is not None and "task" not in found
+    task = said_by(made, TASK, path) if own else _section(found, "task", TASK, TASK)
     arguments = {
         "signals": signals,
-        "controller": _controller(found["controller"]),
+        "controller": _controller(found["controller"])
+        if "controller" in found
+        else said_by(made, ("controller",), path)["controller"],
         **task,
-        **rest,
-        "options": options,
+        **_section(found, "campaign", CAMPAIGN, ()),
+        "options": found.get("options", {}),
     }
-    return CampaignFile(arguments, _section(found, "first", None, ()))
+    first = _section(found, "first", None, ())
+    if made is not None and "first" not in found:
+        first = dict(said_by(made, ("default_gains",), path)["default_gains"])
+    return CampaignFile(path, arguments, first, flies, made)
 
 
 def read_autopilot(path: str | Path) -> Declared | None:

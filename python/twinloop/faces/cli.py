@@ -10,15 +10,18 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from twinloop import __version__
 from twinloop.campaign import Campaign
+from twinloop.campaign.campaign_file import read_file
 from twinloop.campaign.presets import PRESETS, options_of, parsed
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
 from twinloop.faces.by_hand import abandon, ask, attach, new, tell
 from twinloop.faces.certifying import certify
 from twinloop.faces.console import Watch
 from twinloop.faces.exporting import export
+from twinloop.faces.from_file import run_file
 from twinloop.faces.stored import resume, show
 from twinloop.faces.terminal import prepared
 from twinloop.faces.working import answers, check_answer, work
@@ -26,6 +29,11 @@ from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
 from twinloop.systems import BUILT_IN, Quadrotor
 
+SAID_BY_A_FILE = (
+    *("seed", "preset", "goal", "quality", "generations", "test_generations", "noise", "gyroscopic", "harsh"),
+    "changes",
+)
+"""Options of `run` that a campaign file has."""
 STUDIES = {
     "bench": "twinloop_exam.command",
     "reproduce": "twinloop.reproduce.command",
@@ -127,7 +135,15 @@ def run(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Experiment on a built-in SYSTEM (quadrotor): learn its twin, tune its controller."""
+    """Experiment on a SYSTEM: learn its twin, tune its controller.
+
+    SYSTEM is a built-in one (quadrotor), or a campaign file such as rig.toml that names one; that campaign is kept in
+    rig.db beside it.
+    """
+    if Path(system).suffix == ".toml":
+        _refuse_beside_a_file(context)
+        kept_in = Path(system).with_suffix(".db") if store is None else store
+        context.exit(run_file(read_file(system), kept_in, name, experiments, threads, output, plot, as_json))
     if system not in BUILT_IN:
         raise unknown("system", system, BUILT_IN)
     if experiments < 1:
@@ -164,6 +180,16 @@ main.add_command(resume)
 main.add_command(show)
 main.add_command(export)
 main.add_command(certify)
+
+
+def _refuse_beside_a_file(context: click.Context) -> None:
+    """Refuses options that a campaign file has."""
+    for name in SAID_BY_A_FILE:
+        if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
+            option = f"--{'set' if name == 'changes' else name.replace('_', '-')}"
+            raise InvalidInput(
+                f"twinloop run: expected {option} in the campaign file, found it beside it; write it there."
+            )
 
 
 def _change(preset: str, text: str) -> tuple[str, object]:

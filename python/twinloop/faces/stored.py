@@ -13,6 +13,7 @@ from twinloop.campaign.history import Iteration
 from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.console import Watch
+from twinloop.faces.from_file import beside, run_file
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_utf_8
@@ -39,9 +40,21 @@ def resume(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Go on with a campaign of STORE on a built-in system, with the same bits."""
+    """Go on with a campaign of STORE on its system, with the same bits.
+
+    The system is a built-in one, or the one that the campaign file beside the store names.
+    """
     check_answer(output, plot)
     held = look(store, name, read_only=False)
+    file = beside(store)
+    if file is not None:
+        wanted = held.experiments if experiments is None else experiments
+        if wanted is None:
+            raise InvalidInput(
+                "twinloop resume: expected --experiments N for a campaign that was flown by hand so far, found none;"
+                " say how many runs there shall be in all."
+            )
+        context.exit(run_file(file, store, held.name, wanted, threads, output, plot, as_json))
     rig = _system(held)
     budget = held.experiments if experiments is None else experiments
     assert budget is not None  # it stands beside the system
@@ -95,8 +108,9 @@ def _system(held: Kept) -> Quadrotor:
     kind = None if held.system is None else held.system["kind"]
     if kind not in BUILT_IN:
         raise NotAvailable(
-            "twinloop resume: expected a campaign that flies a built-in system, found"
-            f" {'another one' if kind is None else repr(kind)}; go on from Python, with the same arguments and store=."
+            "twinloop resume: expected a campaign that flies a built-in system, or a campaign"
+            f" file beside {held.name!r} that names one, found neither; write [system] into that file, fly"
+            " yourself with twinloop ask, or go on from Python with the same arguments and store=."
         )
     return BUILT_IN[kind].from_record(held.system)
 

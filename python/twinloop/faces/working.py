@@ -18,7 +18,7 @@ from twinloop.faces.result import Result, summary, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_closed, is_utf_8
 from twinloop.faces.text import render
-from twinloop.systems import Quadrotor
+from twinloop.systems import Quadrotor, System
 
 Answer = TypeVar("Answer")
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -64,12 +64,14 @@ def check_answer(output: Path | None, plot: Path | None) -> None:
 
 def work(
     campaign: Campaign,
-    rig: Quadrotor,
+    rig: System,
     watch: Watch,
     experiments: int,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
+    name: str = "quadrotor",
+    timeout: float | None = None,
 ) -> int:
     """Flies a campaign to its end, and shows what came out.
 
@@ -81,6 +83,8 @@ def work(
         output: for the result; None: none.
         plot: for the picture; None: none.
         as_json: whether the result is printed as JSON.
+        name: of the system.
+        timeout: seconds that a run may take; None: as long as it wants.
 
     Returns:
         The exit code: 130 after an interruption, 1 where no controller is fit to fly.
@@ -91,13 +95,13 @@ def work(
     clock = Stopwatch(campaign.threads)
     try:
         with watch, suppress(KeyboardInterrupt):
-            campaign.run(rig, experiments)
+            campaign.run(rig, experiments, timeout=timeout)
             controller_to_fly(campaign)  # learns the last flight
         if campaign.interrupted and campaign.store is not None:
             click.echo(f"Kept: twinloop resume {campaign.store} goes on from here.", err=True)
         if not campaign.experiments or knows_nothing(campaign):
             raise KeyboardInterrupt
-        result = _uninterrupted(lambda: summary(campaign, described("quadrotor", rig), clock.info()))
+        result = _uninterrupted(lambda: summary(campaign, described(name, rig), clock.info()))
     finally:
         campaign.close()
     try:
@@ -132,13 +136,15 @@ def knows_nothing(campaign: Campaign) -> bool:
     return isinstance(campaign.options, DefaultOptions) and not campaign.history
 
 
-def described(name: str, rig: Quadrotor) -> dict[str, object]:
-    """What a result says of a built-in system.
+def described(name: str, rig: System) -> dict[str, object]:
+    """What a result says of a system.
 
     Args:
         name: of the system.
         rig: the system.
     """
+    if not isinstance(rig, Quadrotor):
+        return {"name": name}
     return {
         "name": name,
         "noise": rig.noise,

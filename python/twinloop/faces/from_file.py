@@ -1,0 +1,67 @@
+"""A campaign file that names a system: `twinloop run rig.toml`, and `resume` of what it left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from twinloop.campaign.campaign_file import CampaignFile, read_file
+from twinloop.errors import InvalidInput
+from twinloop.faces.console import Watch
+from twinloop.faces.working import check_answer, work
+
+
+def run_file(
+    file: CampaignFile,
+    store: str | Path,
+    name: str,
+    experiments: int,
+    threads: int | None,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> int:
+    """Flies the system of a campaign file.
+
+    Args:
+        file: that names it.
+        store: where the campaign is kept; what is there goes on.
+        name: of the campaign in its store.
+        experiments: runs in all.
+        threads: of the engine; None: all.
+        output: for the result; None: none.
+        plot: for the picture; None: none.
+        as_json: whether the result is printed as JSON.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        InvalidInput: a file, a system or a number that cannot be used.
+        NotAvailable: the file names no system, or a package is missing.
+    """
+    if experiments < 1:
+        raise InvalidInput(
+            f"--experiments: expected at least 1, found {experiments}; the first flight counts."
+        )
+    check_answer(output, plot)
+    rig = file.system()
+    assert file.flies is not None  # there would be no system
+    campaign = file.campaign(store=store, name=name, threads=threads)
+    watch = Watch(campaign.options, experiments, file.flies.use)
+    campaign.progress = watch
+    if not campaign.tests:
+        campaign.test(file.first)
+    return work(campaign, rig, watch, experiments, output, plot, as_json, file.flies.use, file.flies.timeout)
+
+
+def beside(store: str) -> CampaignFile | None:
+    """The campaign file beside a store, if there is one that names a system.
+
+    Args:
+        store: a file, or the address of a server.
+    """
+    path = Path(store).with_suffix(".toml")
+    if "://" in store or not path.is_file():
+        return None
+    file = read_file(path)
+    return None if file.flies is None else file

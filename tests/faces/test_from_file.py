@@ -1,0 +1,154 @@
+"""A campaign file that names a system: run, resumed to the same bits, and refused where it is wrong."""
+
+import subprocess
+import sys
+
+import pytest
+from click.testing import CliRunner
+
+import twinloop as tl
+from lives import SMALL
+from sameness import same
+from twinloop.campaign.campaign_file import _toml, read_file, template
+from twinloop.faces.cli import main
+
+OPTIONS = "[options]\n" + "".join(f"{name} = {_toml(value)}\n" for name, value in SMALL.items())
+PENDULUM = template("rig.db").partition("# [system]")[0]
+SHORT = "[campaign]\nseed = 3\n"
+RIG = """
+import twinloop as tl
+from math import sin
+
+signals = tl.Signals(
+    states=[
+        tl.State("angle", "rad", scale=3.14, envelope=(-2.5, 2.5)),
+        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
+    ],
+    commands=[tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
+    dt=0.05,
+)
+
+def step(x, u):
+    rate = x[1] + 0.05 * (u[0] - 1.2 * sin(x[0]) - 0.05 * x[1]) / 0.05
+    return x[0] + 0.05 * rate, rate
+
+def rig(noise=0.0, seed=0):
+    return tl.systems.Simulated(signals, step, noise=noise, seed=seed)
+
+def deaf(signals):
+    return tl.systems.Simulated(signals, lambda x, u: x)
+
+there = rig()
+number = 3
+"""
+
+
+def section(use, timeout="", **arguments):
+    lines = "".join(f"{name} = {_toml(value)}\n" for name, value in arguments.items())
+    return f'[system]\nuse = "{use}"\n{timeout}\n[system.arguments]\n{lines}'
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "rig", raising=False)
+    (tmp_path / "rig.py").write_text(RIG, encoding="utf-8")
+    return tmp_path
+
+
+def written(folder, *parts, name="rig.toml"):
+    (folder / name).write_text("\n".join([*parts, OPTIONS]), encoding="utf-8")
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, list(arguments))
+
+
+def flights(store):
+    campaign = tl.Campaign.load(store, read_only=True)
+    return [run.trajectory.states for run in campaign.experiments]
+
+
+def test_a_system_of_ones_own_is_flown_and_resumed_with_the_same_bits(folder):
+    written(folder, PENDULUM, section("rig:rig", "timeout = 60.0", noise=0.01, seed=1))
+    done = run("run", "rig.toml", "--experiments", "3", "--threads", "1")
+    assert done.exit_code == 0, done.output
+    assert "rig:rig" in done.stdout
+    # Another campaign in another process is killed on its second run, and goes on here.
+    killed = "rig.rig = (lambda make: lambda **k: killing(make(**k)))(rig.rig)"
+    script = f"""
+import os, signal, rig
+from twinloop.faces.cli import main
+def killing(system):
+    plain = system.run
+    system.run = lambda test: os.kill(os.getpid(), signal.SIGKILL) if system.runs == 1 else plain(test)
+    return system
+{killed}
+main(["run", "rig.toml", "--experiments", "3", "--threads", "1", "--store", "rig2.db"])
+"""
+    died = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, check=False)
+    assert died.returncode == -9, died.stderr
+    assert len(flights("rig2.db")) == 1
+    (folder / "rig2.toml").write_text((folder / "rig.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    again = run("resume", "rig2.db", "--threads", "1")
+    assert again.exit_code == 0, again.output
+    assert same(flights("rig.db"), flights("rig2.db"))
+
+
+def test_a_built_in_system_needs_no_other_section(folder):
+    written(folder, SHORT, section("quadrotor", noise=0.001, seed=3), name="hover.toml")
+    file = read_file("hover.toml")
+    plain = tl.systems.Quadrotor(noise=0.001, seed=3)
+    assert file.system().to_record() == plain.to_record()
+    campaign = file.campaign(threads=1)
+    assert campaign.setup.seed == 3 and campaign.setup.steps == 100
+    assert dict(file.first) == plain.default_gains
+
+
+def test_a_system_that_asks_for_signals_is_given_those_of_the_file(folder):
+    written(folder, PENDULUM, section("rig:deaf"))
+    assert read_file("rig.toml").system().signals.state_names == ("angle", "rate")
+    written(folder, PENDULUM, section("folder", path="drop"))
+    assert read_file("rig.toml").system().path == folder / "drop"
+
+
+@pytest.mark.parametrize(
+    ("parts", "word"),
+    [
+        ((PENDULUM,), "found none; add it, or fly yourself"),
+        ((PENDULUM, section("quadroto")), "did you mean 'quadrotor'"),
+        ((PENDULUM, section("rig:rigg")), "has no attribute"),
+        ((PENDULUM, section("rigg:rig")), "No module named"),
+        ((PENDULUM, section("rig:number")), "expected a system, or a class"),
+        ((PENDULUM, section("rig:there", noise=0.1)), "name a class or a function"),
+        ((PENDULUM, section("rig:rig", nois=0.1)), "did you mean 'noise'"),
+        ((PENDULUM, section("rig:rig", "timeot = 3.0")), "did you mean 'timeout'"),
+        ((PENDULUM, section("rig:rig", "timeout = -3.0")), "above 0"),
+        ((PENDULUM, section("quadrotor")), "expected its own states"),
+        ((SHORT, section("rig:rig")), "expected [task], found none"),
+        (("dt = 0.1", SHORT, section("rig:rig")), "expected [states] beside dt"),
+        ((PENDULUM, section("rig:rig", noise="much")), "expected a finite number"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_file_with_a_mistake_is_refused_with_what_to_do(folder, parts, word):
+    written(folder, *parts)
+    done = run("run", "rig.toml")
+    assert done.exit_code == 2 and word in done.stderr, done.output
+
+
+def test_options_that_the_file_has_are_refused_beside_it(folder):
+    written(folder, PENDULUM, section("rig:rig"))
+    for option in (("--seed", "3"), ("--set", "lags=false"), ("--harsh",)):
+        done = run("run", "rig.toml", *option)
+        assert done.exit_code == 2 and f"expected {option[0]} in the campaign file" in done.stderr
+    assert run("run", "nowhere.toml").exit_code == 2
+
+
+def test_a_campaign_flown_by_hand_can_be_left_to_a_system(folder):
+    written(folder, PENDULUM, section("rig:rig", noise=0.01))
+    assert run("ask", "rig.db").exit_code == 0
+    done = run("resume", "rig.db")
+    assert done.exit_code == 2 and "--experiments N" in done.stderr
+    done = run("resume", "rig.db", "--experiments", "1")
+    assert done.exit_code == 0 and len(flights("rig.db")) == 1, done.output
