@@ -85,6 +85,50 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     assert json.loads(run("ask", "rig.db", "--again", "--json").stdout)["test"] == 2
 
 
+def test_a_batch_is_flown_in_any_order_and_what_is_abandoned_counts_nothing(folder):
+    assert "fly the first test" in run("ask", "rig.db", "--batch", "3").stderr
+    run("ask", "rig.db")
+    flown(look().tests[0])
+    run("tell", "rig.db", "0", "flight.csv")
+    asked = json.loads(run("ask", "rig.db", "--batch", "3", "--json").stdout)["tests"]
+    assert sorted(test["test"] for test in asked) == [1, 2, 3]
+    plans = {plan.test: plan for plan in look().history[-1].asked}
+    order = [(not plans[test["test"]].safe, -plans[test["test"]].bits) for test in asked]
+    assert order == sorted(order)
+    assert len({tuple(test["gains"].values()) for test in asked}) == 3
+    for test in asked:
+        assert Path(test["file"]).is_file()
+    # Asked again, nothing is new; a sheet for each.
+    text = run("ask", "rig.db", "--batch", "3").stdout
+    assert [line for line in text.splitlines() if line.startswith("TEST ")] == [
+        f"TEST {test['test']} of rig.db: 20 periods of 0.05 s" for test in asked
+    ]
+    assert len(look().tests) == 4
+    best, abandoned = asked[-1]["test"], asked[0]["test"]
+    run("abandon", "rig.db", str(abandoned))
+    flown(look().tests[best])
+    assert run("tell", "rig.db", str(best), "flight.csv").exit_code == 0
+    campaign = look()
+    assert [test.number for test in campaign.waiting] == [asked[1]["test"]]
+    assert len(campaign.experiments) == 2 and [r.number for r in campaign.experiments] == [0, best]
+    assert run("ask", "rig.db", "--batch", "2", "--last").exit_code == 2
+
+
+def test_what_is_learnt_from_a_batch_is_the_same_with_and_without_the_abandoned(folder):
+    plant = tl.systems.Simulated(SIGNALS, pendulum_step)
+    equations = []
+    for size in (1, 3):
+        campaign = read_file("rig.toml").campaign(threads=1)
+        first = campaign.test(read_file("rig.toml").first)
+        campaign.tell(first, plant.run(first))
+        tests = sorted(campaign.ask_batch(size), key=lambda test: test.number)
+        for test in tests[1:]:
+            campaign.abandon(test)
+        campaign.tell(tests[0], plant.run(tests[0]))
+        equations.append(campaign.twin.equations(17))
+    assert equations[0] == equations[1]
+
+
 def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder):
     run("ask", "rig.db")
     test = look().tests[0]

@@ -18,9 +18,10 @@ from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Examination
-from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Progress
+from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, Progress
 from twinloop.campaign.lasting import Lasting
 from twinloop.campaign.presets import AnyOptions
+from twinloop.campaign.ranking import ranked
 from twinloop.campaign.setup import checked, refuse_arguments
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, unknown
@@ -194,6 +195,29 @@ class Campaign(Lasting, kind="campaign"):
         self._learn()
         with self._interruptible(), self._entering():
             return self._method.ask(self._book, bool(last))
+
+    def ask_batch(self, size: int = 3) -> tuple[Test, ...]:
+        """Alternatives to be flown in any order, or not at all: all tests that wait, asked for until there are `size`.
+
+        Each is asked for as by `ask`, from what is known now. Tell each that was flown and abandon the others; nothing
+        is learnt from a test that was not flown. Calling it again, also after a crash, asks for what is missing only.
+
+        Args:
+            size: how many shall wait.
+
+        Returns:
+            The tests that wait, the one most worth flying first: those that keep the envelope before the others, then
+            by the bits that a flight would tell, or with the goal "control" by the predicted quality.
+
+        Raises:
+            NotAvailable: nothing was told yet.
+            InvalidInput: no whole number of at least 1.
+        """
+        wanted = whole("Campaign.ask_batch, size", size, least=1)
+        while len(self._book.waiting()) < wanted:
+            self.ask()
+        plans = {plan.test: plan for _, plan in self._book.asked if isinstance(plan, Planned)}
+        return ranked(self._book.waiting(), plans, self.setup.goal)
 
     def tell(self, test: Test, trajectory: Trajectory) -> None:
         """Adds a run to what is to be learnt. Tests may be told in any order; one told again is a replicate.

@@ -35,23 +35,58 @@ def new(file: Path) -> None:
 @click.argument("store", type=Path)
 @click.option("--last", is_flag=True, help="No other test will follow: fly the best gains that are known.")
 @click.option("--again", is_flag=True, help="Another test, though one is waiting.")
+@click.option(
+    "--batch", type=int, metavar="N", help="N alternatives, to be flown in any order; the best first."
+)
 @click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
 @click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
-def ask(store: Path, last: bool, again: bool, threads: int | None, as_json: bool) -> None:
+def ask(store: Path, last: bool, again: bool, batch: int | None, threads: int | None, as_json: bool) -> None:
     """Say what to fly next: a test sheet, and a file with the excitation and the predicted run.
 
     A campaign that is not in STORE.db yet is begun from STORE.toml beside it. A test that is waiting is shown again.
     """
+    if batch is not None:
+        _ask_batch(store, batch, last or again, threads, as_json)
+        return
     with closing(_campaign(store, threads)) as campaign:
         waiting = campaign.waiting
         if not campaign.experiments and not campaign.failures:
             test = next(iter(campaign.tests), None) or campaign.test(_first(store))
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
-        predicted = campaign.twin.simulate(test) if campaign.experiments else None
-        file = store.with_name(f"{store.stem}-test-{test.number}.csv")
-        write_columns(file, _columns(test, predicted))
-        click.echo(to_json(_facts(test, file)) if as_json else _sheet(store, test, predicted, file), nl=False)
+        sheet, facts = _shown(store, campaign, test)
+        click.echo(to_json(facts) if as_json else sheet, nl=False)
+
+
+def _ask_batch(store: Path, batch: int, other: bool, threads: int | None, as_json: bool) -> None:
+    """Alternatives: those that wait, and as many more as are missing."""
+    if other:
+        raise InvalidInput(
+            "twinloop ask: expected --batch alone, found --last or --again beside it; leave one out."
+        )
+    with closing(_campaign(store, threads)) as campaign:
+        if not campaign.experiments:
+            raise InvalidInput(
+                "twinloop ask --batch: expected a flight that was told, found none; fly the first test:"
+                f" twinloop ask {store}."
+            )
+        shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]
+        if as_json:
+            click.echo(to_json({"tests": [facts for _, facts in shown]}), nl=False)
+            return
+        click.echo(
+            f"{len(shown)} alternatives, the one most worth flying first. Fly them in any order, tell each; a test"
+            f" that will not be flown: twinloop abandon {store} TEST\n"
+        )
+        click.echo("\n".join(sheet for sheet, _ in shown), nl=False)
+
+
+def _shown(store: Path, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
+    """The sheet of a test, and the same as facts; its file is written."""
+    predicted = campaign.twin.simulate(test) if campaign.experiments else None
+    file = store.with_name(f"{store.stem}-test-{test.number}.csv")
+    write_columns(file, _columns(test, predicted))
+    return _sheet(store, test, predicted, file), _facts(test, file)
 
 
 @click.command()
