@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from twinloop.trajectory import Trajectory
 TIME = "t"
 """Name of the column of times, s."""
 DELIMITERS = ",;\t"
+MOST_BYTES = 200_000_000
+"""Of a log, unpacked: an hour of twenty signals at a kilohertz, as text."""
 
 
 def load(path: str | Path, signals: Signals, *, ended: str = "completed", reason: str = "") -> Trajectory:
@@ -39,6 +42,7 @@ def load(path: str | Path, signals: Signals, *, ended: str = "completed", reason
     """
     path = Path(path)
     try:
+        _check_size(path, path.stat().st_size)
         t, states, commands = _arrays(path) if path.suffix == ".npz" else _columns(path, signals)
     except OSError as reason_:
         raise InvalidInput(
@@ -69,8 +73,17 @@ def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
             )
 
 
+def _check_size(path: Path, size: int) -> None:
+    if size > MOST_BYTES:
+        raise InvalidInput(
+            f"Log {path}: expected at most {MOST_BYTES} bytes, found {size}; cut it to the flight, or thin it out."
+        )
+
+
 def _arrays(path: Path) -> tuple[Floats, Floats, Floats]:
     try:
+        with zipfile.ZipFile(path) as archive:
+            _check_size(path, sum(member.file_size for member in archive.infolist()))
         with np.load(path, allow_pickle=False) as arrays:
             missing = [name for name in (TIME, "states", "commands") if name not in arrays]
             if missing:
@@ -97,9 +110,13 @@ def _columns(path: Path, signals: Signals) -> tuple[Floats, Floats, Floats]:
         ) from reason
     head = text.partition("\n")[0]
     delimiter = max(DELIMITERS, key=head.count)
-    rows = [
-        row for row in csv.reader(text.splitlines(), delimiter=delimiter) if any(cell.strip() for cell in row)
-    ]
+    try:
+        lines = list(csv.reader(text.splitlines(), delimiter=delimiter))
+    except csv.Error as reason:
+        raise InvalidInput(
+            f"Log {path}: expected columns of numbers, found: {reason}; save it as CSV."
+        ) from reason
+    rows = [row for row in lines if any(cell.strip() for cell in row)]
     names = [name.strip() for name in rows[0]] if rows else []
     for name in (TIME, *signals.state_names, *signals.command_names):
         if name not in names:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, overload
@@ -321,6 +322,7 @@ def _typed(name: str, kind: str, value: object) -> object:
         kind == "float"
         and isinstance(value, (int, float, np.integer, np.floating))
         and not isinstance(value, bool)
+        and -sys.float_info.max <= value <= sys.float_info.max
     ):
         return float(value)
     if kind == "str" and isinstance(value, str):
@@ -329,6 +331,7 @@ def _typed(name: str, kind: str, value: object) -> object:
         kind.startswith("tuple[float")
         and isinstance(value, (tuple, list))
         and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
+        and all(-sys.float_info.max <= v <= sys.float_info.max for v in value)
     ):
         return tuple(float(v) for v in value)
     if (
