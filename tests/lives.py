@@ -62,6 +62,28 @@ def lived(campaign, life, look=lambda campaign, step: campaign):
     return campaign
 
 
+def learnt(step, experiments):
+    """A campaign on a pendulum that is read with noise."""
+    plant = tl.systems.Simulated(SIGNALS, step)
+    campaign = tl.Campaign(
+        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=2.0,
+        threads=1, options={"moves": 3000, "generations": 0, "lags": False, "candidates": 64, "draws": 4},
+    )  # fmt: skip
+    stream, test = np.random.default_rng(3), campaign.test(PENDULUM_GAINS)
+    for told in range(1, experiments + 1):
+        run = plant.run(test)
+        noisy = run.states + [1e-3, 5e-3] * stream.standard_normal(run.states.shape)
+        campaign.tell(test, tl.Trajectory(run.t, noisy, run.commands))
+        test = campaign.ask() if told < experiments else test
+    return campaign
+
+
+def with_end_stop(x, u):
+    """A pendulum that hits something hard at 0.8 rad."""
+    angle, rate = pendulum_step(x, u)
+    return (0.8, -0.4 * abs(rate)) if angle > 0.8 else (angle, rate)
+
+
 def outcome(campaign):
     """Everything that a campaign has asked and found, as one comparable value."""
     best, twin = campaign.best_test, campaign.twin

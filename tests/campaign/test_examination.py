@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import lives
 import twinloop as tl
-from conftest import PENDULUM_GAINS, pendulum_step
+from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
 
@@ -76,25 +76,9 @@ def test_runs_that_are_short_bear_fewer_lags():
     assert [lags_of(lengths) for lengths in ([400, 300], [90, 400], [7], [])] == [20, 11, 0, 0]
 
 
-def flown(step, experiments):
-    """A campaign on a pendulum that is read with noise."""
-    plant = tl.systems.Simulated(lives.SIGNALS, step)
-    campaign = tl.Campaign(
-        lives.SIGNALS, controller=lives.CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=2.0,
-        threads=1, options={"moves": 3000, "generations": 0, "lags": False, "candidates": 64, "draws": 4},
-    )  # fmt: skip
-    stream, test = np.random.default_rng(3), campaign.test(PENDULUM_GAINS)
-    for told in range(1, experiments + 1):
-        run = plant.run(test)
-        noisy = run.states + [1e-3, 5e-3] * stream.standard_normal(run.states.shape)
-        campaign.tell(test, tl.Trajectory(run.t, noisy, run.commands))
-        test = campaign.ask() if told < experiments else test
-    return campaign
-
-
 @pytest.fixture(scope="module")
 def good():
-    return flown(pendulum_step, 4)
+    return lives.learnt(pendulum_step, 4)
 
 
 def test_flights_that_were_not_learnt_are_those_after_what_was_known(good):
@@ -149,11 +133,7 @@ def test_a_twin_that_was_never_tried_on_a_flight_it_had_not_learnt_does_not_pass
 
 
 def test_a_twin_without_an_end_stop_that_the_system_has_does_not_pass():
-    def step(x, u):
-        angle, rate = pendulum_step(x, u)
-        return (0.8, -0.4 * abs(rate)) if angle > 0.8 else (angle, rate)
-
-    checks = flown(step, 3).checks()
+    checks = lives.learnt(lives.with_end_stop, 3).checks()
     assert not checks.twin_passed
     assert {check.subject for check in checks.failed} >= {"twin"}
 

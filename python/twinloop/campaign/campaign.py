@@ -17,16 +17,16 @@ from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
-from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.examination.examination import Earlier, Examination
+from twinloop.campaign.examination.loops import loops_around
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, Progress
 from twinloop.campaign.lasting import Lasting
 from twinloop.campaign.presets import AnyOptions
 from twinloop.campaign.ranking import ranked
 from twinloop.campaign.setup import checked, refuse_arguments
 from twinloop.controllers import Controller, Family, UnboundFamily
-from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.law.exports.export import asked, delivered, exported_controller
-from twinloop.law.law import Law
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.objectives import closed_loop
@@ -390,8 +390,9 @@ class Campaign(Lasting, kind="campaign"):
             NotAvailable: nothing was told.
         """
         self._learn()
-        book = self._book
-        return Examination(self, self._method.twins_before(book), self._method.innovations(book))
+        known, book = self._method, self._book
+        earlier = Earlier(known.twins_before(book), known.innovations(book), known.rivals())
+        return Examination(self, earlier)
 
     def checks(self) -> Checks:
         """Whether the twin may be believed and the controller flown, check by check; printable.
@@ -433,18 +434,9 @@ class Campaign(Lasting, kind="campaign"):
             InvalidInput: unknown gains, or another place to break a loop at.
             NotAvailable: nothing was told, or the twin or the controller cannot be linearised there.
         """
-        if broken_at not in ("axes", "commands"):
-            raise unknown("place to break a loop at", broken_at, ("axes", "commands"))
         genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
-        twin, described = self.twin, self.setup.controller
-        mixer = getattr(described, "output", None)
-        if mixer is None or broken_at == "commands":
-            names: Sequence[str] = self.signals.command_names
-        else:
-            axes = getattr(described, "axes", None)
-            names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
-        laws = [twin.law, *(Law.of(member, self.signals) for member in twin.members)]
-        return margins_of(laws, self.family, genes, self.setup.final_target, mixer, names, broken_at)
+        loops, names = loops_around(self.twin, self.setup, genes, broken_at)
+        return margins_of(loops, names, broken_at)
 
     def export_controller(
         self,
@@ -533,32 +525,33 @@ class Campaign(Lasting, kind="campaign"):
         lessons = [record for record in history if isinstance(record, Lesson)]
         return advice(twin, self.setup, lessons, controller_to_fly(self)[0]) if lessons else None
 
-    def plot(self, path: str | Path) -> None:
-        """Draws every state of every flight, flown and predicted, above the errors and qualities by experiment.
+    @property
+    def plot(self) -> Any:
+        """Figures by name, such as `campaign.plot.unseen()`; `campaign.plot(path)` draws all flights, .svg or .png."""
+        return _face("figures.plots").Plots(self)
+
+    def report(self, to: str | Path | None = None, name: str = "campaign") -> str:
+        """The whole result for a person, beginning with a verdict of three sentences; `print(campaign)` shows it.
 
         Args:
-            path: of the picture, .svg or .png.
+            to: a file that ends in ".html", for one page with figures that needs nothing else; None: as text.
+            name: of the campaign, for its title.
+
+        Returns:
+            The text, or the page that was written.
 
         Raises:
-            InvalidInput: another suffix, or a file that cannot be written.
-            NotAvailable: matplotlib is missing, or nothing was told.
+            InvalidInput: a file that cannot be written.
+            NotAvailable: nothing was told, or Jinja2 is missing.
         """
-        _face("files").check_picture(Path(path))
-        quality = self.setup.quality
-        words = _face("text").quality_words(quality.kind, _face("result").quality_unit(quality))
-        _face("plots").campaign_picture(self, Path(path), words)
-
-    def report(self, name: str = "campaign") -> str:
-        """The whole result for a person, beginning with a verdict of three lines; `print(campaign)` shows it.
-
-        Args:
-            name: of the system, for its title.
-
-        Raises:
-            NotAvailable: nothing was told.
-        """
-        text: str = _face("text").render(_face("result").summary(self, {"name": name}, {}))
-        return text
+        if to is None:
+            text: str = _face("text").render(_face("result").summary(self, {"name": name}, {}))
+            return text
+        files, path = _face("files"), Path(to)
+        files.check_writable(path, [".html"])
+        page: str = _face("report.page").report_page(self, name, {"name": name}, {})
+        files.write_text(path, page)
+        return page
 
     def __str__(self) -> str:
         return self.report() if self._book.experiments else repr(self)

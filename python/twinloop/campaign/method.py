@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Iteration, Lesson
 from twinloop.campaign.logbook import Logbook
 from twinloop.law.twin import Twin
@@ -92,6 +93,10 @@ class Method(Protocol):
             Over the standard deviation that is expected of them (n + 1, n_x); None where the method knows no noise, or
             the model diverges.
         """
+        ...
+
+    def rivals(self) -> tuple[Rival, ...]:
+        """Sums of terms that were considered for the twin, the chosen ones among them."""
         ...
 
     def history(self, book: Logbook) -> tuple[Iteration, ...] | tuple[Lesson, ...]:

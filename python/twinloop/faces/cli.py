@@ -22,6 +22,7 @@ from twinloop.faces.certifying import certify
 from twinloop.faces.console import Watch
 from twinloop.faces.exporting import export
 from twinloop.faces.from_file import run_file
+from twinloop.faces.report.command import compare, report
 from twinloop.faces.stored import resume, show
 from twinloop.faces.terminal import prepared
 from twinloop.faces.working import answers, check_answer, work
@@ -178,6 +179,8 @@ for command in (new, ask, tell, attach, abandon):
     main.add_command(command)
 main.add_command(resume)
 main.add_command(show)
+main.add_command(report)
+main.add_command(compare)
 main.add_command(export)
 main.add_command(certify)
 

@@ -13,6 +13,7 @@ from twinloop.campaign.coevolution.learning import Learner, Learning
 from twinloop.campaign.coevolution.search import chunks, committee, start_tests
 from twinloop.campaign.coevolution.written import WrittenMemory
 from twinloop.campaign.errors import errors
+from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Iteration, Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import Options
@@ -159,6 +160,10 @@ class Coevolution:
     def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
         """None: the paper knows no noise."""
         return None
+
+    def rivals(self) -> tuple[Rival, ...]:
+        """None: programs are no sums."""
+        return ()
 
     def history(self, book: Logbook) -> tuple[Iteration, ...]:
         """One record for each iteration, from 0."""

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign.examination.correlation import (
@@ -13,15 +17,67 @@ from twinloop.campaign.examination.correlation import (
     crosscorrelation,
     lags_of,
 )
+from twinloop.campaign.examination.data import DataQuality, data_quality
+from twinloop.campaign.examination.frequency import Responses, frequency_responses
+from twinloop.campaign.examination.learning import ErrorMap, error_map
+from twinloop.campaign.examination.loops import (
+    ClosedCurves,
+    LoopCurves,
+    closed_curves,
+    loop_curves,
+    loops_around,
+)
+from twinloop.campaign.examination.poles import Pole, poles
+from twinloop.campaign.examination.rivals import Rival
+from twinloop.campaign.examination.steps import StepAnswer, moved_states, step_answer
 from twinloop.campaign.examination.unseen import Unseen, unseen_flights
+from twinloop.campaign.examination.use import Effort, GainSlope, effort, gain_slopes, outside_of
 from twinloop.campaign.history import Experiment
+from twinloop.controllers import Mixer
 from twinloop.errors import NotAvailable
-from twinloop.law.linear.margins import Margins
+from twinloop.law.linear.margins import Loops, Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.test import Test
+from twinloop.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from twinloop.campaign.campaign import Campaign
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """What a campaign's method knows beside its public results.
+
+    Args:
+        twins: that were known earlier, with how many of the first experiments each had learnt.
+        innovations: of each experiment that was learnt (n + 1, n_x), whitened; None where there are none.
+        rivals: sums of terms that were considered, the chosen ones among them.
+    """
+
+    twins: Sequence[tuple[int, Twin]]
+    innovations: Sequence[Floats] | None
+    rivals: Sequence[Rival]
+
+
+@dataclass(frozen=True, eq=False)
+class Frequency:
+    """The twin around the target beside what the flights show, from one input of the loops to one state.
+
+    Args:
+        input: name of the axis or command.
+        state: that it moves most.
+        frequencies: of the twin's response (f,), rad/s.
+        twin: its gains, complex (models, f), the twin's first.
+        flown: what the flights show.
+        place: of the input and the state in that.
+    """
+
+    input: str
+    state: str
+    frequencies: Floats
+    twin: np.ndarray
+    flown: Responses | None
+    place: tuple[int, int]
 
 
 class Examination:
@@ -29,28 +85,25 @@ class Examination:
 
     Args:
         campaign: with at least one experiment told; it is not changed.
-        twins_before: earlier twins, with how many of the first experiments each had learnt.
-        innovations: of each experiment that was learnt (n + 1, n_x), whitened; None where there are none.
+        earlier: what its method knows beside that.
     """
 
-    def __init__(
-        self,
-        campaign: Campaign,
-        twins_before: tuple[tuple[int, Twin], ...],
-        innovations: tuple[Floats, ...] | None,
-    ) -> None:
+    def __init__(self, campaign: Campaign, earlier: Earlier) -> None:
         self.campaign = campaign
         self.setup, self.signals = campaign.setup, campaign.signals
         self.experiments: tuple[Experiment, ...] = campaign.experiments
         self.twin: Twin = campaign.twin
-        self.twins_before = twins_before
-        self.innovations = innovations
+        self.twins_before = earlier.twins
+        self.innovations = earlier.innovations
+        self.rivals = tuple(earlier.rivals)
         self.best: Test | None = None
         self.no_controller = ""
         try:
             self.best = campaign.best_test
         except NotAvailable as reason:
             self.no_controller = str(reason)
+
+    # The twin
 
     @cached_property
     def unseen(self) -> tuple[Unseen, ...]:
@@ -77,6 +130,42 @@ class Examination:
         commands = [run.trajectory.commands for run in self.experiments[: len(self.innovations)]]
         return crosscorrelation([found[1:] for found in self.innovations], commands, self._lags)
 
+    @cached_property
+    def errors(self) -> ErrorMap:
+        """Error of each twin on each flight, those that it had not learnt among them."""
+        return error_map(self.campaign.history, self.experiments, self.twins_before)
+
+    @cached_property
+    def open_poles(self) -> tuple[Pole, ...]:
+        """Of the twin at the target; none where it has no slope there."""
+        try:
+            return self._open_poles()
+        except NotAvailable:
+            return ()
+
+    def _open_poles(self) -> tuple[Pole, ...]:
+        if self.twin.model.form == "acceleration":
+            return poles(np.linalg.eigvals(self.twin.linearise(self.setup.final_target).A))
+        discrete = self.twin.linearise(self.setup.final_target, discrete=True)
+        return poles(np.linalg.eigvals(discrete.A), self.signals.dt)
+
+    @cached_property
+    def data(self) -> tuple[DataQuality, ...]:
+        """What each flight is worth as data."""
+        sensors = None if self.twin.noise is None else self.twin.noise.sensors
+        found = []
+        for place, run in enumerate(self.experiments):
+            own = (
+                None
+                if self.innovations is None or place >= len(self.innovations)
+                else self.innovations[place]
+            )
+            saturated = max((each.saturated for each in effort(run.trajectory, self.signals)), default=0.0)
+            found.append(data_quality(run, sensors, own, saturated))
+        return tuple(found)
+
+    # The controller
+
     @property
     def last_miss(self) -> float | None:
         """Predicted minus flown quality of the last flight that has both, in the spreads that were told."""
@@ -88,11 +177,148 @@ class Examination:
         return None
 
     @cached_property
-    def margins(self) -> Margins | None:
-        """Of the controller to fly, at the target; None where it or the twin has no slope there."""
+    def _loops(self) -> tuple[list[Loops], Sequence[str]] | None:
         if self.best is None:
             return None
         try:
-            return self.campaign.margins(self.best.genes)
+            return loops_around(self.twin, self.setup, self.best.genes, "axes")
         except NotAvailable:
             return None
+
+    @cached_property
+    def margins(self) -> Margins | None:
+        """Of the controller to fly, at the target; None where it or the twin has no slope there."""
+        return None if self._loops is None else margins_of(*self._loops, "axes")
+
+    @cached_property
+    def loops(self) -> tuple[LoopCurves, ...]:
+        """Each loop over frequency; none where there are no margins."""
+        return () if self._loops is None else loop_curves(*self._loops)
+
+    @cached_property
+    def closed(self) -> ClosedCurves | None:
+        """What sensors' noise does to commands and disturbances to states; None where there are no margins."""
+        return None if self._loops is None else closed_curves(self._loops[0][0], self.setup, self.twin.noise)
+
+    @cached_property
+    def closed_poles(self) -> tuple[Pole, ...]:
+        """Of the loops of the twin, closed."""
+        return () if self._loops is None else poles(self._loops[0][0].closed_poles(), self.signals.dt)
+
+    @cached_property
+    def responses(self) -> tuple[Frequency, ...]:
+        """For each axis, or command, the state that it moves most: the twin at the target, and the flights."""
+        if self._loops is None:
+            return ()
+        loops, names = self._loops
+        dt = self.signals.dt
+        frequencies = np.geomspace(2e-3 * np.pi / dt, np.pi / dt * (1.0 - 1e-9), 200)
+        found = [loop.plant.response(frequencies)[:, : self.signals.n_x] @ loop.of_axes for loop in loops]
+        inputs = [self._of_axes(run.trajectory.commands) for run in self.experiments]
+        outputs = [run.trajectory.states[:-1] for run in self.experiments]
+        flown = frequency_responses(
+            inputs, outputs, dt, None if self.twin.noise is None else self.twin.noise.sensors
+        )
+        scales = np.array([state.scale for state in self.signals.states])
+        size = (np.abs(found[0][len(frequencies) // 2 :]) / scales[:, np.newaxis]).mean(axis=0)
+        chosen = []
+        for place, name in enumerate(names):
+            state = int(np.argmax(size[:, place]))
+            gains = np.stack([each[:, state, place] for each in found])
+            state_name = self.signals.state_names[state]
+            chosen.append(Frequency(name, state_name, frequencies, gains, flown, (place, state)))
+        return tuple(chosen)
+
+    def _of_axes(self, commands: Floats) -> Floats:
+        """What the axes have asked for, from the commands that were sent; the commands where there are no axes."""
+        mixer = getattr(self.setup.controller, "output", None)
+        if not isinstance(mixer, Mixer) or mixer.offset is None:
+            return commands
+        linear = np.sign(commands) * np.abs(commands) ** (1.0 / mixer.power) - mixer.offset
+        return np.asarray(linear @ np.linalg.pinv(mixer.matrix).T)
+
+    @cached_property
+    def planned(self) -> Trajectory | None:
+        """The flight of the controller to fly on the twin, without excitation, with its band."""
+        return None if self.best is None else self.twin.simulate(self.best.quiet())
+
+    @cached_property
+    def best_flown(self) -> Experiment | None:
+        """The last flight of the controller to fly without excitation; None: there was none."""
+        return self._flown_by(self.best)
+
+    @cached_property
+    def first_flown(self) -> Experiment | None:
+        """The first flight that was asked for: the old gains, perhaps with an excitation."""
+        return next((run for run in self.experiments if run.test is not None), None)
+
+    @cached_property
+    def old(self) -> Trajectory | None:
+        """What the twin makes of the old gains on the campaign's own task, without excitation."""
+        if self.first_flown is None or self.first_flown.test is None or self.best is None:
+            return None
+        return self.twin.simulate(replace(self.best.quiet(), genes=self.first_flown.test.genes))
+
+    def _flown_by(self, test: Test | None) -> Experiment | None:
+        if test is None:
+            return None
+        for run in reversed(self.experiments):
+            flown = run.test
+            if (
+                flown is not None
+                and flown.excitation is None
+                and flown.genes.tobytes() == test.genes.tobytes()
+            ):
+                return run
+        return None
+
+    @cached_property
+    def moved(self) -> tuple[int, ...]:
+        """States whose target is elsewhere than their start; all where none is."""
+        scales = [state.scale for state in self.signals.states]
+        found = moved_states(self.setup.initial_state, self.setup.final_target, scales)
+        return tuple(found) or tuple(range(self.signals.n_x))
+
+    def step(self, trajectory: Trajectory) -> tuple[StepAnswer, ...]:
+        """How a flight of the campaign's task answers, each state whose target is elsewhere than its start.
+
+        Args:
+            trajectory: flown or predicted.
+        """
+        start, target = self.setup.initial_state, self.setup.final_target
+        if self.setup.target_state.ndim > 1:
+            return ()
+        scales = [state.scale for state in self.signals.states]
+        return tuple(
+            step_answer(
+                self.signals.state_names[i],
+                trajectory.t,
+                trajectory.states[:, i],
+                float(start[i]),
+                float(target[i]),
+            )
+            for i in moved_states(start, target, scales)
+        )
+
+    def effort(self, trajectory: Trajectory) -> tuple[Effort, ...]:
+        """What a flight asks of each command.
+
+        Args:
+            trajectory: flown or predicted.
+        """
+        return effort(trajectory, self.signals)
+
+    @cached_property
+    def slopes(self) -> tuple[GainSlope, ...]:
+        """The quality against each gain, the others held; none where there is no controller."""
+        return () if self.best is None else gain_slopes(self.twin, self.setup, self.best)
+
+    @cached_property
+    def beyond(self) -> float | None:
+        """Share of the planned flight that lies beyond all states and commands that were flown."""
+        if self.planned is None or self.planned.steps == 0:
+            return None
+        flown = np.concatenate(
+            [np.hstack([r.trajectory.states[:-1], r.trajectory.commands]) for r in self.experiments]
+        )
+        return outside_of(flown, np.hstack([self.planned.states[:-1], self.planned.commands]))

@@ -10,6 +10,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.errors import errors, free_runs
+from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.calibration import (
     OF_PARTS,
@@ -32,6 +33,7 @@ from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
+from twinloop.identification.remarks import symbols_of
 from twinloop.identification.sensors.offsets import moved
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
@@ -336,6 +338,21 @@ class IdentifyAndPlan:
                 workers=self.workers,
             )
         return None if found is None else tuple(errors for errors, _ in found)
+
+    def rivals(self) -> tuple[Rival, ...]:
+        """Subsets of terms that annealing has found nearly as good."""
+        known, signals = self._latest().identified, self.setup.signals
+        symbols = symbols_of(signals)
+        return tuple(
+            Rival(
+                signals.state_names[found.chain.states[0]],
+                tuple(sorted(known.pool.text(node, symbols) for node in subset)),
+                above,
+            )
+            for found in known.sums
+            for subset, above in ((tuple(found.weights), 0.0), *found.others)
+            if above > 0.0 or subset == tuple(found.weights)
+        )
 
     def history(self, book: Logbook) -> tuple[Lesson, ...]:
         """One record for each identification."""

@@ -64,8 +64,8 @@ class Loops:
         assert plant.dt is not None
         self.plant, self.controller, self.dt = plant, controller, plant.dt
         n_x = controller.D.shape[1]
-        self._of_axes = np.eye(len(controller.D)) if outputs is None else outputs
-        self._to_axes = np.linalg.pinv(self._of_axes)
+        self.of_axes = np.eye(len(controller.D)) if outputs is None else outputs
+        self._to_axes = np.linalg.pinv(self.of_axes)
         self._seen = n_x
 
     def closed_poles(self) -> np.ndarray:
@@ -91,12 +91,29 @@ class Loops:
             Complex gains (f,); 1 + L is what decides on stability.
         """
         through = self.controller.response(frequencies) @ self.plant.response(frequencies)[:, : self._seen]
-        around = self._to_axes @ through @ self._of_axes
+        around = self._to_axes @ through @ self.of_axes
         size = around.shape[1]
         closed = np.eye(size)
         closed[loop, loop] = 0.0
         answer = np.linalg.solve(np.eye(size) - around @ closed, around[:, :, loop : loop + 1])
         return -np.asarray(answer[:, loop, 0])
+
+    def closed(self, frequencies: Floats) -> tuple[np.ndarray, np.ndarray]:
+        """What acts on the closed loops, all of them closed.
+
+        Args:
+            frequencies: (f,), rad/s.
+
+        Returns:
+            From noise on the states to the commands (f, n_u, n_x), C S; from what is added to the commands to the
+            states (f, n_x, n_u), P S.
+        """
+        law = self.controller.response(frequencies)
+        plant = self.plant.response(frequencies)[:, : self._seen]
+        size = law.shape[1]
+        to_commands = np.linalg.solve(np.eye(size) - law @ plant, law)
+        to_states = plant @ np.linalg.inv(np.eye(size) - law @ plant)
+        return to_commands, to_states
 
     def margins(self, loop: int, name: str) -> LoopMargins:
         """Margins of one loop."""
@@ -172,16 +189,10 @@ class Margins:
         return "\n".join(lines)
 
 
-def margins_of(
-    laws: Sequence[Law],
-    family: Family,
-    genes: Floats,
-    target: Floats,
-    mixer: Mixer | None,
-    names: Sequence[str],
-    broken_at: str,
-) -> Margins:
-    """Margins of all loops, at the target and under the command that holds it.
+def closed_loops(
+    laws: Sequence[Law], family: Family, genes: Floats, target: Floats, mixer: Mixer | None, broken_at: str
+) -> list[Loops]:
+    """The loops of a controller around each of several laws, at the target and under the command that holds it.
 
     Args:
         laws: the twin's, then those of the committee.
@@ -189,27 +200,37 @@ def margins_of(
         genes: its gains (size,).
         target: state that it leads to (n_x,).
         mixer: from axes to commands; None: axis i is command i.
-        names: of the loops.
         broken_at: "axes" or "commands".
 
     Returns:
-        Nominal and worst margins of each loop.
+        As many as laws.
 
     Raises:
         NotAvailable: a law or the controller has no derivatives there.
     """
     controller = linear_controller(family, genes, target)
     outputs = None if mixer is None or broken_at == "commands" else _slopes(mixer, controller.rest)
-    rows = []
-    for law in laws:
-        plant = linearised(law, target, trimmed(law, target, controller.rest), discrete=True)
-        closed = Loops(plant, controller, outputs)
-        rows.append([closed.margins(loop, name) for loop, name in enumerate(names)])
+    plants = (linearised(law, target, trimmed(law, target, controller.rest), discrete=True) for law in laws)
+    return [Loops(plant, controller, outputs) for plant in plants]
+
+
+def margins_of(loops: Sequence[Loops], names: Sequence[str], broken_at: str) -> Margins:
+    """Margins of all loops.
+
+    Args:
+        loops: of the twin, then of the members of its committee.
+        names: of the places where they are broken.
+        broken_at: "axes" or "commands".
+
+    Returns:
+        Nominal and worst margins of each loop.
+    """
+    rows = [[closed.margins(loop, name) for loop, name in enumerate(names)] for closed in loops]
     return Margins(
         broken_at,
         tuple(rows[0]),
         tuple(worst(each) for each in zip(*rows, strict=True)),
-        max(1, len(laws) - 1),
+        max(1, len(loops) - 1),
     )
 
 

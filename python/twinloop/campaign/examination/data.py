@@ -1,0 +1,89 @@
+"""What each flight is worth as data: how much it moved beside the sensors' noise, what was odd, and its fingerprint."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment
+from twinloop.trajectory import continued
+
+LARGE = 3.0
+"""Standard deviations from which an innovation is looked at."""
+
+
+@dataclass(frozen=True)
+class DataQuality:
+    """Of one experiment.
+
+    Args:
+        number: of the test; None for a run that nobody asked for.
+        seconds: that it lasted.
+        ended: "completed", "aborted" or "diverged".
+        moved: the least that a state moved, root mean square about its mean, over its sensor's noise; None where no
+            noise is known.
+        least: name of that state.
+        saturated: share of the periods in which a command was at a bound, the most of all commands.
+        large: share of innovations beyond three standard deviations; None where there are none. 0.3 % are expected.
+        usage: the most that its readings used of the envelope; 0 without one.
+        fingerprint: the first 16 hexadecimal digits of the SHA-256 of times, states and commands, as little-endian
+            doubles in this order.
+    """
+
+    number: int | None
+    seconds: float
+    ended: str
+    moved: float | None
+    least: str
+    saturated: float
+    large: float | None
+    usage: float
+    fingerprint: str
+
+
+def data_quality(
+    run: Experiment, sensors: Floats | None, innovations: Floats | None, saturated: float
+) -> DataQuality:
+    """Of one experiment.
+
+    Args:
+        run: that was told.
+        sensors: standard deviation of each state's readings (n_x,); None where unknown.
+        innovations: of it (n + 1, n_x), the first row aside; None where there are none.
+        saturated: share of the periods with a command at a bound.
+    """
+    flown, signals = run.trajectory, run.replayed.family.signals
+    states = continued(flown, signals, flown.states[0]).states
+    moved, least = None, ""
+    if sensors is not None and (sensors > 0.0).any():
+        shares = states.std(axis=0) / np.where(sensors > 0.0, sensors, np.inf)
+        shares[sensors <= 0.0] = np.inf
+        place = int(np.argmin(shares))
+        moved, least = float(shares[place]), signals.state_names[place]
+    large = None if innovations is None else float((np.abs(innovations[1:]) > LARGE).mean())
+    return DataQuality(
+        run.number,
+        float(flown.t[-1] - flown.t[0]),
+        flown.ended,
+        moved,
+        least,
+        saturated,
+        large,
+        run.usage,
+        fingerprint(run),
+    )
+
+
+def fingerprint(run: Experiment) -> str:
+    """The first 16 hexadecimal digits of the SHA-256 of an experiment's data.
+
+    Args:
+        run: that was told.
+    """
+    digest = hashlib.sha256()
+    for values in (run.trajectory.t, run.trajectory.states, run.trajectory.commands):
+        digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,73 @@
+"""How the error of the twin fell on each flight from one identification to the next (the paper's Figure 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment, Iteration, Lesson
+from twinloop.law.flight import fly
+from twinloop.law.twin import Twin
+from twinloop.objectives import normalised_error
+
+MOST = 24
+"""Identifications that are shown at most: the last ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorMap:
+    """Error of each twin on each flight, over that of a model that never moves.
+
+    Args:
+        iterations: number of each identification, the columns.
+        tests: number of each flight, the rows; None for a run that nobody asked for.
+        values: (tests, iterations); NaN where it is not known, infinite where the twin diverged.
+        learnt: whether the twin had learnt the flight (tests, iterations).
+    """
+
+    iterations: tuple[int, ...]
+    tests: tuple[int | None, ...]
+    values: Floats
+    learnt: np.ndarray
+
+
+def error_map(
+    history: Sequence[Iteration | Lesson],
+    experiments: Sequence[Experiment],
+    twins: Sequence[tuple[int, Twin]],
+) -> ErrorMap:
+    """The map of a campaign.
+
+    Args:
+        history: of it.
+        experiments: in the order told.
+        twins: earlier ones, with how many of the first experiments each had learnt.
+    """
+    shown: Sequence[Iteration | Lesson] = history[-MOST:]
+    values = np.full((len(experiments), len(shown)), np.nan)
+    learnt = np.zeros(values.shape, dtype=bool)
+    known = dict(twins)
+    for column, record in enumerate(shown):
+        told = len(record.tests)
+        values[:told, column] = record.normalised[: len(experiments)]
+        learnt[:told, column] = True
+        if told in known:
+            for row in range(told, len(experiments)):
+                values[row, column] = _error(known[told], experiments[row])
+    return ErrorMap(
+        tuple(record.iteration for record in shown), tuple(run.number for run in experiments), values, learnt
+    )
+
+
+def _error(twin: Twin, run: Experiment) -> float:
+    """Normalised error of a free run over all states, as the campaign counts it."""
+    test = run.replayed
+    free = fly(twin.model, test, divergence_factor=twin.divergence_factor).states
+    read = twin.signals.continued(run.trajectory.states, test.initial_state)
+    if len(free) < len(read):
+        return float("inf")
+    squares = np.square(twin.signals.difference(read[1:], free[1 : len(read)])).mean()
+    return normalised_error(float(squares), run.frozen)

@@ -1,0 +1,153 @@
+"""Loops that a controller closes around a twin and its committee: what an engineer draws of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.setup import Setup
+from twinloop.errors import unknown
+from twinloop.law.law import Law
+from twinloop.law.linear.margins import Loops, closed_loops
+from twinloop.law.noise import Noise
+from twinloop.law.twin import Twin
+
+FREQUENCIES = 160
+"""At which loops are drawn, in equal ratios."""
+SLOWEST = 1e-3
+"""Lowest of them, as a share of half the frequency of the periods."""
+
+
+def loops_around(
+    twin: Twin, setup: Setup, genes: Floats, broken_at: str
+) -> tuple[list[Loops], Sequence[str]]:
+    """The loops of a controller around a twin and the members of its committee, at the target of a campaign.
+
+    Args:
+        twin: with its committee.
+        setup: of the campaign.
+        genes: gains of the controller (size,).
+        broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+
+    Returns:
+        The loops of the twin, then of each member; and a name for each place where they are broken.
+
+    Raises:
+        InvalidInput: another place.
+        NotAvailable: the twin or the controller has no derivatives there.
+    """
+    if broken_at not in ("axes", "commands"):
+        raise unknown("place to break a loop at", broken_at, ("axes", "commands"))
+    signals, described = setup.signals, setup.controller
+    mixer = getattr(described, "output", None)
+    if mixer is None or broken_at == "commands":
+        names: Sequence[str] = signals.command_names
+    else:
+        axes = getattr(described, "axes", None)
+        names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
+    laws = [twin.law, *(Law.of(member, signals) for member in twin.members)]
+    return closed_loops(laws, setup.family, genes, setup.final_target, mixer, broken_at), names
+
+
+@dataclass(frozen=True, eq=False)
+class LoopCurves:
+    """One loop over frequency, of the twin and of the members of its committee.
+
+    Args:
+        loop: its name.
+        frequencies: (f,), rad/s.
+        open: L (models, f), the twin's first.
+    """
+
+    loop: str
+    frequencies: Floats
+    open: np.ndarray
+
+    @property
+    def sensitivity(self) -> Floats:
+        """|S| = |1 / (1 + L)| (models, f)."""
+        return np.asarray(1.0 / np.abs(1.0 + self.open))
+
+    @property
+    def complementary(self) -> Floats:
+        """|T| = |L / (1 + L)| (models, f)."""
+        return np.asarray(np.abs(self.open / (1.0 + self.open)))
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedCurves:
+    """What acts on all loops, closed, over frequency; of the twin.
+
+    Args:
+        frequencies: (f,), rad/s.
+        to_commands: |C S|, from noise on each state, in units of its scale, to each command, in units of its half range
+            (n_u, n_x, f).
+        to_states: |P S|, from what is added to each command to each state, in the same units (n_x, n_u, f).
+        noise_of_commands: standard deviation that the sensors' noise causes in each command (n_u,), in its unit.
+    """
+
+    frequencies: Floats
+    to_commands: Floats
+    to_states: Floats
+    noise_of_commands: Floats
+
+
+def loop_curves(loops: Sequence[Loops], names: Sequence[str]) -> tuple[LoopCurves, ...]:
+    """Each loop over frequency.
+
+    Args:
+        loops: of the twin, then of the members.
+        names: of the places where they are broken.
+    """
+    frequencies = _frequencies(loops[0].dt)
+    return tuple(
+        LoopCurves(name, frequencies, np.stack([closed.response(i, frequencies) for closed in loops]))
+        for i, name in enumerate(names)
+    )
+
+
+def closed_curves(closed: Loops, setup: Setup, noise: Noise | None) -> ClosedCurves:
+    """What sensors' noise does to the commands, and what disturbs the commands to the states.
+
+    Args:
+        closed: the loops of the twin.
+        setup: of the campaign.
+        noise: of the twin's sensors.
+    """
+    scales = np.array([state.scale for state in setup.signals.states])
+    halves = np.array([0.5 * (high - low) for low, high in (c.bounds for c in setup.signals.commands)])
+    frequencies = _frequencies(closed.dt)
+    to_commands, to_states = (np.abs(found) for found in closed.closed(frequencies))
+    return ClosedCurves(
+        frequencies,
+        np.moveaxis(to_commands * scales / halves[:, np.newaxis], 0, -1),
+        np.moveaxis(to_states * halves / scales[:, np.newaxis], 0, -1),
+        noise_of_commands(closed, np.zeros(len(scales)) if noise is None else noise.sensors),
+    )
+
+
+def noise_of_commands(closed: Loops, sensors: Floats, count: int = 2048) -> Floats:
+    """Standard deviation that white noise of the sensors causes in each command, while no bound is met.
+
+    Args:
+        closed: the loops of a twin.
+        sensors: standard deviation of each state's readings (n_x,), in its unit.
+        count: frequencies over which the spectrum is summed (Parseval).
+
+    Returns:
+        One a command (n_u,), in its unit; infinite where the loops are not stable.
+    """
+    if not (np.abs(closed.closed_poles()) < 1.0).all():
+        return np.full(len(closed.controller.D), np.inf)
+    # Middles of even parts of the upper half of the circle.
+    frequencies = (np.arange(count) + 0.5) * np.pi / count / closed.dt
+    gains = np.abs(closed.closed(frequencies)[0]) * sensors
+    return np.asarray(np.sqrt(np.square(gains).sum(axis=2).mean(axis=0)))
+
+
+def _frequencies(dt: float) -> Floats:
+    half = np.pi / dt
+    return np.geomspace(SLOWEST * half, half * (1.0 - 1e-9), FREQUENCIES)

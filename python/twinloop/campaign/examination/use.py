@@ -1,0 +1,144 @@
+"""What a controller asks of the actuators and of the envelope, and how its quality hangs on each gain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.setup import Setup
+from twinloop.controllers import Gain
+from twinloop.law.flight import fly
+from twinloop.law.twin import Twin
+from twinloop.signals import Signals
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+AT_A_BOUND = 1e-6
+"""Share of a range within which a value counts as at its end."""
+SHARES = (0.8, 0.9, 1.0, 1.1, 1.2)
+"""Factors on one gain at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effort:
+    """What one flight asks of one command.
+
+    Args:
+        command: its name.
+        used: root mean square of the command about the middle of its bounds, as a share of half their distance.
+        saturated: share of the periods at a bound.
+        moved: root mean square of its change from period to period, in the same share.
+    """
+
+    command: str
+    used: float
+    saturated: float
+    moved: float
+
+
+def effort(trajectory: Trajectory, signals: Signals) -> tuple[Effort, ...]:
+    """What a flight asks of each command.
+
+    Args:
+        trajectory: with at least one command.
+        signals: of the system.
+    """
+    found = []
+    for command, sent in zip(signals.commands, trajectory.commands.T, strict=True):
+        low, high = command.bounds
+        half = 0.5 * (high - low)
+        place = (sent - 0.5 * (low + high)) / half
+        changes = np.diff(place)
+        found.append(
+            Effort(
+                command.name,
+                float(np.sqrt(np.square(place).mean())),
+                float((np.abs(place) >= 1.0 - AT_A_BOUND).mean()),
+                float(np.sqrt(np.square(changes).mean())) if len(changes) else 0.0,
+            )
+        )
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class GainSlope:
+    """How the quality hangs on one gain.
+
+    Args:
+        gain: its name.
+        value: that it has, in its unit.
+        factors: on it.
+        qualities: on the twin, without noise, for each factor; infinite where the flight diverges; None where the
+            bounds do not allow it.
+        at_bound: "", "low" or "high", where it stands at an end of its box.
+    """
+
+    gain: str
+    value: float
+    factors: tuple[float, ...]
+    qualities: tuple[float | None, ...]
+    at_bound: str
+
+
+def gain_slopes(twin: Twin, setup: Setup, best: Test) -> tuple[GainSlope, ...]:
+    """The quality against each gain, the others held.
+
+    Args:
+        twin: that flies.
+        setup: of the campaign.
+        best: test of the controller.
+    """
+    found = []
+    for i, gain in enumerate(setup.family.gains):
+        value = float(best.genes[i])
+        qualities: list[float | None] = []
+        for share in SHARES:
+            tried = share * value
+            if not gain.low <= tried <= gain.high:
+                qualities.append(None)
+                continue
+            genes = best.genes.copy()
+            genes[i] = tried
+            qualities.append(_quality(twin, setup, replace(best.quiet(), genes=genes)))
+        found.append(GainSlope(gain.name, value, SHARES, tuple(qualities), _bound(gain, value)))
+    return tuple(found)
+
+
+def _quality(twin: Twin, setup: Setup, test: Test) -> float:
+    run = fly(twin.model, test, divergence_factor=twin.divergence_factor)
+    return setup.quality.flown(run, test.target_state) if run.steps == test.steps else float("inf")
+
+
+def _bound(gain: Gain, value: float) -> str:
+    room = AT_A_BOUND * (gain.high - gain.low)
+    return "low" if value <= gain.low + room else "high" if value >= gain.high - room else ""
+
+
+def envelope_use(states: Floats, signals: Signals) -> tuple[tuple[str, float], ...]:
+    """The most that each state with an envelope uses of it: 1 at a bound.
+
+    Args:
+        states: (n, n_x).
+        signals: of the system.
+    """
+    found = []
+    for state, values in zip(signals.states, states.T, strict=True):
+        if state.envelope is not None:
+            low, high = state.envelope
+            most = float(np.abs(values - 0.5 * (low + high)).max() / (0.5 * (high - low)))
+            found.append((state.name, most))
+    return tuple(found)
+
+
+def outside_of(flown: Floats, planned: Floats) -> float:
+    """Share of planned rows that lie beyond the smallest box around what was flown, in any column.
+
+    Args:
+        flown: rows (n, c).
+        planned: rows (m, c).
+    """
+    low, high = flown.min(axis=0), flown.max(axis=0)
+    room = 1e-9 * (high - low)
+    return float(((planned < low - room) | (planned > high + room)).any(axis=1).mean())

@@ -1,0 +1,155 @@
+"""Flights beside the twin: those that it had not learnt, and all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.examination.examination import Examination
+from twinloop.faces.figures.figure import Band, Figure, Level, Line, Mark, Panel
+from twinloop.faces.figures.units import labelled, said, shown_unit, words
+from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory, continued
+
+MOST = 6
+"""Flights of one figure: the last ones."""
+
+
+def unseen(found: Examination) -> Figure | None:
+    """The last flight that had not been learnt beside what had been predicted of it."""
+    if not found.unseen:
+        return None
+    last = found.unseen[-1]
+    flown = continued(last.flown, found.signals, last.flown.states[0])
+    panels = []
+    for i, state in enumerate(found.signals.states):
+        fit = last.fit[i]
+        factor, unit = shown_unit(state.unit)
+        error = f"RMSE {factor * last.rmse[i]:.3g} {unit}" if np.isfinite(last.rmse[i]) else "it diverged"
+        title = f"{words(state.name)}: {error}" + (f", FIT {fit:.1f} %" if np.isfinite(fit) else "")
+        panels.append(_state_panel(found.signals, i, flown, last.predicted, title))
+    band = (
+        ""
+        if last.inside is None
+        else f" {100.0 * last.inside:.0f} % of the readings are inside the 90 % band."
+    )
+    return Figure(
+        "unseen",
+        f"The twin against {said(last.number)}, which it had not learnt",
+        panels,
+        f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under the"
+        f" test's own controller; no reading after the first was used.{band}",
+    )
+
+
+def flights(found: Examination) -> Figure:
+    """All flights, the last ones where there are many, beside free runs of the twin of today."""
+    panels, twin = [], found.twin
+    shown = list(found.experiments)[-MOST:]
+    runs = [
+        (
+            run,
+            continued(run.trajectory, found.signals, run.trajectory.states[0]),
+            twin.simulate(twin.as_flown(run.replayed, run.trajectory)),
+        )
+        for run in shown
+    ]
+    for i, state in enumerate(found.signals.states):
+        for run, flown, predicted in runs:
+            title = f"{said(run.number)}: {words(state.name)}"
+            target = None if run.test is None else run.test.target_state
+            panels.append(_state_panel(found.signals, i, flown, predicted, title, target))
+    return Figure(
+        "flights",
+        "All flights beside the twin" if len(shown) == len(found.experiments) else f"The last {MOST} flights",
+        panels,
+        "Free runs of the twin of today, which has learnt these flights: they show what is left, not what it can"
+        " foretell.",
+        columns=len(shown),
+    )
+
+
+def step(found: Examination) -> Figure | None:
+    """The task on the twin under the controller to fly, with its band; as it was flown, and under the old gains."""
+    if found.planned is None:
+        return None
+    panels = []
+    for i in found.moved:
+        panel = _state_panel(
+            found.signals,
+            i,
+            None if found.best_flown is None else found.best_flown.trajectory,
+            found.planned,
+            words(found.signals.states[i].name),
+            found.setup.target_state,
+        )
+        old = (
+            []
+            if found.old is None
+            else [_line(found.signals, i, found.old, "old", "first gains, on the twin")]
+        )
+        panels.append(Panel(panel.title, (*old, *panel.marks), panel.x_label, panel.y_label))
+    flown = "flown and " if found.best_flown is not None else "not flown yet, "
+    return Figure(
+        "step",
+        f"The task under the controller to fly: {flown}predicted",
+        panels,
+        "Without excitation, from the campaign's start to its target. The band holds nine of ten readings, by the"
+        " committee and the sensors' noise.",
+    )
+
+
+def _state_panel(
+    signals: Signals,
+    i: int,
+    flown: Trajectory | None,
+    predicted: Trajectory | None,
+    title: str,
+    target: Floats | None = None,
+) -> Panel:
+    state = signals.states[i]
+    factor, label = labelled(state.name, state.unit)
+    marks: list[Mark] = []
+    if target is not None:
+        marks.append(_target(signals, i, target, factor))
+    if predicted is not None and predicted.band is not None:
+        low, high = factor * predicted.band[:, :, i]
+        marks.append(Band(predicted.t, low, high, "twin", "90 % band"))
+    if flown is not None:
+        marks.append(Line(flown.t - flown.t[0], factor * flown.states[:, i], "measured", "flown"))
+    if predicted is not None:
+        marks.append(_line(signals, i, predicted, "twin", "twin"))
+    ends = None if flown is None else _ends(marks, factor * flown.states[:, i])
+    return Panel(title, marks, "time (s)", label, y_range=ends)
+
+
+def _line(signals: Signals, i: int, run: Trajectory, role: str, name: str) -> Line:
+    factor, _ = shown_unit(signals.states[i].unit)
+    return Line(run.t - run.t[0], factor * run.states[:, i], role, name)
+
+
+def _target(signals: Signals, i: int, target: Floats, factor: float) -> Mark:
+    if target.ndim == 1:
+        return Level(factor * float(target[i]), "target", "target")
+    return Line(signals.dt * np.arange(len(target)), factor * target[:, i], "target", "target")
+
+
+def _ends(marks: Sequence[Mark], flown: Floats) -> tuple[float, float] | None:
+    """Limits that show the flight; a twin that runs away must not flatten it."""
+    low, high = float(flown.min()), float(flown.max())
+    room = max(high - low, 1e-9)
+    least, most = low - room, high + room
+    for mark in marks:
+        values = (mark.at,) if isinstance(mark, Level) else ()
+        least, most = min((least, *values)), max((most, *values))
+    wanted = [
+        np.asarray(getattr(mark, key)) for mark in marks for key in ("y", "low", "high") if hasattr(mark, key)
+    ]
+    every = np.concatenate([flown, *wanted])
+    every = np.clip(every[np.isfinite(every)], least, most)
+    levels = [mark.at for mark in marks if isinstance(mark, Level)]
+    low, high = min(float(every.min()), *levels, low), max(float(every.max()), *levels, high)
+    margin = 0.06 * max(high - low, 1e-9)
+    return low - margin, high + margin

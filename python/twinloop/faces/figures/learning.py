@@ -1,0 +1,160 @@
+"""How the campaign learnt: errors before and after, qualities foretold and met, equations that were considered."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from twinloop.campaign.examination.examination import Examination
+from twinloop.faces.figures.figure import Cells, Figure, Level, Line, Mark, Panel, Spans
+from twinloop.faces.figures.units import said, words
+
+LIGHTEST, DARKEST = -5.0, 0.0
+"""Decades of the normalised error from which a cell is lightest, and at which it is darkest."""
+
+
+def errors(found: Examination) -> Figure:
+    """Error of each twin on each flight; framed: before the flight was learnt (Figure 6 of the paper as a map)."""
+    known = found.errors
+    with np.errstate(divide="ignore", invalid="ignore"):
+        decades = np.log10(known.values)
+    shades = np.clip((decades - LIGHTEST) / (DARKEST - LIGHTEST), 0.0, 1.0)
+    shades[np.isinf(known.values)] = 1.0
+    texts = [[_said(value) for value in row] for row in known.values]
+    marked = [(i, j) for i, j in np.ndindex(known.values.shape) if texts[i][j] and not known.learnt[i, j]]
+    return Figure(
+        "errors",
+        "Error of the twin on each flight, experiment by experiment",
+        [
+            Panel(
+                "Error over that of a model that never moves",
+                [
+                    Cells(
+                        np.where(np.isnan(shades), 0.0, shades),
+                        texts,
+                        [said(number) for number in known.tests],
+                        [str(number) for number in known.iterations],
+                        marked,
+                    )
+                ],
+                "identification (experiments learnt)",
+            )
+        ],
+        "Mean squares of whole flights: 0 is perfect, 1 is useless, ∞ diverged. Framed cells are flights that the twin"
+        " had not learnt: they are the ones to believe.",
+        columns=1,
+    )
+
+
+def _said(value: float) -> str:
+    if math.isnan(value):
+        return ""
+    return f"{value:.1g}" if math.isfinite(value) else "∞"
+
+
+def qualities(found: Examination) -> Figure | None:
+    """Qualities as predicted, with what they were expected to scatter, and as flown."""
+    numbered = [(run.test.number, run.quality, run.test) for run in found.experiments if run.test is not None]
+    flown = [(number, quality) for number, quality, _ in numbered if quality is not None]
+    told = [
+        (number, test.predicted, test.spread or 0.0)
+        for number, _, test in numbered
+        if test.predicted is not None and math.isfinite(test.predicted)
+    ]
+    if not flown and not told:
+        return None
+    marks: list[Mark] = [
+        Line([n for n, _ in flown], [q for _, q in flown], "measured", "flown", dots=True),
+        Spans(
+            [n + 0.1 for n, _, _ in told],
+            [q - 2 * s for _, q, s in told],
+            [q + 2 * s for _, q, s in told],
+            "twin",
+        ),
+        Line(
+            [n + 0.1 for n, _, _ in told],
+            [q for _, q, _ in told],
+            "twin",
+            "predicted ± 2 spreads",
+            joined=False,
+        ),
+    ]
+    best = found.best
+    if best is not None and best.predicted is not None and math.isfinite(best.predicted):
+        marks.append(Level(best.predicted, "target", "controller to fly, predicted"))
+    most = max([q for _, q in flown] + [q + 2 * s for _, q, s in told] + [0.0])
+    main = Panel(
+        "Quality of each flight (less is better)",
+        marks,
+        "test",
+        "quality",
+        y_range=(0.0, 1.1 * most or 1.0),
+        whole=True,
+    )
+    missed = [(n, (p - q) / s) for n, p, s in told for m, q in flown if m == n and s > 0.0]
+    panels = [main]
+    if missed:
+        values = [value for _, value in missed]
+        reach = 1.2 * max(3.0, *(abs(value) for value in values))
+        panels.append(
+            Panel(
+                "Predicted − flown, in spreads",
+                [
+                    Line([n for n, _ in missed], values, "twin", joined=False),
+                    Level(0.0, "target"),
+                    Level(2.0, "limit", "2 spreads"),
+                    Level(-2.0, "limit"),
+                ],
+                "test",
+                "spreads",
+                y_range=(-reach, reach),
+                whole=True,
+            )
+        )
+    return Figure("qualities", "Qualities foretold and met", panels, columns=2)
+
+
+def complexity(found: Examination) -> Figure | None:
+    """Terms against description length of the sums that were considered for each state; the choice is marked."""
+    states = list(dict.fromkeys(rival.state for rival in found.rivals))
+    panels = []
+    for state in states:
+        rivals = [rival for rival in found.rivals if rival.state == state]
+        if len(rivals) < 2:
+            continue
+        others = [rival for rival in rivals if not rival.chosen]
+        chosen = [rival for rival in rivals if rival.chosen]
+        marks: list[Mark] = [
+            Line(
+                [len(r.terms) for r in others],
+                [r.above for r in others],
+                "a",
+                "considered",
+                joined=False,
+                faint=True,
+            ),
+            Line([len(r.terms) for r in chosen], [0.0 for _ in chosen], "limit", "chosen", joined=False),
+            Level(10.0, "target", "10: the flights speak against it"),
+        ]
+        most = max(r.above for r in rivals)
+        panels.append(
+            Panel(
+                f"Equation of {words(state)}",
+                marks,
+                "terms",
+                "above the chosen (χ²)",
+                y_range=(-1.5, max(14.0, 1.08 * most)),
+                whole=True,
+            )
+        )
+    if not panels:
+        return None
+    return Figure(
+        "complexity",
+        "Complexity against error",
+        panels,
+        "Each dot is a sum of terms that annealing considered, by how much longer a description of the readings it"
+        " makes; error and number of terms both count. Dots below the line are rivals that the flights hardly tell"
+        " apart.",
+    )

@@ -1,0 +1,122 @@
+"""What was flown and what will be: coverage, and how the quality hangs on each gain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from twinloop.campaign.examination.examination import Examination
+from twinloop.faces.figures.figure import Figure, Level, Line, Mark, Panel
+from twinloop.faces.figures.units import labelled, words
+
+DOTS = 500
+"""Of one panel at most."""
+MOST = 12
+"""Panels at most."""
+
+
+def coverage(found: Examination) -> Figure | None:
+    """State against command where it was flown, and where the controller to fly will go."""
+    if found.planned is None:
+        return None
+    states = np.concatenate([run.trajectory.states[:-1] for run in found.experiments])
+    commands = np.concatenate([run.trajectory.commands for run in found.experiments])
+    kept = np.unique(np.linspace(0, len(states) - 1, DOTS).astype(int))
+    panels = []
+    signals = found.signals
+    for i in found.moved:
+        for j in _strongest(found, i):
+            x_factor, x_label = labelled(signals.states[i].name, signals.states[i].unit)
+            y_factor, y_label = 1.0, f"{words(signals.commands[j].name)} ({signals.commands[j].unit or '1'})"
+            low, high = signals.commands[j].bounds
+            marks: list[Mark] = [
+                Line(
+                    x_factor * states[kept, i],
+                    y_factor * commands[kept, j],
+                    "measured",
+                    "flown",
+                    joined=False,
+                    faint=True,
+                ),
+                Line(
+                    x_factor * found.planned.states[:-1, i],
+                    y_factor * found.planned.commands[:, j],
+                    "twin",
+                    "controller to fly",
+                ),
+                Level(y_factor * low, "limit", "bound of the command"),
+                Level(y_factor * high, "limit"),
+            ]
+            panels.append(
+                Panel(
+                    f"{words(signals.states[i].name)} × {words(signals.commands[j].name)}",
+                    marks,
+                    x_label,
+                    y_label,
+                )
+            )
+    beyond = found.beyond
+    share = f"{100.0 * (beyond or 0.0):.0f} % of the planned flight"
+    told = (
+        "" if beyond is None else f" {share} lies beyond the range that was flown in some state or command."
+    )
+    return Figure(
+        "coverage",
+        "Where it was flown, and where the controller to fly will go",
+        panels[:MOST],
+        f"Where the line leaves the dots the twin is asked about what nobody has seen.{told}",
+    )
+
+
+def _strongest(found: Examination, state: int) -> list[int]:
+    """The two commands that go most with a state or its derivative in the planned flight."""
+    assert found.planned is not None
+    if found.signals.n_u <= 2:
+        return list(range(found.signals.n_u))
+    name = found.signals.state_names[state]
+    rate = next((k for k, s in enumerate(found.signals.states) if s.derivative_of == name), state)
+    values = np.diff(found.planned.states[:, rate])
+    sent = found.planned.commands - found.planned.commands.mean(axis=0)
+    together = np.abs((sent * (values - values.mean())[:, np.newaxis]).sum(axis=0))
+    size = together / (1e-12 + np.sqrt(np.square(sent).sum(axis=0)))
+    return sorted(np.argsort(-size, kind="stable")[:2].tolist())
+
+
+def gains(found: Examination) -> Figure | None:
+    """The quality on the twin against each gain, ± 20 %."""
+    if not found.slopes:
+        return None
+    panels = []
+    finite = [q for each in found.slopes for q in each.qualities if q is not None and math.isfinite(q)]
+    if not finite:
+        return None
+    low, high = min(finite), max(finite)
+    room = 0.1 * max(high - low, 0.02 * high)
+    for each in found.slopes:
+        there = [
+            (100.0 * (f - 1.0), q) for f, q in zip(each.factors, each.qualities, strict=True) if q is not None
+        ]
+        held = f" (at its {'upper' if each.at_bound == 'high' else 'lower'} bound)" if each.at_bound else ""
+        panels.append(
+            Panel(
+                f"{each.gain} = {each.value:.4g}{held}",
+                [
+                    Line(
+                        [x for x, _ in there], [y for _, y in there], "twin", "quality on the twin", dots=True
+                    )
+                ],
+                "change of the gain (%)",
+                "quality",
+                x_range=(-22.0, 22.0),
+                y_range=(low - room, high + room),
+            )
+        )
+    return Figure(
+        "gains",
+        "Quality against each gain, ± 20 %",
+        panels,
+        "One gain at a time, the others held, on the twin without noise. A flat line is a gain that need not be exact;"
+        " a line that ends in the middle is a gain at a bound of its box.",
+        columns=3,
+    )

@@ -1,0 +1,1 @@
+"""The report: one page in HTML that says first what to believe, then shows why."""

@@ -1,0 +1,77 @@
+"""The commands `twinloop report` and `twinloop compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from twinloop.errors import InvalidInput
+from twinloop.faces.figures.catalogue import FIGURES
+from twinloop.faces.figures.saving import FORMATS, check_format, picture, written
+from twinloop.faces.files import check_writable, write_text
+from twinloop.faces.report.comparison import comparison, comparison_page
+from twinloop.faces.report.page import report_page, templates
+from twinloop.faces.report.source import source
+from twinloop.faces.text import table
+
+
+@click.command()
+@click.argument("campaign")
+@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option(
+    "-o", "--output", type=Path, metavar="FILE.html|FOLDER", help="Where to; by default report.html."
+)
+@click.option(
+    "--format", "form", help=f"Instead of the page, all figures as files in FOLDER: {', '.join(FORMATS)}."
+)
+def report(campaign: str, name: str | None, output: Path | None, form: str | None) -> None:
+    """One page on CAMPAIGN, a store or a record in a file: what to believe, and why."""
+    if form is not None:
+        _figures(campaign, name, output or Path("figures"), form)
+        return
+    path = Path("report.html") if output is None else output
+    check_writable(path, [".html"])
+    templates()  # what is missing is said before any work
+    found = source(campaign, name)
+    text = report_page(found.campaign, found.name, {"name": found.system}, {}, found.sessions)
+    write_text(path, text)
+    click.echo(f"Report: {path}", err=True)
+
+
+def _figures(campaign: str, name: str | None, folder: Path, form: str) -> None:
+    check_format(form)
+    if not folder.is_dir():
+        raise InvalidInput(
+            f"Folder {str(folder)!r}: expected a folder for the figures, found none; make it first."
+        )
+    examined = source(campaign, name).campaign.examine()
+    for figure_name, drawn in FIGURES.items():
+        figure = drawn(examined)
+        if figure is not None:
+            path = folder / f"{figure_name}.{form}"
+            written(picture(figure, form), path)
+            click.echo(f"Figure: {path}", err=True)
+
+
+@click.command()
+@click.argument("first")
+@click.argument("second")
+@click.option(
+    "--name", "names", multiple=True, help="Of the campaign in each store, where they hold several; twice."
+)
+@click.option("-o", "--output", type=Path, metavar="FILE.html", help="Also as a page.")
+def compare(first: str, second: str, names: tuple[str, ...], output: Path | None) -> None:
+    """Two campaigns side by side, FIRST and SECOND: stores, or records in files."""
+    if len(names) not in (0, 1, 2):
+        raise InvalidInput(f"--name: expected it at most twice, found {len(names)} of them.")
+    if output is not None:
+        check_writable(output, [".html"])
+        templates()
+    chosen = (names or (None,)) * 2 if len(names) < 2 else names
+    sources = [source(where, name) for where, name in zip((first, second), chosen, strict=False)]
+    found = comparison(sources)
+    click.echo(table(list(found.head), found.rows))
+    if output is not None:
+        write_text(output, comparison_page(sources))
+        click.echo(f"Page: {output}", err=True)

@@ -1,0 +1,92 @@
+"""Two campaigns side by side: what each twin is worth, and what each controller promises and has shown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from twinloop import _core
+from twinloop.campaign.examination.checking import checks
+from twinloop.faces.figures.units import words
+from twinloop.faces.report.page import templates
+from twinloop.faces.report.source import Source
+from twinloop.faces.report.tables import Table, shown_value
+
+Row = tuple[str, object]
+
+
+def comparison(sources: Sequence[Source]) -> Table:
+    """A row a question, a column a campaign.
+
+    Args:
+        sources: at least one.
+    """
+    answers = [dict(_answers(source)) for source in sources]
+    questions = list(dict.fromkeys(question for each in answers for question in each))
+    rows = [[question, *(shown_value(each.get(question)) for each in answers)] for question in questions]
+    return Table("comparison", "Side by side", ["", *(source.name for source in sources)], rows)
+
+
+def comparison_page(sources: Sequence[Source]) -> str:
+    """The same as one page of HTML.
+
+    Args:
+        sources: at least one.
+
+    Raises:
+        NotAvailable: Jinja2 is missing.
+    """
+    title = " against ".join(source.name for source in sources)
+    text: str = (
+        templates()
+        .get_template("compare.html")
+        .render(title=title, table=comparison(sources), version=_core.__version__)
+    )
+    return text
+
+
+def _answers(source: Source) -> list[Row]:
+    campaign = source.campaign
+    found = campaign.examine()
+    judged = checks(found)
+    best, first = found.best, found.first_flown
+    rows: list[Row] = [
+        ("system", source.system),
+        ("preset, seed", f"{campaign.setup.preset}, {campaign.setup.seed}"),
+        ("experiments", len(found.experiments)),
+        ("twin", "trust it" if judged.twin_passed else "do not trust it"),
+        ("checks that fail", ", ".join(check.name for check in judged.failed) or "none"),
+    ]
+    if found.unseen:
+        last = found.unseen[-1]
+        rows.append(("error on the last unseen flight", last.error))
+        rows += [
+            (f"FIT of it, {words(state.name)} (%)", float(last.fit[i]))
+            for i, state in enumerate(found.signals.states)
+        ]
+    rmse = campaign.rmse
+    rows += [
+        (f"error of whole flights, {words(state.name)} ({state.unit or '1'})", float(rmse[i]))
+        for i, state in enumerate(found.signals.states)
+    ]
+    rows.append(("controller", "none" if best is None else f"test {best.number}"))
+    if best is not None:
+        rows += [
+            ("quality predicted", best.predicted),
+            ("± spread", best.spread),
+            ("quality flown", best.measured),
+            ("risk", best.risk),
+        ]
+    rows.append(("quality of the first gains, flown", None if first is None else first.quality))
+    if found.margins is not None:
+        worst = found.margins.worst
+        gain = min(loop.gain for loop in worst)
+        rows += [
+            ("worst gain margin (dB)", 20.0 * math.log10(gain)),
+            ("worst phase margin (°)", math.degrees(min(loop.phase for loop in worst))),
+            ("worst delay margin (ms)", 1e3 * min(loop.delay for loop in worst)),
+            ("largest Ms", max(loop.sensitivity for loop in worst)),
+        ]
+    if best is not None:
+        rows += [(f"gain {name}", value) for name, value in best.parameters.items()]
+    return rows

@@ -1,0 +1,131 @@
+"""The page: everything that is shown, handed to a template that escapes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import Any
+
+from twinloop import _core
+from twinloop.campaign import Campaign
+from twinloop.campaign.examination.checking import checks
+from twinloop.campaign.examination.examination import Examination
+from twinloop.errors import NotAvailable
+from twinloop.faces.figures.catalogue import CAMPAIGN, CONTROLLER, FIGURES, TWIN
+from twinloop.faces.figures.figure import Figure
+from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
+from twinloop.faces.figures.svg import panel_svg
+from twinloop.faces.report import tables
+from twinloop.faces.report.verdict import EVIDENCE, verdict
+from twinloop.faces.result import summary
+
+
+def templates() -> Any:
+    """Jinja's environment of the package's own templates; all that is put into them is escaped.
+
+    Raises:
+        NotAvailable: Jinja2 is missing.
+    """
+    try:
+        import jinja2
+    except ImportError as missing:
+        raise NotAvailable(
+            "Reports need Jinja2, which is not installed: pip install 'twinloop[report]'."
+        ) from missing
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        loader=jinja2.FunctionLoader(_source),
+    )  # fmt: skip
+    # Drawings are made by an XML library, which has escaped what stands in them.
+    environment.globals["draw"] = lambda panel: _markup(panel_svg(panel))
+    environment.globals["style"] = _markup(style())
+    environment.globals["script"] = _markup(_source("page.js"))
+    return environment
+
+
+def style() -> str:
+    """The style sheet of pages and figures, light and dark."""
+    themes = (
+        f":root{{color-scheme:light dark;{variables(LIGHT)}}}"
+        f"@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}"
+        f"@media print{{:root{{{variables(LIGHT)}}}}}"
+    )
+    return themes + RULES + _source("page.css")
+
+
+def report_page(
+    campaign: Campaign, name: str, system: Mapping[str, object], run_info: Mapping[str, object],
+    sessions: Sequence[Mapping[str, Any]] = (),
+) -> str:  # fmt: skip
+    """The report of a campaign.
+
+    Args:
+        campaign: with at least one experiment told.
+        name: of the campaign, for its title.
+        system: what was experimented on.
+        run_info: of the process that makes the report.
+        sessions: that have worked on the campaign, where a store knows them.
+
+    Returns:
+        One page of HTML that needs nothing else.
+
+    Raises:
+        NotAvailable: nothing was told, or Jinja2 is missing.
+    """
+    template = templates().get_template("page.html")
+    found, result = campaign.examine(), summary(campaign, system, run_info)
+    checked = checks(found)
+    history = campaign.history
+    learnt = len(history[-1].tests) if history else 0
+    text: str = template.render(
+        name=name,
+        result=result,
+        system=result["system"],
+        unlearnt=len(found.experiments) - learnt,
+        verdict=verdict(found, checked, result),
+        checks=checked,
+        evidence=EVIDENCE,
+        equations="\n".join(result["twin"]["equations"]),  # type: ignore[call-overload,index,arg-type]
+        remarks=campaign.twin.remarks,
+        twin_figures=_figures(found, TWIN),
+        controller_figures=_figures(found, CONTROLLER),
+        campaign_figures=_figures(found, CAMPAIGN),
+        twin_tables=_present(
+            tables.states(result), tables.disturbances(result), tables.actuators(result), tables.rivals(found),
+            *tables.poles(found)[:1],
+        ),
+        controller_tables=_present(
+            tables.gains(result), tables.margins(found), tables.steps(found), tables.effort(found),
+            tables.envelope(found), *tables.poles(found)[1:],
+        ),
+        campaign_tables=_present(tables.flights(result), tables.data(found)),
+        next=_next(campaign, result),
+        failures=campaign.failures,
+        sessions=sessions,
+        version=_core.__version__,
+    )  # fmt: skip
+    return text
+
+
+def _present(*found: tables.Table | None) -> list[tables.Table]:
+    return [table for table in found if table is not None]
+
+
+def _figures(found: Examination, names: Sequence[str]) -> list[Figure]:
+    drawn = (FIGURES[name](found) for name in names)
+    return [figure for figure in drawn if figure is not None]
+
+
+def _next(campaign: Campaign, result: Mapping[str, Any]) -> dict[str, object]:
+    """What is waiting to be flown, and what another flight would bring."""
+    return {"waiting": campaign.waiting, "advice": result.get("advice"), "unit": result["quality"]["unit"]}
+
+
+def _source(name: str) -> str:
+    return resources.files("twinloop.faces.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _markup(text: str) -> Any:
+    from markupsafe import Markup
+
+    return Markup(text)

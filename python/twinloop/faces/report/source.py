@@ -1,0 +1,104 @@
+"""Where a report's campaign comes from: a store, or a record in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from twinloop.campaign import Campaign
+from twinloop.campaign.keeping import look
+from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.working import knows_nothing
+from twinloop.records.reading import from_text
+
+LARGEST = 1 << 30
+"""Bytes of a record that is read."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A campaign with what is known about it.
+
+    Args:
+        campaign: to be looked at, as it was learnt last.
+        name: of it.
+        system: what it experimented on, in a few words.
+        sessions: that have worked on it, as texts: begun, command, versions, machine.
+    """
+
+    campaign: Campaign
+    name: str
+    system: str
+    sessions: Sequence[Mapping[str, str]]
+
+
+def source(where: str, name: str | None = None) -> Source:
+    """Opens a campaign to look at it; nothing is changed, and a writer is not held up.
+
+    Args:
+        where: a store, or a file with the record of a campaign as JSON.
+        name: of the campaign in a store that holds several; of a record, for its title.
+
+    Raises:
+        InvalidInput: neither of both, or no such campaign.
+        NotAvailable: nothing was told yet.
+    """
+    found = _of_record(Path(where), name) if _is_json(where) else _of_store(where, name)
+    if not found.campaign.experiments:
+        raise NotAvailable(
+            f"Report: expected a campaign with at least one experiment, found {found.name!r} without one; fly a"
+            " controller that you trust, and tell it."
+        )
+    # What was learnt so far is enough, if anything was.
+    found.campaign.interrupted = not knows_nothing(found.campaign)
+    return found
+
+
+def _is_json(where: str) -> bool:
+    path = Path(where)
+    if "://" in where or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(64).lstrip()[:1] == b"{"
+
+
+def _of_record(path: Path, name: str | None) -> Source:
+    if path.stat().st_size > LARGEST:
+        raise InvalidInput(
+            f"File {str(path)!r}: expected at most 1 GiB of JSON, found {path.stat().st_size} bytes."
+        )
+    what = f"File {str(path)!r}"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        raise InvalidInput(f"{what}: expected a text that can be read, found: {reason}.") from reason
+    record = from_text(text, what)
+    if not isinstance(record, dict) or record.get("kind") != "campaign":
+        raise InvalidInput(
+            f"{what}: expected the record of a campaign, as campaign.to_record() gives, found another JSON; a result"
+            " that `--output` wrote has no flights to examine: keep the campaign with --store."
+        )
+    return Source(Campaign.from_record(record), name or path.stem, "a system of your own", ())
+
+
+def _of_store(where: str, name: str | None) -> Source:
+    held = look(where, name, read_only=True)
+    kind = (
+        "a system of your own" if held.system is None else str(held.system.get("kind", "")).replace("_", " ")
+    )
+    campaign = Campaign.load(where, held.name, read_only=True)
+    return Source(campaign, held.name, kind, [_session(session) for session in held.sessions])
+
+
+def _session(found: Mapping[str, Any]) -> dict[str, str]:
+    versions = found.get("versions")
+    return {
+        "begun": str(found.get("started", "")),
+        "command": " ".join(str(word) for word in found.get("command") or ()),
+        "versions": ", ".join(f"{k} {v}" for k, v in versions.items())
+        if isinstance(versions, Mapping)
+        else "",
+        "machine": f"{found.get('processor', '')}, {found.get('system', '')}".strip(", "),
+    }

@@ -1,0 +1,341 @@
+"""Tables of the report, as plain rows of numbers and texts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.examination.poles import Pole
+from twinloop.campaign.examination.use import envelope_use
+from twinloop.faces.figures.units import said, words
+from twinloop.faces.text import cell
+
+RIVALS = 3
+"""Rivals of each equation that are shown."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under one heading.
+
+    Args:
+        name: a word that does not change; links use it.
+        title: for a person.
+        head: of the columns.
+        rows: cells as texts.
+        note: below it.
+        texts: columns that are read, not compared.
+    """
+
+    name: str
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    texts: Sequence[int] = ()
+
+
+def _table(
+    name: str,
+    title: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    note: str = "",
+    texts: Sequence[int] = (),
+) -> Table:
+    return Table(name, title, head, [[shown_value(value) for value in row] for row in rows], note, texts)
+
+
+def shown_value(value: object) -> str:
+    """A cell of a table: four digits, and signs as they are set."""
+    if isinstance(value, float):
+        return (
+            ("−∞" if value < 0.0 else "∞")
+            if math.isinf(value)
+            else "–"
+            if math.isnan(value)
+            else f"{value:.4g}".replace("-", "−")
+        )
+    return cell(value)
+
+
+def states(result: Mapping[str, Any]) -> Table | None:
+    """What the twin leaves beside the sensors' noise."""
+    twin = result["twin"]
+    if "states" not in twin:
+        return None
+    rows = [
+        [
+            words(state["name"]), state["unit"] or "1", state["error"], state["sensor"],
+            state["error"] / state["sensor"] if state["sensor"] and state["error"] is not None else None,
+            1e3 * state["offset"],
+        ]
+        for state in twin["states"]
+    ]  # fmt: skip
+    head = ["state", "unit", "error of whole flights", "sensor's noise", "ratio", "read late by (ms)"]
+    note = (
+        "Errors are root mean squares of flown minus simulated; noise is a standard deviation, as estimated. A ratio"
+        " of 1 leaves nothing but the sensors."
+    )
+    return _table("noise", "What the twin leaves, state by state", head, rows, note)
+
+
+def disturbances(result: Mapping[str, Any]) -> Table | None:
+    """What moves the states beside the commands."""
+    found = result["twin"].get("disturbances")
+    if not found:
+        return None
+    rows = [
+        [
+            words(each["name"]),
+            each["unit"] or "1",
+            each["white"] or None,
+            each["lasting"] or None,
+            each["memory"] or None,
+        ]
+        for each in found
+    ]
+    head = ["state", "unit", "white, each period", "lasting, each second", "its memory (s)"]
+    return _table("disturbances", "Disturbances (standard deviations)", head, rows)
+
+
+def actuators(result: Mapping[str, Any]) -> Table | None:
+    """Lags and delays."""
+    found = result["twin"].get("actuators")
+    if not found:
+        return None
+    rows = [[words(each["name"]), each["lag"], each["delay"]] for each in found]
+    return _table("actuators", "Actuators", ["command", "lag (s)", "delay (periods)"], rows)
+
+
+def rivals(found: Examination) -> Table | None:
+    """Other equations that the flights tell apart the least."""
+    rows: list[list[object]] = []
+    for state in dict.fromkeys(rival.state for rival in found.rivals):
+        others = sorted((r for r in found.rivals if r.state == state and not r.chosen), key=lambda r: r.above)
+        chosen = next((set(r.terms) for r in found.rivals if r.state == state and r.chosen), set())
+        for rival in others[:RIVALS]:
+            gone = ", ".join(sorted(chosen - set(rival.terms))) or "–"
+            come = ", ".join(sorted(set(rival.terms) - chosen)) or "–"
+            rows.append([words(state), len(rival.terms), come, gone, rival.above])
+    if not rows:
+        return None
+    head = ["equation of", "terms", "with", "without", "above the chosen (χ²)"]
+    note = "From about 10 on the flights speak against a rival; below that they cannot tell the two apart."
+    return _table("rivals", "Rival equations", head, rows, note, (2, 3))
+
+
+def _poles(name: str, title: str, found: Sequence[Pole], note: str) -> Table | None:
+    if not found:
+        return None
+    rows = [
+        [f"{pole.real:.3g} ± {pole.imaginary:.3g} j".replace("-", "−") if pole.imaginary else pole.real,
+         pole.frequency, pole.damping, pole.time]
+        for pole in found
+    ]  # fmt: skip
+    return _table(
+        name, title, ["pole (1/s)", "frequency (rad/s)", "damping", "time constant (s)"], rows, note
+    )
+
+
+def poles(found: Examination) -> list[Table]:
+    """Of the twin alone, and closed."""
+    both = [
+        _poles(
+            "poles", "Poles of the twin at the target", found.open_poles, "A negative time constant grows."
+        ),
+        _poles("closed-poles", "Poles with the loops closed", found.closed_poles, ""),
+    ]
+    return [table for table in both if table is not None]
+
+
+def gains(result: Mapping[str, Any]) -> Table | None:
+    """Gains of the controller to fly beside the first."""
+    best, first = result["controller"], result["first_controller"]
+    if best is None:
+        return None
+    rows = []
+    for gain in best["gains"]:
+        box = "fixed" if gain["low"] is None else f"{gain['low']:g} to {gain['high']:g}"
+        at = (
+            ""
+            if gain["low"] is None
+            else "at a bound"
+            if gain["value"] in (gain["low"], gain["high"])
+            else ""
+        )
+        rows.append(
+            [
+                gain["name"],
+                gain["value"],
+                None if first is None else first["gains"][gain["name"]],
+                gain["unit"],
+                box,
+                at,
+            ]
+        )
+    return _table(
+        "gains-table", "Gains", ["gain", "value", "first", "unit", "bounds", ""], rows, best.get("why") or ""
+    )
+
+
+def margins(found: Examination) -> Table | None:
+    """Margins of each loop, the worst over the committee first."""
+    known = found.margins
+    if known is None:
+        return None
+    rows = []
+    for nominal, worst in zip(known.nominal, known.worst, strict=True):
+        for which, loop in (("worst", worst), ("twin", nominal)):
+            rows.append(
+                [words(loop.loop), which, 20.0 * math.log10(loop.gain) if loop.gain > 0 else None,
+                 20.0 * math.log10(loop.gain_down) if loop.gain_down > 0 else -math.inf, math.degrees(loop.phase),
+                 1e3 * loop.delay, loop.crossover, loop.sensitivity, loop.complementary, "yes" if loop.stable else "NO"]
+            )  # fmt: skip
+    head = [
+        "loop",
+        "model",
+        "gain (dB)",
+        "down to (dB)",
+        "phase (°)",
+        "delay (ms)",
+        "crossover (rad/s)",
+        "Ms",
+        "Mt",
+        "stable",
+    ]
+    note = (
+        f"Each loop broken at the {known.broken_at}, the others closed, at the target, with delays and lags; worst: the"
+        f" worst of each over {known.members} model{'s' * (known.members != 1)} of the committee, which need not be one"
+        " model's."
+    )
+    return _table("margins", "Margins", head, rows, note)
+
+
+def steps(found: Examination) -> Table | None:
+    """Rise, overshoot and settling as predicted, as flown and of the first gains."""
+    if found.planned is None:
+        return None
+    runs = [("predicted", found.planned)]
+    if found.best_flown is not None:
+        runs.append(("flown", found.best_flown.trajectory))
+    if found.old is not None:
+        runs.append(("first gains, on the twin", found.old))
+    rows = [
+        [
+            words(answer.state),
+            name,
+            answer.rise,
+            100.0 * answer.overshoot,
+            answer.settling,
+            100.0 * answer.left,
+        ]
+        for i in range(len(found.step(found.planned)))
+        for name, run in runs
+        for answer in [found.step(run)[i]]
+    ]
+    if not rows:
+        return None
+    head = ["state", "flight", "rise 10–90 % (s)", "overshoot (%)", "settling 5 % (s)", "off at the end (%)"]
+    return _table("steps", "The step", head, rows, "–: it does not get there within the flight.")
+
+
+def effort(found: Examination) -> Table | None:
+    """What the planned flight asks of each command."""
+    if found.planned is None or found.planned.steps == 0:
+        return None
+    first = None if found.first_flown is None else found.effort(found.first_flown.trajectory)
+    noise = None if found.closed is None else found.closed.noise_of_commands
+    rows = []
+    for j, each in enumerate(found.effort(found.planned)):
+        low, high = found.signals.commands[j].bounds
+        rows.append(
+            [words(each.command), 100.0 * each.used, 100.0 * each.saturated, 100.0 * each.moved,
+             None if first is None else 100.0 * first[j].used, None if first is None else 100.0 * first[j].saturated,
+             None if noise is None else 200.0 * float(noise[j]) / (high - low)]
+        )  # fmt: skip
+    head = [
+        "command",
+        "used (%)",
+        "at a bound (%)",
+        "change a period (%)",
+        "first: used (%)",
+        "first: at a bound (%)",
+        "from sensors' noise (%)",
+    ]
+    note = "Root mean squares in half ranges of each command, about their middle. At a bound: share of the periods."
+    return _table("effort", "Effort of the commands", head, rows, note)
+
+
+def envelope(found: Examination) -> Table | None:
+    """The most that is used of the envelope, foretold and met."""
+    if found.planned is None:
+        return None
+    planned = envelope_use(found.planned.states, found.signals)
+    if not planned:
+        return None
+    met = (
+        None
+        if found.best_flown is None
+        else dict(envelope_use(found.best_flown.trajectory.states, found.signals))
+    )
+    flown = [dict(envelope_use(run.trajectory.states, found.signals)) for run in found.experiments]
+    rows = [
+        [
+            words(name),
+            100.0 * used,
+            None if met is None else 100.0 * met[name],
+            100.0 * max(each[name] for each in flown),
+        ]
+        for name, used in planned
+    ]
+    risk = (
+        ""
+        if found.best is None or found.best.risk is None
+        else (f" Probability that the flight leaves it, by the committee: {found.best.risk:.2g}.")
+    )
+    head = ["state", "foretold (%)", "met (%)", "most of all flights (%)"]
+    return _table("envelope", "Use of the envelope", head, rows, f"100 % is a bound.{risk}")
+
+
+def data(found: Examination) -> Table:
+    """Data quality, flight by flight."""
+    rows = [
+        [said(each.number), each.seconds, each.ended,
+         None if each.moved is None else f"{each.moved:.3g} ({words(each.least)})", 100.0 * each.saturated,
+         None if each.large is None else 100.0 * each.large, 100.0 * each.usage, each.fingerprint]
+        for each in found.data
+    ]  # fmt: skip
+    head = [
+        "flight",
+        "length (s)",
+        "ended",
+        "least moved, in noises",
+        "at a bound (%)",
+        "beyond 3 σ (%)",
+        "envelope (%)",
+        "SHA-256 of the data",
+    ]
+    note = (
+        "Least moved: the state that moved least, in standard deviations of its sensor; below about 10 little can be"
+        " learnt of it. Beyond 3 σ: innovations; 0.3 % are expected of noise. The last column begins the SHA-256 of"
+        " times, states and commands as little-endian doubles."
+    )
+    return _table("data", "Data, flight by flight", head, rows, note)
+
+
+def flights(result: Mapping[str, Any]) -> Table:
+    """Predicted and flown, with the reason of each."""
+    rows = [
+        [
+            said(run["test"]), run["predicted"], run.get("spread"), run["measured"],
+            run.get("predicted_minus_measured"),
+            run.get("risk"), run.get("why") or ("" if run["test"] is None else "Gains of your own."),
+        ]
+        for run in result["experiments"]
+    ]  # fmt: skip
+    head = ["flight", "predicted", "± spread", "flown", "predicted − flown", "risk", "why"]
+    return _table("flights-table", "Flights", head, rows, texts=(6,))

@@ -1,0 +1,219 @@
+"""The verdict: three sentences with numbers, in plain words, each with links to its evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.examination import Examination
+from twinloop.faces.figures.units import said, words
+from twinloop.faces.text import quality_words
+
+EVIDENCE = {
+    "follows": "flights",
+    "unseen-flight": "unseen",
+    "band": "unseen",
+    "quality": "qualities",
+    "whiteness": "autocorrelation",
+    "commands": "crosscorrelation",
+    "remarks": "remarks",
+    "controller": "gains-table",
+    "stable": "margins",
+    "sensitivity": "margins",
+    "envelope": "envelope",
+    "flown": "step",
+}
+"""Where on the page each check can be looked at."""
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One sentence of the verdict.
+
+    Args:
+        subject: "Twin", "Controller" or "Next".
+        answer: in a word or two.
+        good: whether it says yes; None where it says neither.
+        text: with its numbers.
+        links: where the evidence stands, and what to call it.
+    """
+
+    subject: str
+    answer: str
+    good: bool | None
+    text: str
+    links: tuple[tuple[str, str], ...]
+
+
+def verdict(
+    found: Examination, checks: Checks, result: Mapping[str, Any]
+) -> tuple[Sentence, Sentence, Sentence]:
+    """Of a campaign.
+
+    Args:
+        found: its examination.
+        checks: of it.
+        result: its `twinloop.faces.result.summary`.
+    """
+    return _of_twin(found, checks), _of_controller(found, checks, result), _of_next(found, checks, result)
+
+
+PLAIN = {
+    "follows": "flown by itself it does not follow the experiments that it was learnt from",
+    "remarks": "its remarks are serious",
+    "unseen-flight": "nothing shows yet that it foretells a flight",
+    "band": "readings of that flight were outside of its band",
+    "quality": "the last quality that it predicted was far off",
+    "whiteness": "what it misses now tells what it will miss next",
+    "commands": "the commands tell what it will miss",
+}
+"""What each check of the twin means where it fails."""
+
+
+def _of_twin(found: Examination, checks: Checks) -> Sentence:
+    failed = [check for check in checks.failed if check.subject == "twin"]
+    unseen = _unseen(found)
+    if failed:
+        lacks = [check for check in failed if check.name in ("whiteness", "commands")]
+        text = "; ".join(PLAIN[check.name] for check in failed)
+        if lacks:
+            share = max(check.value or 0.0 for check in lacks)
+            text += f" (up to {100.0 * share:.0f} % of the correlations are beyond their 99 % limits): something acts"
+            text += " that it has not got"
+        return Sentence("Twin", "Do not trust it", False, f"{_capital(text)}.{unseen}", _links(failed))
+    text = unseen.strip()
+    if found.autocorrelation is not None:
+        text += " What is left is noise: it is correlated neither with itself nor with the commands."
+    return Sentence(
+        "Twin", "Trust it", True, text,
+        (("unseen", "unseen flight"), ("crosscorrelation", "what is left"), ("checks", "all checks")),
+    )  # fmt: skip
+
+
+def _unseen(found: Examination) -> str:
+    """How well it foretold the last flight that it had not learnt."""
+    if not found.unseen:
+        return ""
+    last = found.unseen[-1]
+    which = f" Of {said(last.number)}, which it had not learnt,"
+    if not np.isfinite(last.rmse).all():
+        return f"{which} its free run diverged."
+    fits = np.where(np.isfinite(last.fit), last.fit, np.inf)
+    worst = int(np.argmin(fits))
+    if not np.isfinite(fits[worst]):
+        return ""
+    inside = (
+        ""
+        if last.inside is None
+        else f"; {100.0 * last.inside:.0f} % of the readings were inside its 90 % band"
+    )
+    state = words(found.signals.state_names[worst])
+    return f"{which} it foretold the course with a FIT of {fits[worst]:.3g} % at worst, of {state}{inside}."
+
+
+def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:
+    best, first = result["controller"], result["first_controller"]
+    failed = [check for check in checks.failed if check.subject == "controller"]
+    if best is None or found.best is None:
+        return Sentence("Controller", "None to fly", False, found.no_controller, (("checks", "all checks"),))
+    measure = result["quality"]
+    quality = quality_words(measure["kind"], measure["unit"])
+    told = f"{quality} {_number(best['predicted'])} ± {_spread(best['spread'])} predicted"
+    told += f", {_number(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
+    if first is not None and first["measured"] is not None:
+        told += f"; the first gains had {_number(first['measured'])}"
+    margins = _margins(found)
+    if failed:
+        return Sentence(
+            "Controller", "Do not fly it", False, f"{failed[0].sentence} {_capital(told)}.", _links(failed)
+        )
+    if not checks.twin_passed:
+        text = f"{_capital(told)}. What is predicted rests on a twin that is not to be trusted: believe what was flown."
+        return Sentence(
+            "Controller", "Not on this twin's word", False, text, (("step", "step"), ("qualities", "flights"))
+        )
+    return Sentence(
+        "Controller", "Fly it" if best["measured"] is None else "Keep it", True, f"{_capital(told)}.{margins}",
+        (("step", "step"), ("margins", "margins"), ("gains-table", "gains")),
+    )  # fmt: skip
+
+
+def _margins(found: Examination) -> str:
+    if found.margins is None or not all(loop.stable for loop in found.margins.worst):
+        return ""
+    gain = min(loop.gain for loop in found.margins.worst)
+    phase = math.degrees(min(loop.phase for loop in found.margins.worst))
+    gain_words = (
+        f"a gain margin of {20.0 * math.log10(gain):.0f} dB" if math.isfinite(gain) else "any gain margin"
+    )
+    phase_words = f"{phase:.0f}° of phase" if math.isfinite(phase) else "any phase"
+    return (
+        f" The worst of all loops over {found.margins.members} models keeps {gain_words} and {phase_words}."
+    )
+
+
+def _of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:
+    advice = result.get("advice")
+    unit = result["quality"]["unit"]
+    links = (("next", "next experiment"),)
+    if advice is None:
+        return Sentence(
+            "Next", "You decide", None, "The preset paper does not say what another test would bring.", links
+        )
+    if not checks.twin_passed:
+        text = (
+            "Look into the checks that fail, then fly again where they point: what the twin says about the worth of"
+            " another flight is worth no more than the twin."
+        )
+        return Sentence(
+            "Next", "Find out what the twin lacks", False, text, (("checks", "all checks"), *links)
+        )
+    if advice["gain"] is None:
+        return Sentence(
+            "Next", "Ask", None, "No flight was planned yet; ask for one to hear what it would bring.", links
+        )
+    if advice["gain"] == 0.0:
+        text = "The models agree on what to fly: another flight would not improve the quality."
+        return Sentence("Next", "Stop", True, text, links)
+    gain, scatter = _number(advice["gain"]), _number(advice["scatter"])
+    if advice["stop"]:
+        text = f"Another flight would improve the quality by {gain} {unit}".rstrip()
+        return Sentence(
+            "Next",
+            "Stop",
+            True,
+            f"{text}; the same flight repeated scatters by {scatter} {unit}".rstrip() + ".",
+            links,
+        )
+    text = f"Another flight may improve the quality by {gain} {unit}".rstrip()
+    return Sentence(
+        "Next",
+        "Fly another",
+        None,
+        f"{text}; one measurement scatters by {scatter} {unit}".rstrip() + ".",
+        links,
+    )
+
+
+def _links(failed: list[Check]) -> tuple[tuple[str, str], ...]:
+    found = [
+        (EVIDENCE[check.name], check.name.replace("-", " ")) for check in failed[:3] if check.name in EVIDENCE
+    ]
+    return (*found, ("checks", "all checks"))
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}"
+
+
+def _spread(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1g}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

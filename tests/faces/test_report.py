@@ -1,0 +1,203 @@
+"""The report: what it says first, that links lead somewhere, that nothing is fetched, and nothing strange gets in."""
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import lives
+import twinloop as tl
+from conftest import pendulum_step
+from twinloop.faces.cli import main
+from twinloop.faces.figures.axis import axis
+from twinloop.faces.figures.catalogue import FIGURES
+from twinloop.faces.figures.figure import Band, Figure, Line, Panel
+from twinloop.faces.figures.svg import drawing, panel_svg
+from twinloop.faces.report.page import report_page
+from twinloop.records import to_text
+
+pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
+
+
+class Elements(HTMLParser):
+    """Every element with its attributes, and all text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.found, self.text = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def good():
+    return lives.learnt(pendulum_step, 4)
+
+
+@pytest.fixture(scope="module")
+def bad():
+    return lives.learnt(lives.with_end_stop, 3)
+
+
+@pytest.fixture(scope="module")
+def page(good):
+    return report_page(good, "pendulum", {"name": "a pendulum"}, {})
+
+
+def first_words(text):
+    """What stands before the checks, as a person reads it."""
+    before = "".join(Elements(text[text.index("<body>") : text.index('id="checks"')]).text)
+    return re.sub(r"\s+", " ", before)
+
+
+def test_the_verdict_comes_first_with_numbers(good, bad, page):
+    words = first_words(page)
+    assert "Trust it" in words and "Do not trust it" not in words
+    last = good.examine().unseen[-1]
+    assert (
+        f"FIT of {np.min(last.fit):.3g} %" in words and f"{100 * last.inside:.0f} % of the readings" in words
+    )
+    of_bad = first_words(report_page(bad, "stop", {"name": "a pendulum"}, {}))
+    assert "Do not trust it" in of_bad and "Fly it" not in of_bad
+
+
+def test_every_link_leads_to_something_on_the_page(page, bad):
+    for text in (page, report_page(bad, "stop", {"name": "a pendulum"}, {})):
+        elements = Elements(text).found
+        ids = [a["id"] for _, a in elements if "id" in a]
+        targets = [a["href"][1:] for tag, a in elements if tag == "a"]
+        assert len(ids) == len(set(ids)) and len(targets) > 15
+        assert set(targets) <= set(ids)
+
+
+def test_the_page_needs_no_network_and_is_small(page):
+    for tag, attributes in Elements(page).found:
+        assert tag not in ("link", "iframe", "object", "embed", "img"), tag
+        assert not {"src", "srcset", "action"} & set(attributes)
+    assert "@import" not in page and "url(" not in page
+    assert "default-src 'none'" in page
+    assert len(page.encode()) < 2_000_000
+
+
+def test_strange_names_and_reasons_are_shown_and_never_run(good):
+    strange = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>"
+    campaign = tl.Campaign.from_record(good.to_record(), threads=1)
+    campaign.tell_failed(campaign.test({"angle.kp": 1.0, "angle.ki": 0.0, "angle.kd": 0.1}), strange)
+    text = report_page(
+        campaign,
+        strange,
+        {"name": strange},
+        {},
+        [dict.fromkeys(("begun", "command", "versions", "machine"), strange)],
+    )
+    elements = Elements(text)
+    assert sum(tag == "script" for tag, _ in elements.found) == 1
+    assert not [tag for tag, attributes in elements.found if tag == "img" or "onerror" in attributes]
+    assert "".join(elements.text).count("alert(2)") >= 5
+
+
+def test_names_in_drawings_are_escaped():
+    panel = Panel("<b>", [Line([0, 1], [0, 1], "a", '"><script>')], "</svg>", "&")
+    for text in (panel_svg(panel), drawing(Figure("f", "<i>", [panel]))):
+        assert "<b>" not in text and "<script>" not in text
+        assert "&lt;b&gt;" in text
+
+
+def test_lines_stand_where_their_numbers_are():
+    panel = Panel(
+        "t",
+        [Line([0.0, 5.0, 10.0], [1.0, np.nan, 3.0], "a"), Band([0.0, 10.0], [0, 0], [4, 4], "a")],
+        x_range=(0.0, 10.0),
+        y_range=(0.0, 4.0),
+    )
+    text = panel_svg(panel)
+    high, wide = (float(value) for value in re.search(r'class="plot".*?', text) and (162.0, 312.0))
+    path = re.search(r'<path d="(M[^"]+)" class="line a"', text).group(1)
+    assert path == f"M0 {high * 0.75:g}M{wide:g} {high * 0.25:g}"  # a gap where a number is none
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_ticks_of_an_axis_are_inside_and_even(log):
+    stream = np.random.default_rng(1)
+    for _ in range(200):
+        values = 10.0 ** stream.uniform(-6, 6) * (np.abs(stream.normal(size=5)) + 1e-3)
+        found = axis([values], 300.0, log)
+        places = found.place(np.array([value for value, _ in found.ticks]))
+        assert ((places >= -1e-6) & (places <= 300.0 + 1e-6)).all()
+        assert 1 <= len(places) <= 12
+        assert (found.place(values) >= 0.0).all() and (found.place(values) <= 300.0).all()
+        if not log and len(places) > 2:
+            assert np.diff(places) == pytest.approx(np.diff(places)[0], rel=1e-6)
+
+
+def test_every_figure_is_drawn_or_says_why_not(good):
+    for name in FIGURES:
+        figure = getattr(good.plot, name)()
+        assert figure.name == name and figure.panels
+        assert figure._repr_svg_().startswith("<svg")
+    with pytest.raises(AttributeError, match="unseen"):
+        good.plot.weather  # noqa: B018
+    with pytest.raises(tl.NotAvailable, match="something to show"):
+        lives.learnt(pendulum_step, 1).plot.unseen()
+
+
+def test_figures_are_saved_for_a_paper(good, tmp_path):
+    pytest.importorskip("vl_convert", reason="twinloop[paper] is not installed")
+    figure = good.plot.errors()
+    for ending, begins in ((".svg", b"<svg"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
+        figure.save(tmp_path / f"errors{ending}")
+        assert (tmp_path / f"errors{ending}").read_bytes().startswith(begins)
+    with pytest.raises(tl.InvalidInput, match=r"\.svg or \.pdf or \.png"):
+        figure.save(tmp_path / "errors.doc")
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def test_a_store_and_a_record_give_the_same_report(good, tmp_path):
+    store, record = tmp_path / "pendulum.db", tmp_path / "pendulum.json"
+    good.save(store, "pendulum")
+    record.write_text(to_text(good.to_record()), encoding="utf-8")
+    pages = []
+    for where in (store, record):
+        output = tmp_path / f"{where.suffix[1:]}.html"
+        answer = run("report", where, "-o", output)
+        assert answer.exit_code == 0, answer.output
+        text = output.read_text(encoding="utf-8")
+        pages.append(text[: text.index('id="again"')])
+    assert pages[0] == pages[1]
+    assert good.report(tmp_path / "own.html", "pendulum")[: len(pages[0])] == pages[0].replace(
+        "a system of your own", "pendulum"
+    )
+
+
+def test_two_campaigns_stand_side_by_side(good, bad, tmp_path):
+    for campaign, name in ((good, "good"), (bad, "bad")):
+        campaign.save(tmp_path / f"{name}.db", name)
+    answer = run("compare", tmp_path / "good.db", tmp_path / "bad.db", "-o", tmp_path / "both.html")
+    assert answer.exit_code == 0, answer.output
+    assert re.search(r"^twin +trust it +do not trust it$", answer.stdout, re.MULTILINE)
+    assert "good against bad" in (tmp_path / "both.html").read_text(encoding="utf-8")
+
+
+def test_what_is_no_campaign_is_refused_in_a_sentence(tmp_path):
+    other, broken = tmp_path / "other.json", tmp_path / "broken.json"
+    other.write_text('{"kind": "test"}')
+    broken.write_text("{" * 5000)
+    for where, words in (
+        (other, "the record of a campaign"),
+        (broken, "expected JSON"),
+        (tmp_path / "none.db", "none.db"),
+    ):
+        answer = run("report", where, "-o", tmp_path / "x.html")
+        assert answer.exit_code == 2 and words in answer.stderr, answer.output
+    assert run("report", other, "-o", tmp_path / "x.pdf").exit_code == 2
+    assert not (tmp_path / "x.html").exists()
