@@ -174,9 +174,8 @@ def test_a_store_and_a_record_give_the_same_report(good, tmp_path):
         text = output.read_text(encoding="utf-8")
         pages.append(text[: text.index('id="again"')])
     assert pages[0] == pages[1]
-    assert good.report(tmp_path / "own.html", "pendulum")[: len(pages[0])] == pages[0].replace(
-        "a system of your own", "pendulum"
-    )
+    own = good.report(tmp_path / "own.html", "pendulum")
+    assert own[: own.index('id="again"')] == pages[0].replace("a system of your own", "pendulum")
 
 
 def test_two_campaigns_stand_side_by_side(good, bad, tmp_path):

@@ -65,7 +65,7 @@ def error_map(
 def _error(twin: Twin, run: Experiment) -> float:
     """Normalised error of a free run over all states, as the campaign counts it."""
     test = run.replayed
-    free = fly(twin.model, test, divergence_factor=twin.divergence_factor).states
+    free = fly(twin.model, test, limits=twin.limits).states
     read = twin.signals.continued(run.trajectory.states, test.initial_state)
     if len(free) < len(read):
         return float("inf")

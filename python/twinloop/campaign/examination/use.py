@@ -107,7 +107,7 @@ def gain_slopes(twin: Twin, setup: Setup, best: Test) -> tuple[GainSlope, ...]:
 
 
 def _quality(twin: Twin, setup: Setup, test: Test) -> float:
-    run = fly(twin.model, test, divergence_factor=twin.divergence_factor)
+    run = fly(twin.model, test, limits=twin.limits)
     return setup.quality.flown(run, test.target_state) if run.steps == test.steps else float("inf")
 
 
