@@ -19,3 +19,13 @@ campaign = tl.Campaign(
 campaign.run(system, experiments=3)
 print(campaign.twin.equations())
 print(campaign.controller.parameters)
+
+# The twin is offered back as an environment, for whoever wants to train something else on it.
+twin = campaign.twin.env(initial_state=[0.3, 0.0], target_state=[0.0, 0.0], steps=40)
+state, _ = twin.reset(seed=0)
+total, over = 0.0, False
+while not over:
+    action = campaign.controller.command(state, [0.0, 0.0])
+    state, reward, terminated, truncated, _ = twin.step(action)
+    total, over = total + reward, terminated or truncated
+print(f"an episode on the twin ends at {state}, with a return of {total:.3g}")

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from twinloop.arrays import Floats, floats, number
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
 from twinloop.law.equations import equations
+from twinloop.law.exports.environment import Reward, environment
 from twinloop.law.exports.export import Source, asked, delivered, exported
 from twinloop.law.flight import fly, fly_commands
 from twinloop.law.law import Law
@@ -329,6 +331,39 @@ class Twin(Recorded, kind="twin"):
         with engine_input():
             following = self.model.step(x, u, past=before)
         return following[0] if single else following
+
+    def env(
+        self,
+        initial_state: ArrayLike,
+        target_state: ArrayLike,
+        steps: int,
+        *,
+        reward: Reward | None = None,
+        noisy: bool = False,
+    ) -> Any:
+        """The twin as an environment of Gymnasium: observations are states, actions are commands, a step is a period.
+
+        An episode begins at the initial state, or at `reset(options={"initial_state": …})`; it is truncated after
+        `steps`, and terminates where the twin diverges. Lags, delays and hidden states act as in `simulate`; sensors
+        that are late or early are read as if they were not. Commands are in their own units, not normalised. Each
+        environment is one of its own.
+
+        Args:
+            initial_state: where an episode begins (n_x,), SI units, radians.
+            target_state: for the reward (n_x,), the same units.
+            steps: of an episode.
+            reward: called with state (n_x,), command (n_u,) and next state (n_x,); by default −dt Σ |next − target| /
+                scale.
+            noisy: whether observations carry the noise of the sensors that the twin estimates.
+
+        Returns:
+            A `gymnasium.Env`.
+
+        Raises:
+            NotAvailable: Gymnasium is not installed.
+            InvalidInput: states or steps that cannot be used.
+        """
+        return environment(self, initial_state, target_state, steps, reward, noisy)
 
     def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
         """The twin around a point, by exact derivatives of its equations.
