@@ -15,7 +15,7 @@ from twinloop.campaign.presets import options_of
 from twinloop.identification.fit.fitting import Fitting
 from twinloop.identification.fit.parts import parts
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.records import Run, guessed_noise
+from twinloop.identification.records import HELD, Run, guessed_noise
 from twinloop.identification.search.structure import all_judged, prices
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
@@ -302,7 +302,7 @@ def test_a_first_guess_of_the_noise_is_its_variance_and_never_nothing():
     states = np.sin(t * [1.0, 2.0]) + stream.normal(size=(2000, 2)) * [0.01, 0.3]
     np.testing.assert_allclose(guessed_noise([Run.of(states, t)], np.ones(2)), [1e-4, 0.09], rtol=0.2)
     still = Run.of(np.zeros((50, 2)), np.zeros((49, 1)))
-    assert guessed_noise([still], np.ones(2)).tolist() == [pytest.approx(1e-14)] * 2
+    assert guessed_noise([still], np.ones(2)).tolist() == [HELD * HELD] * 2
     assert (guessed_noise([Run.of(np.ones((3, 2)), np.ones((2, 1)))], np.ones(2)) > 0.0).all()
 
 

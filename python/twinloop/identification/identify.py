@@ -40,8 +40,8 @@ from twinloop.streams import Unit
 
 LAGS_AGAIN = 4
 """Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
-ROUNDING = 1e-18
-"""That of rounding alone."""
+ROUNDING = 2.0**-50
+"""Share of a reading that rounding takes of it in a step or two: no model follows it more closely."""
 SEATS = 4
 """Of so many members one is of a part of the only run."""
 WHOLE = 0
@@ -348,8 +348,12 @@ class _Learner:
     def _rescaled(self, observer: Sequence[Chain], left: float, readings: int) -> list[Chain]:
         """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
         misfit = left / max(1, readings) if np.isfinite(left) else 1.0
-        factor = max(misfit, ROUNDING if exact(misfit) else 1.0)
-        return [
-            c.with_noise(c.sensors * factor, (c.motion[0] * factor, c.motion[1] * factor, c.motion[2]))
-            for c in observer
-        ]
+        factor = misfit if exact(misfit) else max(misfit, 1.0)
+        sizes = np.max([np.abs(run.states).max(axis=0) for run in self.fitting.runs], axis=0)
+        scaled = []
+        for chain in observer:
+            least = np.square(ROUNDING * sizes[list(chain.states)])
+            sensors = np.where(least > 0.0, np.maximum(chain.sensors * factor, least), chain.sensors)
+            motion = (chain.motion[0] * factor, chain.motion[1] * factor, chain.motion[2])
+            scaled.append(chain.with_noise(sensors, motion))
+        return scaled

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.identification.interpolation import FALLS, FEWEST, integration_error, middles, points, segments
 from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
+
+ORDERS = (3, 4, 5, 6)
+"""Orders of the differences in which noise is looked for."""
+HELD = 2.0**-47
+"""Share of a reading that its rounding may take, with a tenth of it (`BEST_SENSOR`) the rounding of a sum or two."""
+HELD_IN_SQUARES = 2.0**-23
+"""Share of a number of which a tenth is left to see once it stands squared in a sum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +56,22 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Stages:
-    """Inputs of a model at the start, the middle and the end of each period (rows, inputs), all runs in one."""
+    """Inputs of a model at the start, the middle and the end of each period (rows, inputs), all runs in one.
+
+    `left` is the variance, a period, of what integrating through them leaves of what moves each state (n_x,).
+    """
 
     start: Floats
     middle: Floats
     end: Floats
     runs: tuple[slice, ...]
+    left: Floats
 
 
 def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stages:
     """What a model sees within each period: states, effects of commands in units of their scale, hidden states.
 
-    The state in the middle is Hermite's where a state's derivative is another, and the mean elsewhere.
+    The state in the middle is Hermite's where a state's derivative is another.
 
     Args:
         runs: recorded.
@@ -71,14 +84,18 @@ def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stage
     scales = np.array([command.size for command in signals.commands])
     parts: list[tuple[Floats, Floats, Floats]] = []
     slices, first = [], 0
-    for run in runs:
+    all_effects = [actuation.effects(signals, run.commands) for run in runs]
+    between = [segments(effects[0], effects[2]) for effects in all_effects]
+    pieces = [run.smooth[part] for run, rows in zip(runs, between, strict=True) for part in rows]
+    numbers = points(pieces)
+    for run, effects, rows in zip(runs, all_effects, between, strict=True):
         before, after = run.smooth[:-1], run.smooth[1:]
-        middle = 0.5 * (before + after)
+        middle = middles(run.smooth, rows, numbers)
         for i, state in enumerate(signals.states):
             if state.derivative_of is not None:
                 parent = signals.state_names.index(state.derivative_of)
+                middle[:, parent] = 0.5 * (before[:, parent] + after[:, parent])
                 middle[:, parent] += signals.dt / 8.0 * (before[:, i] - after[:, i])
-        effects = actuation.effects(signals, run.commands)
         parts.append(
             tuple(  # type: ignore[arg-type]
                 np.hstack([signals.wrapped(x), e[:, : signals.n_u] / scales, e[:, signals.n_u :]])
@@ -88,11 +105,15 @@ def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stage
         slices.append(slice(first, first + len(before)))
         first += len(before)
     start, middle, end = (np.concatenate(stage) for stage in zip(*parts, strict=True))
-    return Stages(start, middle, end, tuple(slices))
+    noise = guessed_noise(runs, np.array([state.scale for state in signals.states]))
+    return Stages(start, middle, end, tuple(slices), integration_error(pieces, noise))
 
 
 def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:
-    """Variance of each sensor as if all that changes faster than a parabola were noise; a first guess from above.
+    """Variance of each sensor as if all that no polynomial follows were noise; a first guess from above.
+
+    Noise looks the same in differences of any order, once divided by what they multiply it by; motion fades from order
+    to order where it is smooth: as long as it does, the next order is taken.
 
     Args:
         runs: recorded.
@@ -101,11 +122,37 @@ def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:
     Returns:
         Variances (n_x,), never below what rounding leaves.
     """
-    thirds = [np.diff(run.states, n=3, axis=0) for run in runs if len(run.states) > 3]
-    low = (1e-7 * scales) ** 2
-    if not thirds:
-        return low
-    squares = np.sort(np.concatenate(thirds) ** 2, axis=0)
-    # The median of a squared normal number is 0.4549; a third difference has 20 times the variance.
-    guess: Floats = np.maximum(squares[len(squares) // 2] / (0.4549 * 20.0), low)
-    return guess
+    guess = np.full(len(scales), np.inf)
+    for order in ORDERS:
+        differences = [np.diff(run.states, n=order, axis=0) for run in runs if len(run.states) > order]
+        if sum(len(found) for found in differences) < (1 if order == ORDERS[0] else FEWEST):
+            break
+        squares = np.sort(np.concatenate(differences) ** 2, axis=0)
+        # The median of a squared normal number is 0.4549.
+        found = squares[len(squares) // 2] / (0.4549 * math.comb(2 * order, order))
+        guess = np.where(found < FALLS * guess, found, guess)
+    least = rounding(runs, scales)
+    answer: Floats = np.where(np.isfinite(guess), np.maximum(guess, least), least)
+    return answer
+
+
+def rounding(runs: Sequence[Run], scales: Floats) -> Floats:
+    """Variance that readings are taken to have at least about a polynomial: ten deviations of what rounding leaves.
+
+    A number of 53 bits holds 2^-53 of a reading; a sum of squares as much of what moves a state from one reading to the
+    next squared, which is 2^-26 of that move.
+
+    Args:
+        runs: recorded.
+        scales: of the states (n_x,), for states that never left 0.
+
+    Returns:
+        Variances (n_x,), above 0.
+    """
+    moves = np.concatenate([np.diff(run.states, axis=0) for run in runs])
+    moved = np.sqrt(np.square(moves).mean(axis=0)) if len(moves) else np.zeros(len(scales))
+    sizes = np.max([np.abs(run.states).max(axis=0) for run in runs], axis=0)
+    least = np.maximum(moved * HELD_IN_SQUARES, sizes * HELD)
+    deviations = np.where(least > 0.0, least, scales * HELD)
+    variances: Floats = deviations * deviations
+    return variances

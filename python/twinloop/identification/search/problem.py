@@ -112,6 +112,10 @@ class Problem:
         bounds = self.told.bounds.get(chain.states[0], {})
         return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
 
+    def integration(self, chain: Chain) -> float:
+        """Variance, a period, of what integrating terms leaves of what moves a chain's first state."""
+        return float(self.stages.left[chain.states[0]])
+
     def readings(self, chain: Chain) -> int:
         """Readings of a chain that count."""
         return int(sum(run.weights[:, list(chain.states)].sum() for run in self.runs))

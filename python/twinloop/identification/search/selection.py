@@ -93,11 +93,11 @@ class Selection:
         """
         options = self.options
         usable = problem.usable(terms)
-        below = [first_noise(problem, chain, usable, self.scales, options.gusts) for chain in self.driven]
+        below = [first_noise(problem, chain, usable, options.gusts) for chain in self.driven]
         low = self.search(problem, terms, known, below, options.moves, 2)
         if not options.noise_from_above:
             return low, low
-        above = [unexplained(problem, chain, self.scales, options.gusts) for chain in self.driven]
+        above = [unexplained(problem, chain, options.gusts) for chain in self.driven]
         none: list[Sum | None] = [None] * len(self.driven)
         high = self.search(problem, terms, none, above, options.moves, 2)
         return [shortest(both, lambda found: found.energy) for both in zip(low, high, strict=True)], high
@@ -125,7 +125,7 @@ class Selection:
             seeds += [node for found in best for node in found.weights]
             for _ in range(options.restarts):
                 best = evolve(
-                    problem, best, seeds, self.scales,
+                    problem, best, seeds,
                     operators=options.operators, generations=options.generations,
                     population=options.population, longest=options.longest, moves=options.moves // 4,
                     largest=options.largest, unit=self._next(),
@@ -147,7 +147,7 @@ class Selection:
     ) -> list[Sum]:
         """One search among some terms, as `structure.search`; the next one of this selection, or a unit of its own."""
         return search(
-            problem, driven, terms, known, self.scales,
+            problem, driven, terms, known,
             moves=moves, starts=starts, largest=self.options.largest,
             unit=self._next() if unit is None else unit, purpose=purpose, fixed_noise=fixed_noise,
         )  # fmt: skip

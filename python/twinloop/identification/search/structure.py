@@ -86,7 +86,6 @@ def search(
     chains: Sequence[Chain],
     terms: Sequence[int],
     known: Sequence[Sum | None],
-    scales: Floats,
     *,
     moves: int,
     starts: int,
@@ -104,7 +103,6 @@ def search(
         chains: with the noise to begin with.
         terms: to choose from.
         known: for each chain a sum that is already known, or None; the answer is never worse.
-        scales: of all states (n_x,).
         moves: of each walk.
         starts: walks for each chain.
         largest: number of terms at most.
@@ -148,8 +146,8 @@ def search(
         noisy, changed = current, False
         if not fixed_noise:
             used = [len(judged[0][0]) for judged in subsets]
-            noisy = _noisy(problem, regressions, coefficients, current, used, scales)
-            changed = any(_differ(*pair, scales, problem.dt) for pair in zip(noisy, current, strict=True))
+            noisy = _noisy(problem, regressions, coefficients, current, used)
+            changed = any(_differ(*pair, problem) for pair in zip(noisy, current, strict=True))
         best = []
         for i, (judged, chain) in enumerate(zip(subsets, noisy, strict=True)):
             subset, energy, weights = judged[0]
@@ -272,11 +270,16 @@ def _noisy(
     coefficients: Sequence[Floats],
     chains: Sequence[Chain],
     used: Sequence[int],
-    scales: Floats,
 ) -> list[Chain]:
     """The chains with the noise under which what is left is most likely, and the freedom that was used given back."""
     posed = [
-        (regression, found, chain.sensors, chain.motion, *floor_of(chain, scales, problem.dt))
+        (
+            regression,
+            found,
+            chain.sensors,
+            chain.motion,
+            *floor_of(chain, problem.dt, problem.integration(chain)),
+        )
         for regression, found, chain in zip(regressions, coefficients, chains, strict=True)
     ]
     with engine_input():
@@ -288,9 +291,9 @@ def _noisy(
     return noisy
 
 
-def _differ(new: Chain, old: Chain, scales: Floats, dt: float) -> bool:
+def _differ(new: Chain, old: Chain, problem: Problem) -> bool:
     """Whether a chain's noise is so much another one that its terms may be."""
-    _, slow = floor_of(old, scales, dt)
+    _, slow = floor_of(old, problem.dt, problem.integration(old))
     moved = (abs(log((new.motion[i] + slow[i]) / (old.motion[i] + slow[i]))) > 1.0 for i in range(2))
     return bool(np.any(np.abs(log(new.sensors / old.sensors)) > 0.3)) or any(moved)
 

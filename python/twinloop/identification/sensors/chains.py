@@ -26,7 +26,7 @@ class Chain(Recorded, kind="chain"):
             rigid body).
         integrated: whether the output is a derivative, not an increment.
         sensors: variance of each state's sensor, in its unit squared.
-        rough: variance of each state's readings about a parabola through neighbours: the sensor's or more.
+        rough: variance of each state's readings about a polynomial through neighbours: the sensor's or more.
         motion: variance of a white disturbance per second (per period for increments), variance of a lasting one such
             as gusts, and the time in s after which that is forgotten to 1/e.
     """

@@ -78,36 +78,42 @@ def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chai
     most = OUTLYING * float(np.median(np.abs(np.concatenate(residuals))))
     clipped = [np.clip(residual, -most, most) for residual in residuals]
     products = np.concatenate([residual[1:] * residual[:-1] for residual in clipped])
-    least = 1e-7 * signals.states[angle].scale
-    sensors = np.array([max(least * least, min(-float(products.mean()), float(chain.rough[0])))])
+    rough = float(chain.rough[0])
+    found = min(-float(products.mean()), rough)
+    sensors = np.array([max(BEST_SENSOR * BEST_SENSOR * rough, found)])
     return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
 
 
-def floor_of(chain: Chain, scales: Floats, dt: float) -> tuple[Floats, Motion]:
+def floor_of(chain: Chain, dt: float, integration: float = 0.0) -> tuple[Floats, Motion]:
     """Variances below which noise is not believed: rounding and integration leave that much.
 
     Disturbances could explain every reading exactly. Sensors are therefore never taken to be much better than their
-    own roughness says, which is all noise of theirs or less.
+    own roughness says, which is all noise of theirs or less, and never below rounding.
+
+    Args:
+        chain: of states.
+        dt: period, s.
+        integration: variance, a period, of what integrating terms leaves of what moves the first state.
     """
-    sensors = np.maximum((1e-7 * scales[list(chain.states)]) ** 2, BEST_SENSOR * BEST_SENSOR * chain.rough)
+    sensors = BEST_SENSOR * BEST_SENSOR * chain.rough
     period = dt if chain.integrated else 1.0
-    return sensors, (1e-9 * float(sensors[0]) / period, 1e-9 * float(sensors[0]) / (period * period), dt)
+    white = 1e-9 * float(sensors[0]) + (integration if chain.integrated else 0.0)
+    return sensors, (white / period, 1e-9 * float(sensors[0]) / (period * period), dt)
 
 
-def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = True) -> Chain:
+def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:
     """The noise from above: what would have to disturb the motion if no term drove the chain.
 
     Args:
         problem: of the chain.
         chain: with a first guess of its sensors' noise.
-        scales: of all states (n_x,).
         gusts: whether disturbances may last.
 
     Returns:
         The chain with that noise.
     """
     regression = problem.regression(chain, problem.usable([problem.pool.one]))
-    low, slow = floor_of(chain, scales, problem.dt)
+    low, slow = floor_of(chain, problem.dt, problem.integration(chain))
     # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
     begun = [_begun(chain, low, slow, problem.dt, size) for size in (GUSTS if gusts else (0.0,))]
     with engine_input():
@@ -118,23 +124,20 @@ def unexplained(problem: Problem, chain: Chain, scales: Floats, gusts: bool = Tr
     return chain.with_noise(sensors, motion)
 
 
-def first_noise(
-    problem: Problem, chain: Chain, terms: Sequence[int], scales: Floats, gusts: bool = True
-) -> Chain:
+def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: bool = True) -> Chain:
     """The noise that a fit of all terms leaves, with the freedom that it used up given back.
 
     Args:
         problem: of the chain.
         chain: with a first guess of its sensors' noise.
         terms: usable ones.
-        scales: of all states (n_x,).
         gusts: whether disturbances may last.
 
     Returns:
         The chain with its noise estimated.
     """
     regression = problem.regression(chain, terms)
-    low, slow = floor_of(chain, scales, problem.dt)
+    low, slow = floor_of(chain, problem.dt, problem.integration(chain))
     sensors, motion = _begun(chain, low, slow, problem.dt, GUST if gusts else 0.0)
     readings = problem.readings(chain)
     for _ in range(2):

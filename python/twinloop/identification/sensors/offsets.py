@@ -163,7 +163,7 @@ class _Group:
         """The chains with the noise under which that is most likely."""
         dt, problems = self.signals.dt, []
         for chain, regression in zip(self.chains, self._regressions(size, self.chains), strict=True):
-            low, slow = floor_of(chain, self.scales, dt)
+            low, slow = floor_of(chain, dt)
             first = float(chain.rough[0])
             gust = 0.0 if chain.output is None else max(first / (dt * dt), slow[1])
             start = (max(first / dt, slow[0]), gust, 10.0 * dt)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from twinloop import _core
-from twinloop.arrays import Floats
 from twinloop.elementary import log
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
@@ -28,7 +27,6 @@ def evolve(
     problem: Problem,
     known: Sequence[Sum],
     terms: Sequence[int],
-    scales: Floats,
     *,
     operators: Sequence[str],
     generations: int,
@@ -44,7 +42,6 @@ def evolve(
         problem: of all chains.
         known: the best sum of each chain so far, with the noise to begin with.
         terms: the nodes to begin with.
-        scales: of all states (n_x,).
         operators: that new nodes may use.
         generations: how often new nodes are drawn.
         population: nodes that are judged at once.
@@ -79,7 +76,7 @@ def evolve(
         ]
         usable = problem.usable([*candidates, *(node for whole in wholes for node in whole)])
         best = search(
-            problem, [found.chain for found in best], usable, best, scales,
+            problem, [found.chain for found in best], usable, best,
             moves=moves, starts=2, largest=largest, unit=unit.part(generation),
             favoured=favoured, forbidden=[set(whole) for whole in wholes],
             fixed_noise=generation % 4 != 0 and generation != generations - 1,
