@@ -2,5 +2,6 @@
 
 from twinloop.autopilots.files import Autopilot
 from twinloop.autopilots.parameters import Parameter
+from twinloop.autopilots.sweep import Sweep
 
-__all__ = ["Autopilot", "Parameter"]
+__all__ = ["Autopilot", "Parameter", "Sweep"]

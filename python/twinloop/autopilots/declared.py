@@ -1,4 +1,4 @@
-"""What a user declares of an autopilot in a campaign file: its kind, and what it calls each gain."""
+"""What a user declares of an autopilot in a campaign file: its kind, and what it calls each gain; its sweep."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Any
 
 from twinloop.autopilots.files import EVERY_NODE, Autopilot
 from twinloop.autopilots.parameters import Parameter
+from twinloop.autopilots.sweep import Sweep
 from twinloop.errors import InvalidInput, unknown
 
-KEYS = ("kind", "node", "parameters")
+KEYS = ("kind", "node", "parameters", "sweep")
 
 
 @dataclass(frozen=True)
@@ -22,11 +23,13 @@ class Declared:
         kind: of its files; None: to be chosen.
         parameters: of each gain by its name; None for a gain that it has not got.
         node: of ROS 2.
+        sweep: that excites a test, where it makes chirps by itself.
     """
 
     kind: str | None
     parameters: Mapping[str, Parameter | None]
     node: str = EVERY_NODE
+    sweep: Sweep | None = None
 
     def autopilot(self, kind: str) -> Autopilot:
         """The autopilot.
@@ -60,7 +63,16 @@ def declared(table: object, where: str) -> Declared:
         raise InvalidInput(
             f"{where}, [autopilot]: expected kind and node as texts, found {kind!r} and {node!r}."
         )
-    return Declared(kind, parameters, node)
+    sweep = None
+    if "sweep" in found:
+        place = f"{where}, [autopilot.sweep]"
+        names = [field.name for field in dataclasses.fields(Sweep)]
+        table = _table(found["sweep"], place, names)
+        missing = [name for name in names[:6] if name not in table]
+        if missing:
+            raise InvalidInput(f"{place}: expected {', '.join(missing)}, found none; add them.")
+        sweep = Sweep(**table)
+    return Declared(kind, parameters, node, sweep)
 
 
 def _parameter(value: object, where: str) -> Parameter:

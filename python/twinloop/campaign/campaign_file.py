@@ -80,6 +80,7 @@ duration = 1.0                   # of a test, s
 # [autopilot.parameters]         # parameter = scale * gain + offset
 # "angle.kp" = {{ name = "MC_ROLLRATE_P", scale = 0.1, limits = [0.01, 0.5] }}
 # "angle.ki" = false             # a gain that it has not got
+# [autopilot.sweep]              # that it makes by itself: command, axis, amplitude, first and last (Hz), duration (s)
 
 [campaign]
 preset = "default"               # or "paper"

@@ -106,7 +106,7 @@ def tell(store: Path, test: int, flight: Path | None, failed: str | None, aborte
             "twinloop tell: expected a flight, found none; name its file, or say --failed REASON."
         )
     with closing(_campaign(store)) as campaign:
-        known = _numbered(campaign, test)
+        known = numbered(campaign, test)
         ended = "completed" if aborted is None and failed is None else "aborted"
         run = (
             None
@@ -144,7 +144,7 @@ def attach(store: Path, flight: Path) -> None:
 def abandon(store: Path, test: int) -> None:
     """Say that a TEST will not be flown."""
     with closing(_campaign(store)) as campaign:
-        campaign.abandon(_numbered(campaign, test))
+        campaign.abandon(numbered(campaign, test))
         click.echo(f"Kept: test {test} abandoned in {store}.")
 
 
@@ -170,7 +170,16 @@ def _first(store: Path) -> dict[str, float]:
     return dict(read_file(file).first)
 
 
-def _numbered(campaign: Campaign, number: int) -> Test:
+def numbered(campaign: Campaign, number: int) -> Test:
+    """A test of a campaign.
+
+    Args:
+        campaign: that it was made in.
+        number: of the test.
+
+    Raises:
+        InvalidInput: no such test.
+    """
     if not 0 <= number < len(campaign.tests):
         last = len(campaign.tests) - 1
         raise InvalidInput(f"Test: expected a number from 0 to {last}, found {number}; ask for one first.")

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from twinloop.autopilots import Autopilot
+from twinloop.autopilots.declared import Declared
 from twinloop.autopilots.files import FORMATS
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_autopilot
@@ -49,7 +50,7 @@ def certify(
         raise InvalidInput(
             f"Store {store}: expected a store with a campaign, found no file; run with --store."
         )
-    autopilot = _autopilot(store, kind, mapping)
+    _, autopilot = declared_for(store, kind, mapping)
     campaign = Campaign.load(store, name, read_only=True)
     found = campaign.certificate()
     texts = _parameter_files(found, autopilot)
@@ -73,18 +74,30 @@ def certify(
     context.exit(1)
 
 
-def _autopilot(store: Path, kind: str | None, mapping: Path | None) -> Autopilot | None:
+def declared_for(
+    store: Path, kind: str | None, mapping: Path | None
+) -> tuple[Declared | None, Autopilot | None]:
+    """What is declared of an autopilot for a campaign, and the autopilot if one was chosen.
+
+    Args:
+        store: of the campaign.
+        kind: that was asked for; None: the one that is declared, if any is.
+        mapping: file of the declaration; None: the campaign file beside the store.
+
+    Raises:
+        InvalidInput: a declaration that cannot be used, or none where a kind was asked for.
+    """
     file = store.with_suffix(".toml") if mapping is None else mapping
     declared = read_autopilot(file) if file.exists() or mapping is not None else None
     chosen = kind if kind is not None or declared is None else declared.kind
     if declared is not None and chosen is not None:
-        return declared.autopilot(chosen)
+        return declared, declared.autopilot(chosen)
     if kind is not None:
         raise InvalidInput(
-            f"twinloop certify --autopilot: expected a section [autopilot.parameters] in {file}, found none; declare"
-            " there what it calls each gain."
+            f"--autopilot: expected a section [autopilot.parameters] in {file}, found none; declare there what it calls"
+            " each gain."
         )
-    return None
+    return declared, None
 
 
 def _parameter_files(found: Certificate, autopilot: Autopilot | None) -> dict[str, tuple[str, str]]:

@@ -23,6 +23,7 @@ from twinloop.faces.console import Watch
 from twinloop.faces.exporting import export
 from twinloop.faces.from_file import run_file
 from twinloop.faces.report.command import compare, report
+from twinloop.faces.settings import settings
 from twinloop.faces.stored import resume, show
 from twinloop.faces.terminal import prepared
 from twinloop.faces.working import answers, check_answer, work
@@ -183,6 +184,7 @@ main.add_command(report)
 main.add_command(compare)
 main.add_command(export)
 main.add_command(certify)
+main.add_command(settings)
 
 
 def _refuse_beside_a_file(context: click.Context) -> None:

@@ -1,0 +1,91 @@
+"""`twinloop settings`: a test as an autopilot takes it: its gains, its commands over time, its chirp."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.autopilots.files import FORMATS
+from twinloop.autopilots.sweep import AXES
+from twinloop.campaign import Campaign
+from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.by_hand import numbered
+from twinloop.faces.certifying import declared_for
+from twinloop.faces.files import write_text
+from twinloop.logs import TIME, write_columns
+from twinloop.test import Test
+
+
+@click.command()
+@click.argument("store", type=Path)
+@click.argument("test", type=int)
+@click.option(
+    "-o", "--output", type=Path, required=True, metavar="FOLDER", help="Where to write; made if need be."
+)
+@click.option("--autopilot", "kind", help=f"Write parameter files for {', '.join(FORMATS)}.")
+@click.option(
+    "--mapping",
+    type=Path,
+    metavar="FILE.toml",
+    help="What it calls the gains, and its sweep; by default STORE.toml, [autopilot].",
+)
+@click.option("--name", help="Of the campaign, where the store holds several.")
+def settings(
+    store: Path, test: int, output: Path, kind: str | None, mapping: Path | None, name: str | None
+) -> None:
+    """Write a TEST of STORE as settings: gains, commands over time and, where it can be, a chirp.
+
+    Writes test-N-commands.csv into FOLDER and, with --autopilot, first restore.* with the gains of the first test, then
+    test-N.* with those of this one, and test-N-sweep.* where its excitation is the declared sweep of ArduPilot or
+    Betaflight; where it is not, a sentence says why.
+    """
+    if not store.exists():
+        raise InvalidInput(
+            f"Store {store}: expected a store with a campaign, found no file; twinloop ask {store}."
+        )
+    declared, autopilot = declared_for(store, kind, mapping)
+    campaign = Campaign.load(store, name, read_only=True)
+    asked = numbered(campaign, test)
+    texts: dict[str, str] = {}
+    said = ""
+    if autopilot is not None and declared is not None:
+        old = campaign.tests[0].parameters
+        texts[f"restore{autopilot.suffix}"] = autopilot.text(old, "The gains of test 0: load to go back.")
+        texts[f"test-{test}{autopilot.suffix}"] = autopilot.text(
+            asked.parameters, f"The gains of test {test}."
+        )
+        if declared.sweep is not None and autopilot.kind in AXES:
+            try:
+                texts[f"test-{test}-sweep{autopilot.suffix}"] = declared.sweep.settings(autopilot.kind, asked)
+            except NotAvailable as reason:
+                said = str(reason)
+        elif asked.excitation is not None:
+            said = (
+                f"Chirp settings: expected [autopilot.sweep] and one of {', '.join(AXES)}, which sweep one axis by"
+                " themselves; send the table of commands."
+            )
+    columns = _columns(campaign, asked)
+    output.mkdir(parents=True, exist_ok=True)
+    for file, text in texts.items():
+        write_text(output / file, text)
+    table = output / f"test-{test}-commands.csv"
+    write_columns(table, columns)
+    click.echo(
+        f"Wrote {', '.join(str(output / file) for file in [*texts, table.name])}."
+        + (f" {said}" if said else "")
+    )
+
+
+def _columns(campaign: Campaign, test: Test) -> dict[str, Floats]:
+    """A row a period: what is added to the commands and, where there is a twin, what they will be on it."""
+    signals = campaign.signals
+    columns = {TIME: signals.dt * np.arange(test.steps, dtype=np.float64)}
+    added = np.zeros((test.steps, signals.n_u)) if test.excitation is None else test.excitation
+    columns |= {f"excitation_{name}": added[:, i] for i, name in enumerate(signals.command_names)}
+    if campaign.experiments:
+        sent = campaign.twin.simulate(test).commands
+        columns |= {f"predicted_{name}": sent[:, i] for i, name in enumerate(signals.command_names)}
+    return columns
