@@ -429,6 +429,15 @@ def test_a_stored_campaign_is_taken_away_from_the_command_line(tmp_path, new_cam
     assert done.returncode == 0 and done.stdout == twin.export("latex")
 
 
+def test_a_campaign_whose_twin_fails_a_check_exports_it_only_by_force(new_campaign, pendulum):
+    campaign = new_campaign()
+    campaign.run(pendulum, experiments=1)
+    assert not campaign.checks().twin_passed
+    with pytest.raises(NotAvailable, match=r"holds its checks, found: .*Fly one more"):
+        campaign.export_twin("python")
+    assert "def simulate(" in campaign.export_twin("python", force=True)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

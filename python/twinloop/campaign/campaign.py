@@ -438,6 +438,32 @@ class Campaign(Lasting, kind="campaign"):
         loops, names = loops_around(self.twin, self.setup, genes, broken_at)
         return margins_of(loops, names, broken_at)
 
+    def export_twin(
+        self, to: str | Path, *, kind: str | None = None, precision: str = "double", force: bool = False
+    ) -> str | tuple[Path, ...]:
+        """The twin for use elsewhere: `twin.export`, refused where a check of the twin that binds fails.
+
+        Args:
+            to: a kind, or the path of a file with the suffix of one.
+            kind: of the file where its suffix does not say it.
+            precision: of C, "double" or "float".
+            force: also a twin that fails a check, and without comparing what is made.
+
+        Returns:
+            The text where a kind was asked for, else the paths that were written.
+
+        Raises:
+            InvalidInput: no such kind, or a path that cannot be written.
+            NotAvailable: the twin fails a check, or the export could not be checked on its flights.
+        """
+        failed = [] if force else [check for check in self.checks().failed if check.subject == "twin"]
+        if failed:
+            raise NotAvailable(
+                f"Export: expected a twin that holds its checks, found: {' '.join(map(str, failed))} Learn from more"
+                " tests, or pass force=True (--force)."
+            )
+        return self.twin.export(to, kind=kind, precision=precision, force=force)
+
     def export_controller(
         self,
         to: str | Path,

@@ -23,7 +23,7 @@ WHAT = ("twin", "controller")
 @click.option("--name", help="Of the campaign, where the store holds several.")
 @click.option("--precision", default="double", show_default=True, help=f"Of C: {' or '.join(PRECISIONS)}.")
 @click.option(
-    "--force", is_flag=True, help="Also a twin that does not follow its flights, and without the check."
+    "--force", is_flag=True, help="Also a twin that fails its checks, and without comparing what is made."
 )
 def export(
     source: Path,
@@ -50,8 +50,12 @@ def export(
         )
     to: str | Path = output if output is not None else str(kind)
     if what == "twin":
-        twin = load_twin(source) if source.suffix == ".json" else _campaign(source, name).twin
-        made = twin.export(to, kind=kind if output is not None else None, precision=precision, force=force)
+        of_file = kind if output is not None else None
+        if source.suffix == ".json":
+            made = load_twin(source).export(to, kind=of_file, precision=precision, force=force)
+        else:
+            held = _campaign(source, name)
+            made = held.export_twin(to, kind=of_file, precision=precision, force=force)
     else:
         if source.suffix == ".json":
             raise InvalidInput(

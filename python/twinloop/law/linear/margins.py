@@ -19,6 +19,8 @@ FREQUENCIES = 4000
 """Frequencies at which a loop is looked at, in equal ratios."""
 SLOWEST = 1e-5
 """Lowest of them, as a share of half the frequency of the periods."""
+TINY = 1e-300
+"""In place of the gain of a loop that no command goes round, for its logarithm."""
 HALVINGS = 60
 """Times that an interval with a crossing is halved."""
 
@@ -120,7 +122,8 @@ class Loops:
         half = math.pi / self.dt
         frequencies = np.geomspace(SLOWEST * half, half * (1.0 - 1e-9), FREQUENCIES)
         values = self.response(loop, frequencies)
-        crossings = self._crossings(loop, frequencies, np.log(np.abs(values)), lambda v: math.log(abs(v)))
+        sizes = np.log(np.maximum(np.abs(values), TINY))
+        crossings = self._crossings(loop, frequencies, sizes, lambda v: math.log(max(abs(v), TINY)))
         turns = self._crossings(loop, frequencies, values.imag, lambda v: float(v.imag))
         at = self.response(loop, np.array(crossings)) if crossings else np.zeros(0, complex)
         lost = np.mod(np.angle(at) + math.pi, 2.0 * math.pi)
