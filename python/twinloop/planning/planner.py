@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
-from twinloop.elementary import log, power
+from twinloop.elementary import log
 from twinloop.flights import disagreements
 from twinloop.limits import Limits
 from twinloop.planning.candidates import Candidates, candidates
@@ -20,6 +20,7 @@ from twinloop.planning.gains import nearby, tune_gains
 from twinloop.planning.judging import Committee, Judge, Judged, Task, expected, risk
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
+from twinloop.planning.worth import apart, gain, limit
 from twinloop.streams import Purpose
 
 Flags = NDArray[np.bool_]
@@ -28,6 +29,8 @@ TRIED = 128
 """Candidates at most that are flown under noise before the safest one is taken."""
 TOGETHER = 4
 """Of them at once."""
+ANYWHERE = 64
+"""Flights by which it is asked how much of the twin is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +41,15 @@ class Flown:
         best: genes of the best flight; those tuned where no test was flown.
         kept: whether they are known to fly: to the end, and inside the envelope.
         usages: largest usage of the envelope in each flight.
-        first_quality: of the first controller, as flown or predicted; infinite where it left the envelope: a flight
-            that keeps it may then be worse.
+        good: quality of the best flight that kept the envelope; infinite where none has: one that keeps it may then be
+            worse.
         failed: genes of tests that failed on the system, or were cut.
     """
 
     best: Floats
     kept: bool
     usages: Sequence[float]
-    first_quality: float
+    good: float
     failed: Sequence[Floats] = ()
 
 
@@ -219,15 +222,13 @@ class Planner(Judge):
         )
         possible = self._possible(drafts, flown)
         keeps = possible & (quiet.worst_usage <= self._reach(goal, flown.usages))
-        scatter = 0.0 if goal == "model" else self._scatter(committee, tuned)
-        promised = float(quiet.mean[0])
-        first = flown.first_quality if np.isfinite(flown.first_quality) else 2.0 * promised
-        limit = self._limit(promised, goal, len(flown.usages), first, scatter)
-        wanted: list[int] = []
-        if committee.trusted:
-            allowed, better = keeps & (quiet.mean <= limit), keeps & (quiet.mean <= first)
-            wanted = [0] if exploit and allowed[0] else []
-            wanted += [*_first(allowed, -tells), *_first(better, quiet.mean)]
+        choices, promised = quiet.qualities.mean(axis=1)[:, keeps], float(quiet.mean[0])
+        scatter, by_noise = (0.0, 0.0) if goal == "model" else self._noise_of(members, committee.sds, tuned)
+        most = self._most(promised, flown.good, goal)
+        worst = most
+        if goal != "model":
+            unknown = self._unknown(members, number) if goal == "both" else 0.0
+            worst = limit(promised, flown.good, gain(choices), unknown, scatter, self.options)
 
         def noisy(chosen: list[int]) -> Judged:
             some = drafts.some(chosen)
@@ -241,7 +242,17 @@ class Planner(Judge):
                 measured=True,
             )
 
-        found = _first_that_lasts(wanted, noisy, max(limit, flown.first_quality + 2.0 * scatter))
+        found = None
+        if committee.trusted:
+            allowed = keeps & (quiet.mean <= worst)
+            wanted = [0] if exploit and allowed[0] else []
+            wanted += _first(allowed, -tells)
+            found = _first_that_lasts(wanted, noisy, worst + by_noise + 2.0 * scatter)
+            if found is None:
+                # None that tells much lasts under noise: the one that promises most, if it is no worse than was flown.
+                found = _first_that_lasts(
+                    _first(keeps & (quiet.mean <= most), quiet.mean), noisy, most + 2.0 * scatter
+                )
         if found is None:
             # What was flown and kept the envelope will again, whatever the members make of it.
             likely = possible & (np.arange(len(possible)) >= drafts.repeats) if flown.kept else possible
@@ -263,7 +274,7 @@ class Planner(Judge):
             risk=risk(flights.usages),
             safe=safe,
             disagreement=disagreement,
-            gain=_gain(quiet.qualities.mean(axis=1)[:, keeps]),
+            gain=gain(choices),
             reason=self._reason(
                 committee.trusted,
                 exploit and chosen == 0,
@@ -294,22 +305,27 @@ class Planner(Judge):
         far = max(min(options.reach_far, options.reach_growth * first), options.reach_least, most)
         return min(1.0 - options.margin, far if goal == "model" else near)
 
-    def _scatter(self, committee: Committee, tuned: Floats) -> float:
-        """How far the quality of one flight is from that of the next, by the sensors' noise alone."""
-        flights = self.judge(committee.members[:1], tuned[np.newaxis], committee.sds, self.options.draws)
-        return flights.scatter if np.isfinite(flights.qualities).all() else 0.0
+    def _unknown(self, members: Sequence[_core.Model], number: int) -> float:
+        """How far members are apart about flights of the task under gains from anywhere in their box, as a share."""
+        stream = self.unit.part(number, 1).stream("candidates")
+        genes = self.family.from_unit(stream.uniforms(ANYWHERE, self.family.size))
+        return apart(self.judge(members, genes, np.zeros(self.signals.n_x), 1).qualities[:, 0])
 
-    def _limit(self, tuned: float, goal: str, told: int, first: float, scatter: float) -> float:
-        """Predicted quality that a test may have at most."""
-        if goal == "model":
-            return max(first, 2.0 * tuned)
-        if not np.isfinite(tuned):
-            return first + scatter
-        given = power(self.options.share, max(1, told)) * max(0.0, first - tuned)
-        # What is lost in the scatter of the flights costs nothing.
-        given = 0.1 * given if goal == "control" else max(scatter, given)
-        # Where the tuned gains promise less than the first ones gave, the committee knows too little to lead anywhere.
-        return min(tuned + given, first + scatter)
+    def _noise_of(self, members: Sequence[_core.Model], sds: Floats, tuned: Floats) -> tuple[float, float]:
+        """Of the tuned flight: how far its quality is from that of the next, and what noise adds to a measurement."""
+        genes, draws = tuned[np.newaxis], self.options.draws
+        true, measured = (self.judge(members, genes, sds, draws, measured=how) for how in (False, True))
+        if not np.isfinite(true.qualities).all():
+            return 0.0, 0.0
+        quiet = self.judge(members, genes, sds, 1)
+        scatter = float(true.qualities[0].std())
+        return scatter, max(0.0, float(measured.mean[0] - quiet.mean[0]))
+
+    def _most(self, promised: float, good: float, goal: str) -> float:
+        """Predicted quality that any flight may have at most; one for the model may cost as much again."""
+        # Where no flight has kept the envelope, one that does may be worse than what is promised.
+        most = (1.0 + self.options.worse) * good if np.isfinite(good) else 2.0 * promised
+        return max(most, 2.0 * promised) if goal == "model" else most
 
     def _smallest(self) -> Floats:
         """Differences below this are rounding (n_x,)."""
@@ -369,10 +385,3 @@ def _first_that_lasts(
             i = int(lasts[0])
             return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])
     return None
-
-
-def _gain(choices: Floats) -> float:
-    """What knowing the right member would bring (members, K): each one's own best against the best for all of them."""
-    if not choices.size:
-        return 0.0
-    return max(0.0, float(choices.mean(axis=0).min() - choices.min(axis=1).mean()))

@@ -22,8 +22,10 @@ class PlanningOptions:
         target_range: how far from the campaign's target a test may lead, likewise.
         candidates: flights that are compared for each proposal.
         nearness: standard deviation of the candidates' gains around the tuned ones, in ranges of the gains.
-        share: of the way from the tuned quality back to the first controller's that a test may give up to be told
-            more, after the first flight; it is multiplied by itself with every further one.
+        worse: share by which a test may be predicted to be worse than the tuned gains, and than the best flight so
+            far, to be told more.
+        accuracy: share of a quality to which the twin is asked to know it: as far as members are further apart about
+            flights, being told more is worth as much of the quality. Not with the goal "control".
         draws: of sensor noise under which a flight is judged.
         margin: share of the envelope that a proposal keeps free on every member of the committee.
         reach_first: usage of the envelope that a proposal may always have.
@@ -49,7 +51,8 @@ class PlanningOptions:
     target_range: tuple[float, ...] = ()
     candidates: int = 1024
     nearness: float = 0.1
-    share: float = 0.15
+    worse: float = 0.05
+    accuracy: float = 0.01
     draws: int = 16
     margin: float = 0.1
     reach_first: float = 0.7

@@ -223,7 +223,7 @@ class IdentifyAndPlan:
                 tuned if best is None else best.genes,
                 best is not None and book.flies(best.number),
                 [run.usage for run in book.experiments],
-                self._first_quality(book),
+                self._good(book, best),
                 book.unfit(),
             ),
             self.setup.goal,
@@ -425,18 +425,12 @@ class IdentifyAndPlan:
         except (NotAvailable, InvalidInput):
             return []
 
-    def _first_quality(self, book: Logbook) -> float:
-        """Of the first controller, as flown or predicted; infinite where it left the envelope."""
-        first = book.first_flown()
-        if first is None or first.test is None or not book.flies(first.test.number):
+    def _good(self, book: Logbook, best: Test | None) -> float:
+        """Quality of the best test flown for the campaign's own task inside the envelope; infinite where none was."""
+        if best is None or not (book.flies(best.number) and book.on_task(best)):
             return float("inf")
-        measured = book.measured(first.test.number)
-        if measured is not None:
-            return measured
-        committee = self._committee()
-        return float(
-            self.planner.judge(committee.members[:1], first.test.genes[np.newaxis], committee.sds, 1).mean[0]
-        )
+        measured = book.measured(best.number)
+        return float("inf") if measured is None else measured
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
