@@ -5,10 +5,12 @@ from twinloop._core import __version__
 from twinloop.campaign import Campaign
 from twinloop.errors import (
     InvalidInput,
+    NoAnswer,
     NotAvailable,
     RemarkWarning,
     StoreFailure,
     SystemFailure,
+    TooRisky,
     TwinloopError,
 )
 from twinloop.law.twin import Twin, load_twin
@@ -23,6 +25,7 @@ __all__ = [
     "Campaign",
     "Command",
     "InvalidInput",
+    "NoAnswer",
     "NotAvailable",
     "Remark",
     "RemarkWarning",
@@ -33,6 +36,7 @@ __all__ = [
     "System",
     "SystemFailure",
     "Test",
+    "TooRisky",
     "Trajectory",
     "Twin",
     "TwinloopError",

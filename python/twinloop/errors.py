@@ -26,6 +26,14 @@ class SystemFailure(TwinloopError, RuntimeError):
     """The system under test raised, or answered with something that is no next state."""
 
 
+class NoAnswer(SystemFailure):
+    """The system has not answered a test that still waits for it: what hangs, or a log that is not there yet."""
+
+
+class TooRisky(TwinloopError, RuntimeError):
+    """A test that was asked for is riskier than what was allowed; it waits and was not flown."""
+
+
 class StoreFailure(TwinloopError, RuntimeError):
     """A store cannot be read or written now; what it held before it holds still."""
 

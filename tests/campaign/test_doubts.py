@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop.campaign.identify_and_plan.diagnostics import distinct, doubts
+from conftest import PENDULUM_GAINS
+from twinloop.campaign.identify_and_plan.diagnostics import distinct, doubts, other_commands
+from twinloop.campaign.identify_and_plan.following import unexplained
 
 DT, STEPS = 0.02, 200
 SIGNALS = tl.Signals(
@@ -75,3 +77,45 @@ def test_runs_that_were_all_cut_and_a_twin_that_does_not_follow_are_told():
     assert "No run was complete" in said(flown(cut=True))[0]
     assert said(flown(cut=True), flown(1)) == []
     assert "does not follow" in said(flown(), follows=False)[0]
+
+
+def test_where_the_records_show_no_wrong_sign_none_is_looked_for():
+    (sentence,) = said(flown(), flown(1), follows=False)
+    assert "check the signs" not in sentence and "contact" in sentence
+    wrong = said(flown(change=lambda x: x * [1.0, -1.0, 1.0]), follows=False)
+    assert "check their units and signs" in wrong[0] and "contact" not in wrong[1]
+
+
+def remarked(*runs, **found):
+    return [(remark.code, remark.serious) for remark in doubts(runs, SIGNALS, True, STEPS, **found)]
+
+
+def test_a_free_run_that_noise_does_not_explain_is_a_serious_remark():
+    assert remarked(flown(), missed=[0.0]) == []
+    assert remarked(flown(), missed=[4.5]) == [("free-run", True)]
+    assert remarked(flown(), flown(1), missed=[0.0, np.inf]) == [("free-run", True)]
+    assert remarked(flown(), others=[3]) == [("other-commands", True)]
+
+
+def test_what_noise_and_disturbances_explain_is_held_against_no_twin():
+    free, frozen = np.array([1e-4, 9.1e-4, 9.1e-4, 1e-2, np.inf]), np.full(5, 1.0)
+    expected = np.array([1e-9, 1e-9, 1e-4, 1e-3, 1e-3])
+    # Too small to matter, up to 3 % of how far the flight went; then beyond three times what is expected, or not.
+    ratios = unexplained(free, frozen, expected)
+    assert ratios[:3].tolist() == [0.0, pytest.approx(np.sqrt(9.1e5)), pytest.approx(np.sqrt(9.1))]
+    assert ratios[3] == pytest.approx(np.sqrt(10.0)) and np.isposinf(ratios[4])
+    assert unexplained(np.array([8e-3]), np.ones(1), np.array([1e-3])).tolist() == [0.0]
+    # Where noise alone makes the twin diverge, it may.
+    assert unexplained(np.array([np.inf]), np.ones(1), np.array([np.inf])).tolist() == [0.0]
+
+
+def test_commands_of_another_controller_are_found(new_campaign, pendulum):
+    """Recorded in degrees, or with another sign, the states would have given other commands."""
+    campaign = new_campaign()
+    test = campaign.test(PENDULUM_GAINS)
+    run = pendulum.run(test)
+    flights = [SimpleNamespace(test=test, number=test.number, trajectory=run)]
+    assert other_commands(flights) == []
+    for states in (run.states * [57.3, 1.0], -run.states):
+        wrong = SimpleNamespace(states=states, commands=run.commands)
+        assert other_commands([SimpleNamespace(test=test, number=0, trajectory=wrong)]) == [0]

@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, whole
+from twinloop.arrays import Floats, at_least_zero, floats, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
@@ -25,7 +25,7 @@ from twinloop.campaign.presets import AnyOptions
 from twinloop.campaign.ranking import ranked
 from twinloop.campaign.setup import checked, refuse_arguments
 from twinloop.controllers import Controller, Family, UnboundFamily
-from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
 from twinloop.law.exports.export import asked, delivered, exported_controller
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
@@ -299,17 +299,29 @@ class Campaign(Lasting, kind="campaign"):
         """
         return self._book.status(test)
 
-    def run(self, system: System, experiments: int = 4, *, timeout: float | None = None) -> Campaign:
+    def run(
+        self,
+        system: System,
+        experiments: int = 4,
+        *,
+        timeout: float | None = None,
+        max_risk: float | None = None,
+    ) -> Campaign:
         """The whole loop; the last test is that of `ask(last=True)`.
 
         What was asked for, and neither told nor abandoned, is flown first. Where nothing was told, the first test is
         the last one made by `campaign.test`, or that of `system.default_gains`.
+
+        A test in which the system raises a `SystemFailure` has failed, as by `tell_failed`. The loop goes on with
+        another one if some test was flown and the one before did not fail; if not, the failure is raised.
 
         Args:
             system: anything with `signals` and `run(test)`.
             experiments: runs on the system in all, the first, those told before and those that failed included, those
                 that were attached not.
             timeout: seconds that the system may take for a test; None: as long as it wants.
+            max_risk: probability, by the committee, that a test leaves the envelope, above which it is not flown; None:
+                any. Tests of your own have none that is known, and are flown.
 
         Returns:
             The campaign.
@@ -320,9 +332,12 @@ class Campaign(Lasting, kind="campaign"):
             KeyboardInterrupt: Ctrl-C. Nothing that was told is lost: `interrupted` says so, the results give the best
                 so far, and calling again goes on from there with the same bits.
             NotAvailable: there is no first test.
-            SystemFailure: the system did not answer in time, or failed; its test still waits and nothing is lost.
+            NoAnswer: the system did not answer in time; its test still waits and nothing is lost.
+            SystemFailure: the first test failed, or two in a row; both are told.
+            TooRisky: a test is riskier than `max_risk`; it waits. Raise `max_risk`, fly it by hand, or abandon it.
         """
         budget = whole("Campaign.run, experiments", experiments, least=1)
+        allowed = 1.0 if max_risk is None else at_least_zero("Campaign.run, max_risk", max_risk)
         described = isinstance(getattr(system, "signals", None), Signals)
         if not (described and callable(getattr(system, "run", None))):
             raise InvalidInput(
@@ -338,13 +353,34 @@ class Campaign(Lasting, kind="campaign"):
         self.interrupted = False
         if self._keeping is not None:
             self._keeping.fly(system, budget)
+        failed = False
         with self._interruptible():
             while self._book.runs < budget:
                 test = self._next(system, last=self._book.runs + 1 == budget)
                 check_signals(test, system.signals)
+                if test.risk is not None and test.risk > allowed:
+                    raise TooRisky(
+                        f"Campaign.run: expected a test that leaves the envelope with a probability of at most"
+                        f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; it waits and was not flown:"
+                        " fly it by hand, abandon it, or raise max_risk."
+                    )
                 self._report_experiment()
-                self.tell(test, run_within(system, test, timeout))
+                failed = self._fly(system, test, timeout, failed)
         return self
+
+    def _fly(self, system: System, test: Test, timeout: float | None, again: bool) -> bool:
+        """One run, told as what became of it: whether the system failed, which it may not do `again`."""
+        try:
+            trajectory = run_within(system, test, timeout)
+        except NoAnswer:
+            raise
+        except SystemFailure as failure:
+            self.tell_failed(test, str(failure))
+            if again or not self._book.experiments:
+                raise
+            return True
+        self.tell(test, trajectory)
+        return False
 
     # What came out
 

@@ -277,6 +277,7 @@ class Planner(Judge):
             gain=gain(choices),
             reason=self._reason(
                 committee.trusted,
+                flown.kept,
                 exploit and chosen == 0,
                 repeats,
                 safe,
@@ -334,6 +335,7 @@ class Planner(Judge):
     def _reason(
         self,
         trusted: bool,
+        known: bool,
         exploits: bool,
         repeats: bool,
         safe: bool,
@@ -345,7 +347,9 @@ class Planner(Judge):
         sentences = []
         if repeats:
             change = "a stronger excitation" if self.options.excitation > 0.0 else "a small variation"
-            sentences.append(f"The best gains flown, again, with {change}: they are known to fly.")
+            sentences.append(
+                f"The best gains flown, again, with {change}{': they are known to fly' * known}."
+            )
         if not trusted:
             sentences.append(
                 "The twin does not follow the flights so far: it cannot say what this one will tell."
@@ -358,7 +362,7 @@ class Planner(Judge):
                 f" {row * self.signals.dt:.2g} s after the start; the flight tells {value / float(log(2.0)):.3g} bits."
             )
         else:
-            sentences.append("All models agree: the flight confirms what is known.")
+            sentences.append("The models predict the same of it: the flight tests what they have in common.")
         if not safe:
             sentences.append(
                 "No candidate keeps the envelope with its margin, or lasts at all, on every model and under the noise"

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from twinloop.arrays import number
-from twinloop.errors import InvalidInput, SystemFailure, TwinloopError
+from twinloop.errors import InvalidInput, NoAnswer, TwinloopError
 from twinloop.logs import load
 from twinloop.signals import Signals
 from twinloop.systems.base import System
@@ -83,7 +83,7 @@ class Folder(System):
             What it logged.
 
         Raises:
-            SystemFailure: no log in time, or one that cannot be read; the test still waits, and so does the log.
+            NoAnswer: no log in time, or one that cannot be read; the test still waits, and so does the log.
             InvalidInput: the test is for other signals, or the folder holds tests of another campaign.
         """
         check_signals(test, self._signals)
@@ -121,7 +121,7 @@ class Folder(System):
             logs = self._logs(digits)
             if len(logs) > 1:
                 names = " and ".join(log.name for log in logs)
-                raise SystemFailure(
+                raise NoAnswer(
                     f"Folder {self.path}: expected one log, found {names}; leave the right one, and go on."
                 )
             now = time.monotonic()
@@ -132,7 +132,7 @@ class Folder(System):
                 elif now - since >= self.settled:
                     return logs[0]
             elif self.timeout is not None and now - begun > self.timeout:
-                raise SystemFailure(
+                raise NoAnswer(
                     f"Folder {self.path}: expected flight-{digits}.csv or .npz within {self.timeout:g} s, found none;"
                     " the test still waits: look after the rig, and go on once the log is there."
                 )
@@ -147,10 +147,10 @@ class Folder(System):
         try:
             run = load(log, self._signals, ended=ended, reason=reason or "the rig stopped it")
         except TwinloopError as refusal:
-            raise SystemFailure(f"{refusal} The test still waits; mend {log.name}, and go on.") from refusal
+            raise NoAnswer(f"{refusal} The test still waits; mend {log.name}, and go on.") from refusal
         if run.steps > test.steps or (ended == "completed" and run.steps < test.steps):
             advice = "cut it" if run.steps > test.steps else f"write why it was stopped into {why.name}"
-            raise SystemFailure(
+            raise NoAnswer(
                 f"Log {log}: expected {test.steps + 1} rows of states, found {run.steps + 1}, unchanged for"
                 f" {self.settled:g} s; complete it, or {advice}, and go on."
             )

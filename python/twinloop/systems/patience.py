@@ -6,7 +6,7 @@ import threading
 import time
 
 from twinloop.arrays import number
-from twinloop.errors import SystemFailure
+from twinloop.errors import NoAnswer
 from twinloop.systems.base import System
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -32,7 +32,7 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
         What the system answered.
 
     Raises:
-        SystemFailure: it did not answer in time, or still hangs from the time before.
+        NoAnswer: it did not answer in time, or still hangs from the time before.
         InvalidInput: no number of seconds above 0.
     """
     if seconds is None:
@@ -40,7 +40,7 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
     limit = number("Timeout (s)", seconds, above=0.0)
     before = _hanging.get(id(system))
     if before is not None and before.is_alive():
-        raise SystemFailure(
+        raise NoAnswer(
             "The system has not come back from the test before, which it did not answer in time; mend it, and go on in"
             " a new process."
         )
@@ -60,7 +60,7 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
         thread.join(min(LOOK, limit))
     if thread.is_alive():
         _hanging[id(system)] = thread
-        raise SystemFailure(
+        raise NoAnswer(
             f"The system did not answer test {test.number} within {limit:g} s; the test still waits and nothing is"
             " lost: look after the system, then go on, or abandon the test."
         )

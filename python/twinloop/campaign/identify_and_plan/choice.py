@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotAvailable
@@ -19,6 +20,8 @@ from twinloop.test import Test
 
 DOUBT = 3.0
 """Standard deviations of predicted flights by which they may be worse than one that was measured."""
+SURE = 2.0
+"""Spreads of a predicted quality that a flight may be off it and still confirm it."""
 UNKNOWN = "No controller to fly: "
 
 
@@ -107,6 +110,14 @@ class Choice:
                 "the twin expects worse of others than was measured of these, but of these it expects worse, too, and"
                 " so is not believed here"
             )
+        if measured is not None and not confirmed(self.book.experiments):
+            predicted, spread = expected(recorded[:, :, 0])
+            spread = calibrated(spread, predicted, self.book.experiments)
+            if not predicted + SURE * spread < measured:
+                return (
+                    "the last flight was not what had been predicted, and of others the twin predicts"
+                    f" {predicted:.3g} ± {spread:.2g} where {measured:.3g} was measured of these"
+                )
         if better < self.confidence:
             share, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
             return f"the twin prefers others in {share} of its predictions, and {asked} are asked for"
@@ -149,6 +160,22 @@ class Choice:
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None
     ) -> Judged:
         return self.planner.judge(members, genes, self.committee.sds, self.draws, measured=measured, off=off)
+
+
+def confirmed(experiments: Sequence[Experiment]) -> bool:
+    """Whether the last flight that something was predicted of came out as predicted; so where none was.
+
+    Args:
+        experiments: in the order told.
+    """
+    for run in reversed(experiments):
+        test = run.test
+        if test is None or test.predicted is None or np.isnan(test.predicted):
+            continue
+        if run.quality is None or test.spread is None:
+            return False
+        return bool(abs(test.predicted - run.quality) <= SURE * test.spread)
+    return True
 
 
 def off_start(book: Logbook) -> Floats | None:

@@ -20,8 +20,20 @@ AS_FAST = (0.5, 2.0)
 ALIKE = 0.5
 """Correlation with its integrated derivative below which a state is taken to do something else."""
 
+OTHER = 0.5
+"""Share of what commands do that may differ from what their controller gives, squared."""
+LITTLE = 0.02
+"""Share of their bounds by which commands may differ whatever they do."""
 
-def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, steps: int) -> list[Remark]:
+
+def doubts(
+    experiments: Sequence[Experiment],
+    signals: Signals,
+    follows: bool,
+    steps: int,
+    missed: Sequence[float] = (),
+    others: Sequence[int] = (),
+) -> list[Remark]:
     """What speaks against the data or the twin.
 
     Args:
@@ -29,17 +41,48 @@ def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, s
         signals: of the system.
         follows: whether the twin follows them when it is flown by itself.
         steps: of a whole run.
+        missed: times further from each run than noise and disturbances explain that the free run is; 0 where they do.
+        others: numbers of the tests whose recorded commands are none that their controllers give.
 
     Returns:
         Remarks, none where nothing does.
     """
     said = list(_against_derivatives(experiments, signals))
+    if others:
+        said.append(
+            serious(
+                "other-commands",
+                f"The commands recorded of test{'s' if len(others) > 1 else ''} {', '.join(map(str, others))} are"
+                " none that its controller gives for the recorded states: check the signs, units and order of states"
+                " and commands, and that the recorded controller is the one that the test names.",
+            )
+        )
     if not follows:
+        cause = (
+            "the remarks before this one say why"
+            if said
+            else "something acts that no term describes, such as a contact, play, friction that sticks, or a state that"
+            " nobody reads; the records themselves show no wrong sign or unit"
+        )
         said.append(
             serious(
                 "does-not-follow",
-                "Flown by itself the twin does not follow the runs that it was learnt from: check the signs, units and"
-                " order of states and commands, and that the recorded controller is the one that the test names.",
+                f"Flown by itself the twin does not follow the runs that it was learnt from: {cause}.",
+            )
+        )
+    elif any(missed):
+        worst = max(missed)
+        how = (
+            f"by {worst:.3g} times what noise and disturbances explain"
+            if np.isfinite(worst)
+            else "until it diverges"
+        )
+        said.append(
+            serious(
+                "free-run",
+                f"Flown by itself the twin misses {sum(map(bool, missed))} of the {len(missed)} runs that it was"
+                f" learnt from, {how}: something acts that no term describes. Do not believe it beyond the"
+                " flights that were made.",
             )
         )
     copies = len(experiments) - len(distinct(experiments))
@@ -61,6 +104,28 @@ def doubts(experiments: Sequence[Experiment], signals: Signals, follows: bool, s
             )
         )
     return said
+
+
+def other_commands(experiments: Sequence[Experiment]) -> list[int]:
+    """Numbers of the tests whose recorded commands have little to do with those of their controllers.
+
+    Args:
+        experiments: that were learnt from; controllers are run on the readings.
+    """
+    found = []
+    for run in experiments:
+        if run.test is None or run.number in found:
+            continue
+        controller, given = run.test.controller(), []
+        controller.reset()
+        for k, state in enumerate(run.trajectory.states[:-1]):
+            given.append(controller.command(state, run.test.target(k)))
+        low, high = np.array([command.bounds for command in run.test.family.signals.commands]).T
+        size = np.square((np.array(given) - np.mean(given, axis=0)) / (high - low)).mean()
+        off = np.square((run.trajectory.commands - np.array(given)) / (high - low)).mean()
+        if off > OTHER * size and off > LITTLE * LITTLE:
+            found.append(run.test.number)
+    return found
 
 
 def _against_derivatives(experiments: Sequence[Experiment], signals: Signals) -> Iterator[Remark]:

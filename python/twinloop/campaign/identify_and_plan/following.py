@@ -11,7 +11,16 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.errors import engine_input
+from twinloop.law.noise import Noise
 from twinloop.limits import Limits
+from twinloop.streams import Unit
+
+DRAWS = 8
+"""Of noise and disturbances, by which it is said how far these take a flight."""
+TIMES = 3.0
+"""Times further from a flight than these that a free run is no more explained by them."""
+RELEVANT = 0.03
+"""Share of how far a flight went below which nobody minds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,3 +86,66 @@ def following(
             misses = np.square(signals.difference(runs.read[0, 1:], states[1:]) / scales)
             free[i, j] = misses.mean() if lasted[i, j] == 1.0 else np.inf
     return Following(free, lasted, frozen)
+
+
+def foretold(
+    model: _core.Model,
+    flights: Sequence[Experiment],
+    noise: Noise,
+    unit: Unit,
+    limits: Limits,
+    workers: _core.Workers,
+) -> Floats:
+    """How far noise and disturbances alone take flights from a model's free run.
+
+    Args:
+        model: that is flown.
+        flights: N of them, at least one.
+        noise: of the sensors, and disturbances.
+        unit: of which the draws are a part.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+
+    Returns:
+        Mean squares over draws, steps and states, in units of the states' scales (N,), as `Following.free`; infinite
+        where a run diverges, in which the free run may be anywhere.
+    """
+    scales = np.array([state.scale for state in limits.signals.states])
+    found = np.empty(len(flights))
+    for j, flight in enumerate(flights):
+        test, steps = flight.replayed, flight.trajectory.steps
+        seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
+        excitation = None if test.excitation is None else np.tile(test.excitation[:steps], (DRAWS + 1, 1, 1))
+        start = model.states_of(flight.trajectory.states[:1])[0]
+        with engine_input():
+            runs = _core.rollout(
+                model,
+                limits.setting(test.family),
+                np.tile(test.genes, (DRAWS + 1, 1)),
+                _core.Task(start, test.target_state, steps),
+                noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
+                disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
+                excitation=excitation,
+                workers=workers,
+            )
+        lasted = bool((runs.lasted == steps).all())
+        with np.errstate(invalid="ignore"):
+            off = np.square(limits.signals.difference(runs.measured[1:], runs.read[0]) / scales).mean()
+        found[j] = off if lasted else np.inf
+    return found
+
+
+def unexplained(free: Floats, frozen: Floats, expected: Floats) -> Floats:
+    """Times further from its flights than noise and disturbances explain that a free run is, where that matters.
+
+    Args:
+        free: mean squares of the free run (N,), infinite where it diverges.
+        frozen: of the model that never moves (N,).
+        expected: of noise and disturbances (N,), infinite where these make it diverge.
+
+    Returns:
+        Ratios of roots (N,); 0 where the free run does as can be expected, or is within 3 % of how far the flight went.
+    """
+    matters = (free > RELEVANT * RELEVANT * frozen) & (free > TIMES * TIMES * expected)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(matters, np.sqrt(free / expected), 0.0)

@@ -20,8 +20,8 @@ from twinloop.campaign.identify_and_plan.calibration import (
     needed_factor,
 )
 from twinloop.campaign.identify_and_plan.choice import Choice
-from twinloop.campaign.identify_and_plan.diagnostics import doubts
-from twinloop.campaign.identify_and_plan.following import following
+from twinloop.campaign.identify_and_plan.diagnostics import doubts, other_commands
+from twinloop.campaign.identify_and_plan.following import following, foretold, unexplained
 from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
@@ -41,6 +41,7 @@ from twinloop.objectives import normalised_error
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner
 from twinloop.records import Record, Recorded
+from twinloop.streams import Unit
 from twinloop.test import Test
 
 STEPS = (
@@ -191,7 +192,11 @@ class IdentifyAndPlan:
         believed = [identified.members[i] for i in sorted(kept)]
         follows = self._can_follow(identified, free[0], frozen)
         errors_of_best = free_runs(identified.members[:1], book, self.workers)[0]
-        lesson = self._lesson(identified, follows, book, errors_of_best.tolist())
+        noise = identified.noise(self.setup.signals)
+        unit = Unit(self.setup.seed).part(told, 1)
+        off = foretold(identified.members[0], book.experiments, noise, unit, self.setup.limits, self.workers)
+        missed = unexplained(free[0], frozen, off)
+        lesson = self._lesson(identified, follows, book, errors_of_best.tolist(), missed)
         before = () if known is None else known.lessons
         earlier = () if known is None else known.models
         models = (*earlier, identified.model)
@@ -438,7 +443,9 @@ class IdentifyAndPlan:
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
 
-    def _lesson(self, known: Identified, follows: bool, book: Logbook, free: list[float]) -> Lesson:
+    def _lesson(
+        self, known: Identified, follows: bool, book: Logbook, free: list[float], missed: Floats
+    ) -> Lesson:
         return Lesson(
             iteration=len(book.experiments),
             tests=self._told,
@@ -467,6 +474,8 @@ class IdentifyAndPlan:
                     self.setup.signals,
                     follows or not np.isfinite(known.left),  # of one that diverges it is said already
                     self.setup.steps,
+                    missed.tolist() if np.isfinite(known.left) else (),
+                    () if follows else other_commands(book.experiments),
                 ),
             ),
         )

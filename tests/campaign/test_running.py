@@ -1,0 +1,75 @@
+"""`campaign.run`: a test that is too risky is not flown, and one in which the system fails has failed."""
+
+import pytest
+
+import twinloop as tl
+from conftest import PENDULUM_GAINS
+
+
+class Failing(tl.System):
+    """Fails in the runs of some numbers."""
+
+    default_gains = PENDULUM_GAINS
+
+    def __init__(self, system, fails):
+        self.system, self.fails, self.count = system, fails, -1
+
+    @property
+    def signals(self):
+        return self.system.signals
+
+    def run(self, test):
+        self.count += 1
+        if self.count in self.fails:
+            raise tl.SystemFailure("The motor cut out.")
+        return self.system.run(test)
+
+
+def test_a_test_in_which_the_system_fails_has_failed_and_the_loop_goes_on(new_campaign, pendulum):
+    campaign = new_campaign().run(Failing(pendulum, {1}), 3)
+    assert [failure.reason for failure in campaign.failures] == ["The motor cut out."]
+    assert campaign.status(campaign.failures[0].test) == "failed"
+    assert [run.number for run in campaign.experiments] == [0, 2] and campaign.waiting == ()
+
+
+def test_a_first_test_that_fails_and_two_in_a_row_are_told_and_raised(new_campaign, pendulum):
+    campaign = new_campaign()
+    with pytest.raises(tl.SystemFailure, match="motor cut out"):
+        campaign.run(Failing(pendulum, {0}), 3)
+    assert len(campaign.failures) == 1 and campaign.experiments == ()
+    campaign = new_campaign()
+    with pytest.raises(tl.SystemFailure, match="motor cut out"):
+        campaign.run(Failing(pendulum, {1, 2}), 5)
+    assert len(campaign.failures) == 2 and len(campaign.experiments) == 1
+
+
+@pytest.mark.parametrize("bad", [-0.1, float("nan"), "low"])
+def test_a_risk_that_is_none_is_refused(new_campaign, pendulum, bad):
+    with pytest.raises(tl.InvalidInput, match="max_risk"):
+        new_campaign().run(pendulum, 2, max_risk=bad)
+
+
+def test_what_is_riskier_than_allowed_waits_and_is_not_flown(pendulum):
+    campaign = tl.Campaign(
+        pendulum.signals,
+        controller=tl.controllers.PID(
+            axes=[("angle", "rate")],
+            gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
+        ),
+        initial_state=[0.0, 0.0],
+        target_state=[1.0, 0.0],
+        duration=1.0,
+        threads=1,
+        options={
+            "moves": 1500,
+            "generations": 0,
+            "evaluations": 256,
+            "candidates": 32,
+            "committee_size": 4,
+            "draws": 2,
+        },
+    )
+    with pytest.raises(tl.TooRisky, match=r"at most 0, found 0\.\d+ for test 1; it waits"):
+        campaign.run(pendulum, 2, max_risk=0.0)
+    assert [test.number for test in campaign.waiting] == [1] and len(campaign.experiments) == 1
+    assert len(campaign.run(pendulum, 2, max_risk=0.9).experiments) == 2
