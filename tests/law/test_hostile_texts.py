@@ -55,8 +55,8 @@ def test_in_python_it_is_a_literal_or_a_comment(unit, kind):
     if kind == "python":
         twin = hostile(unit)
         run = twin.flights[0]
-        found = python_simulation(text)(run.states[0], run.commands)
-        np.testing.assert_allclose(found[: len(run.states)], run.states, rtol=1e-9, atol=1e-9)
+        found = python_simulation(text)(run.true_states[0], run.commands)
+        np.testing.assert_allclose(found[: len(run.states)], run.true_states, rtol=1e-9, atol=1e-9)
 
 
 @needs_cc
