@@ -15,6 +15,7 @@ from twinloop.arrays import Floats, at_least_zero, floats, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
+from twinloop.campaign.errors import free_runs
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Earlier, Examination
@@ -427,8 +428,9 @@ class Campaign(Lasting, kind="campaign"):
         """
         self._learn()
         known, book = self._method, self._book
-        earlier = Earlier(known.twins_before(book), known.innovations(book), known.rivals())
-        return Examination(self, earlier)
+        twins = known.twins_before(book)
+        errors = free_runs([twin.model for _, twin in twins], book, self._workers)
+        return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals()))
 
     def checks(self) -> Checks:
         """Whether the twin may be believed and the controller flown, check by check; printable.

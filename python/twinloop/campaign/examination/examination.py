@@ -50,11 +50,13 @@ class Earlier:
 
     Args:
         twins: that were known earlier, with how many of the first experiments each had learnt.
+        errors: of each of them on all experiments, SI units squared (twins, experiments).
         innovations: of each experiment that was learnt (n + 1, n_x), whitened; None where there are none.
         rivals: sums of terms that were considered, the chosen ones among them.
     """
 
     twins: Sequence[tuple[int, Twin]]
+    errors: Floats
     innovations: Sequence[Floats] | None
     rivals: Sequence[Rival]
 
@@ -93,7 +95,7 @@ class Examination:
         self.setup, self.signals = campaign.setup, campaign.signals
         self.experiments: tuple[Experiment, ...] = campaign.experiments
         self.twin: Twin = campaign.twin
-        self.twins_before = earlier.twins
+        self.twins_before, self._errors = earlier.twins, earlier.errors
         self.innovations = earlier.innovations
         self.rivals = tuple(earlier.rivals)
         self.best: Test | None = None
@@ -133,7 +135,8 @@ class Examination:
     @cached_property
     def errors(self) -> ErrorMap:
         """Error of each twin on each flight, those that it had not learnt among them."""
-        return error_map(self.campaign.history, self.experiments, self.twins_before)
+        known = {learnt: row for (learnt, _), row in zip(self.twins_before, self._errors, strict=True)}
+        return error_map(self.campaign.history, self.experiments, known)
 
     @cached_property
     def open_poles(self) -> tuple[Pole, ...]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment, Iteration, Lesson
-from twinloop.law.flight import fly
-from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
 
 MOST = 24
@@ -37,37 +35,25 @@ class ErrorMap:
 def error_map(
     history: Sequence[Iteration | Lesson],
     experiments: Sequence[Experiment],
-    twins: Sequence[tuple[int, Twin]],
+    earlier: Mapping[int, Floats],
 ) -> ErrorMap:
     """The map of a campaign.
 
     Args:
         history: of it.
         experiments: in the order told.
-        twins: earlier ones, with how many of the first experiments each had learnt.
+        earlier: errors of earlier twins on all experiments, SI units squared, by how many they had learnt.
     """
     shown: Sequence[Iteration | Lesson] = history[-MOST:]
     values = np.full((len(experiments), len(shown)), np.nan)
     learnt = np.zeros(values.shape, dtype=bool)
-    known = dict(twins)
     for column, record in enumerate(shown):
         told = len(record.tests)
         values[:told, column] = record.normalised[: len(experiments)]
         learnt[:told, column] = True
-        if told in known:
+        if told in earlier:
             for row in range(told, len(experiments)):
-                values[row, column] = _error(known[told], experiments[row])
+                values[row, column] = normalised_error(float(earlier[told][row]), experiments[row].frozen)
     return ErrorMap(
         tuple(record.iteration for record in shown), tuple(run.number for run in experiments), values, learnt
     )
-
-
-def _error(twin: Twin, run: Experiment) -> float:
-    """Normalised error of a free run over all states, as the campaign counts it."""
-    test = run.replayed
-    free = fly(twin.model, test, limits=twin.limits).states
-    read = twin.signals.continued(run.trajectory.states, test.initial_state)
-    if len(free) < len(read):
-        return float("inf")
-    squares = np.square(twin.signals.difference(read[1:], free[1 : len(read)])).mean()
-    return normalised_error(float(squares), run.frozen)
