@@ -129,6 +129,32 @@ def test_what_is_learnt_from_a_batch_is_the_same_with_and_without_the_abandoned(
     assert equations[0] == equations[1]
 
 
+def test_after_old_logs_the_first_test_is_still_the_controller_that_is_trusted(folder):
+    trusted = read_file("rig.toml").first
+    other = read_file("rig.toml").campaign(threads=1)
+    flown(other.test({"angle.kp": 1.0, "angle.ki": 0.5, "angle.kd": 0.2}), "old.csv")
+    assert run("attach", "rig.db", "old.csv").stdout == "Kept: old.csv; 1 experiment in rig.db.\n"
+    asked = json.loads(run("ask", "rig.db", "--json").stdout)
+    assert asked["gains"] == dict(trusted) and asked["excited"]
+    # With the twin of the old log, the sheet says what to expect of it all the same.
+    assert "angle, rad" in run("ask", "rig.db").stdout
+
+
+def test_a_log_that_was_told_is_not_told_twice_and_what_was_expected_stands_beside_what_was_flown(folder):
+    for number in range(2):
+        sheet = run("ask", "rig.db").stdout
+        flown(look().tests[number])
+        told = run("tell", "rig.db", str(number), "flight.csv").stdout
+        again = run("tell", "rig.db", str(number), "flight.csv")
+        assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == number + 1
+    assert "add to torque, N m" in sheet and "rate, rad/s" in sheet
+    test, flight = look().tests[1], look().experiments[1]
+    assert f"quality {flight.quality:.4g}, predicted {test.predicted:.4g} ± {test.spread:.3g};" in told
+    last = next(line for line in sheet.splitlines() if line.startswith("1 "))
+    predicted = look().twin.simulate(test)  # of now; the sheet's was of before, near it
+    assert float(last.split()[1].strip("(")) == pytest.approx(predicted.states[-1, 0], abs=0.2)
+
+
 def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder):
     run("ask", "rig.db")
     test = look().tests[0]

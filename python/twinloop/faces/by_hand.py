@@ -18,6 +18,9 @@ from twinloop.logs import TIME, load, write_columns
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
+ROWS = 10
+"""Of the predicted run on a sheet, after the first; the file has all."""
+
 
 @click.command()
 @click.argument("file", type=Path)
@@ -50,7 +53,8 @@ def ask(store: Path, last: bool, again: bool, batch: int | None, threads: int | 
         return
     with closing(_campaign(store, threads)) as campaign:
         waiting = campaign.waiting
-        if not campaign.experiments and not campaign.failures:
+        # Whatever was attached: the first test is the controller that is trusted.
+        if all(run.attached for run in campaign.experiments) and not campaign.failures:
             test = next(iter(campaign.tests), None) or campaign.test(_first(store))
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
@@ -122,9 +126,14 @@ def tell(store: Path, test: int, flight: Path | None, failed: str | None, aborte
                     f"Log {flight}: expected the {known.steps} steps of test {test}, found {run.steps}; record it"
                     " whole, or say why it was stopped: --aborted REASON."
                 )
+            if any(_same(run, told.trajectory) for told in campaign.experiments):
+                raise InvalidInput(
+                    f"Log {flight}: expected a flight that was not told yet, found one that was, to the last digit;"
+                    " nothing has changed. Name the log of this flight."
+                )
             campaign.tell(known, run)
         click.echo(
-            f"Kept: test {test} {campaign.status(known)}; {len(campaign.experiments)} experiments in {store}."
+            f"Kept: test {test} {campaign.status(known)}{_as_expected(campaign, known)}; {_count(campaign)} in {store}."
         )
 
 
@@ -135,7 +144,7 @@ def attach(store: Path, flight: Path) -> None:
     """Add a FLIGHT that nobody asked for, as CSV or .npz, to what is learnt."""
     with closing(_campaign(store)) as campaign:
         campaign.attach(load(flight, campaign.signals))
-        click.echo(f"Kept: {flight}; {len(campaign.experiments)} experiments in {store}.")
+        click.echo(f"Kept: {flight}; {_count(campaign)} in {store}.")
 
 
 @click.command()
@@ -146,6 +155,26 @@ def abandon(store: Path, test: int) -> None:
     with closing(_campaign(store)) as campaign:
         campaign.abandon(numbered(campaign, test))
         click.echo(f"Kept: test {test} abandoned in {store}.")
+
+
+def _count(campaign: Campaign) -> str:
+    told = len(campaign.experiments)
+    return f"{told} experiment{'' if told == 1 else 's'}"
+
+
+def _same(one: Trajectory, other: Trajectory) -> bool:
+    pairs = (one.states, other.states), (one.commands, other.commands)
+    return all(a.shape == b.shape and np.array_equal(a, b) for a, b in pairs)
+
+
+def _as_expected(campaign: Campaign, test: Test) -> str:
+    """The quality that was flown beside the one that was predicted, where there are both."""
+    runs = [run.quality for run in campaign.experiments if run.number == test.number]
+    if not runs or runs[-1] is None:
+        return ""
+    expected = "" if test.predicted is None else f", predicted {test.predicted:.4g}"
+    spread = "" if test.predicted is None or test.spread is None else f" ± {test.spread:.3g}"
+    return f", quality {runs[-1]:.4g}{expected}{spread}"
 
 
 def _campaign(store: Path, threads: int | None = None) -> Campaign:
@@ -200,6 +229,29 @@ def _columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
     return columns
 
 
+def _expected(test: Test, predicted: Trajectory | None) -> str:
+    """What is added to each command and where each state is expected to be, in a few rows of the file's."""
+    signals = test.family.signals
+    heads, cells = ["t, s"], [[f"{signals.dt * k:.4g}" for k in range(test.steps + 1)]]
+    if test.excitation is not None:
+        for i, command in enumerate(signals.commands):
+            heads.append(f"add to {command.name}, {command.unit}".rstrip(", "))
+            cells.append([f"{value:+.3g}" for value in test.excitation[:, i]])
+    if predicted is not None:
+        for i, state in enumerate(signals.states):
+            heads.append(f"{state.name}, {state.unit}".rstrip(", "))
+            middle = [f"{value:.3g}" for value in predicted.states[:, i]]
+            if predicted.band is not None:
+                ends = predicted.band[:, :, i].T
+                middle = [
+                    f"{one} ({low:.3g} to {high:.3g})" for one, (low, high) in zip(middle, ends, strict=True)
+                ]
+            cells.append(middle)
+    chosen = sorted({round(k) for k in np.linspace(0, test.steps, min(test.steps, ROWS) + 1).tolist()})
+    rows = [[column[k] if k < len(column) else "" for column in cells] for k in chosen]
+    return table(heads, rows)
+
+
 def _facts(test: Test, file: Path) -> dict[str, object]:
     signals = test.family.signals
     return {
@@ -239,6 +291,8 @@ def _sheet(store: Path, test: Test, predicted: Trajectory | None, file: Path) ->
         lines.append(
             f"Predicted quality: {test.predicted:.4g}{spread}; the predicted run with its band: {file}."
         )
+    if test.excitation is not None or predicted is not None:
+        lines += ["", _expected(test, predicted), ""]
     if test.risk is not None:
         lines.append(f"Risk of leaving the envelope: {100 * test.risk:.2g} %.")
     lines += [test.reason] if test.reason else []

@@ -109,7 +109,7 @@ def _system(held: Kept) -> Quadrotor:
     if kind not in BUILT_IN:
         raise NotAvailable(
             "twinloop resume: expected a campaign that flies a built-in system, or a campaign"
-            f" file beside {held.name!r} that names one, found neither; write [system] into that file, fly"
+            " file beside the store that names one, found neither; write [system] into that file, fly"
             " yourself with twinloop ask, or go on from Python with the same arguments and store=."
         )
     return BUILT_IN[kind].from_record(held.system)
