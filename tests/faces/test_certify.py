@@ -203,3 +203,24 @@ def test_a_campaign_file_may_declare_an_autopilot(tmp_path):
     assert read_autopilot(file).kind == "px4"
     file.write_text(template("rig.db"), encoding="utf-8")
     assert read_autopilot(file) is None
+
+
+def test_exact_readings_leave_rounding_and_that_speaks_against_nobody():
+    def step(state, command):
+        """One Runge-Kutta step of a linear pendulum, which a twin can follow to the last digits."""
+
+        def slope(x):
+            return np.array([x[1], 11.0 * command[0] - 0.8 * x[1] - 5.0 * x[0]])
+
+        x, h = np.asarray(state), SIGNALS.dt
+        a = slope(x)
+        b = slope(x + 0.5 * h * a)
+        c = slope(x + 0.5 * h * b)
+        d = slope(x + h * c)
+        return x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+
+    campaign = rig_campaign()
+    campaign.run(tl.systems.Simulated(SIGNALS, step, default_gains=PENDULUM_GAINS), experiments=3)
+    assert campaign.twin.errors[0].closed_loop < 1e-20
+    assert campaign.examine().innovations is None
+    assert campaign.checks().twin_passed

@@ -327,8 +327,10 @@ class IdentifyAndPlan:
         return tuple((learnt, found[learnt]) for learnt in sorted(found) if learnt < latest.told)
 
     def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
-        """Whitened prediction errors of the twin's own filter."""
+        """Whitened prediction errors of the twin's own filter; None of exact readings, which leave rounding alone."""
         latest = self._latest()
+        if latest.identified.exact:
+            return None
         runs = [
             Run.of(run.trajectory.states, run.trajectory.commands).continued(self.setup.signals)
             for run in book.experiments[: latest.told]
