@@ -16,6 +16,9 @@ os.environ["NUMBA_NUM_THREADS"] = "1"
 
 import archive
 import closed_loop
+import committees
+import filters
+import fitting
 import generations
 import ranking
 import rows
@@ -30,7 +33,10 @@ SECTIONS = {
     "ranking": ranking.report,
     "archive": archive.report,
     "generations": generations.report,
+    "whitening": filters.report,
     "subsets": subsets.report,
+    "tuning": fitting.report,
+    "committees": committees.report,
 }
 
 

@@ -1,6 +1,6 @@
 //! Any dynamics: a model or a built-in plant, where both are flown by the same compiled loops.
 
-use crate::dynamics::Dynamics;
+use crate::dynamics::{Dynamics, step_apart};
 use crate::lanes::Vector;
 use crate::model::Model;
 use crate::plants::Quadrotor;
@@ -12,6 +12,18 @@ pub enum AnyDynamics<'a> {
     Model(Model<'a>),
     /// The built-in quadrotor.
     Quadrotor(&'a Quadrotor),
+}
+
+impl<'a> From<Model<'a>> for AnyDynamics<'a> {
+    fn from(model: Model<'a>) -> Self {
+        Self::Model(model)
+    }
+}
+
+impl<'a> From<&'a Quadrotor> for AnyDynamics<'a> {
+    fn from(plant: &'a Quadrotor) -> Self {
+        Self::Quadrotor(plant)
+    }
 }
 
 /// The workspace of the one that is flown.
@@ -47,9 +59,12 @@ impl<'a> Dynamics for AnyDynamics<'a> {
     #[inline(always)]
     fn step<V: Vector>(&self, workspace: &mut AnyWorkspace<'a, V>, state: &mut [V], command: &[V]) {
         match (self, workspace) {
-            (Self::Model(model), AnyWorkspace::Model(workspace)) => model.step(workspace, state, command),
+            (Self::Model(model), AnyWorkspace::Model(workspace)) => {
+                // By a call: the step that other loops call is compiled already.
+                step_apart(model, workspace, state, command);
+            }
             (Self::Quadrotor(plant), AnyWorkspace::Quadrotor(workspace)) => {
-                plant.step(workspace, state, command);
+                step_apart(*plant, workspace, state, command);
             }
             _ => unreachable!("a workspace belongs to the dynamics that made it"),
         }

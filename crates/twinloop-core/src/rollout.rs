@@ -1,7 +1,8 @@
 //! The roll-out: dynamics under the commands of a controller that reads them, or of a record. There is no second one.
 
+use crate::any_dynamics::AnyDynamics;
 use crate::controller::{Controllers, Family};
-use crate::dynamics::{Dynamics, read_apart, step_apart};
+use crate::dynamics::{Dynamics, read_apart};
 use crate::lanes::{Apart, Vector};
 use crate::task::target_at;
 
@@ -62,10 +63,58 @@ pub trait Watch<V> {
 /// Runs the loops and shows each step to `watch`. Returns the steps that each lane lasted: n, unless its state stopped
 /// being finite or left the limits; what is shown of a lane after that means nothing.
 #[inline(always)]
-pub fn rollout<D: Dynamics, V: Vector>(
-    dynamics: &D,
+pub fn rollout<V: Vector>(
+    dynamics: AnyDynamics<'_>,
     start: &Start<'_, V>,
     watch: &mut impl Watch<V>,
+) -> Vec<usize> {
+    let mut lasted = vec![];
+    V::apart(Run { dynamics, start, watch: &mut Aside(watch), lasted: &mut lasted });
+    lasted
+}
+
+/// The roll-out as a function of its own: it is compiled once for each vector, whatever looks on.
+struct Run<'a, V> {
+    dynamics: AnyDynamics<'a>,
+    start: &'a Start<'a, V>,
+    watch: &'a mut dyn Watch<V>,
+    lasted: &'a mut Vec<usize>,
+}
+
+impl<V: Vector> Apart for Run<'_, V> {
+    #[inline(always)]
+    fn run(self) {
+        *self.lasted = closed(&self.dynamics, self.start, self.watch);
+    }
+}
+
+/// A watcher that is called: its own function has the instructions of the vector, which one of a trait object lacks.
+struct Aside<'a, W>(&'a mut W);
+
+impl<V: Vector, W: Watch<V>> Watch<V> for Aside<'_, W> {
+    fn see(&mut self, seen: Seen<'_, V>) {
+        V::apart(Look { watch: &mut *self.0, seen });
+    }
+}
+
+struct Look<'a, V, W> {
+    watch: &'a mut W,
+    seen: Seen<'a, V>,
+}
+
+impl<V: Vector, W: Watch<V>> Apart for Look<'_, V, W> {
+    #[inline(always)]
+    fn run(self) {
+        self.watch.see(self.seen);
+    }
+}
+
+/// The same for dynamics of any kind, such as a function that is not the engine's.
+#[inline(always)]
+pub(crate) fn closed<D: Dynamics, V: Vector>(
+    dynamics: &D,
+    start: &Start<'_, V>,
+    watch: &mut dyn Watch<V>,
 ) -> Vec<usize> {
     let Start { commands, initial, steps, limits, noise, disturbance } = *start;
     let states = initial.len();
@@ -96,7 +145,7 @@ pub fn rollout<D: Dynamics, V: Vector>(
             reading: &reading,
             command: &mut command,
         });
-        step_apart(dynamics, &mut workspace, &mut state, &command);
+        dynamics.step(&mut workspace, &mut state, &command);
         if !disturbance.is_empty() {
             add(&mut state, &disturbance[step * states..]);
         }

@@ -1,5 +1,6 @@
 //! Rows: code and dynamics over many rows that know nothing of each other.
 
+use crate::any_dynamics::AnyDynamics;
 use crate::dynamics::{Dynamics, step_apart};
 use crate::lanes::{Isa, Kernel, Vector, Width, dispatch, pack};
 use crate::lgp::Code;
@@ -34,8 +35,8 @@ impl Kernel for Run<'_> {
 
 /// Next states (rows × n_x) of each row of states under its row of commands. Each row is a run of its own, that began
 /// with the commands of its row of the past (p × n_u, the oldest first), or begins now where there are none.
-pub fn step_rows<D: Dynamics>(
-    dynamics: &D,
+pub fn step_rows(
+    dynamics: AnyDynamics<'_>,
     states: &[&[f64]],
     commands: &[&[f64]],
     past: &[&[f64]],
@@ -44,14 +45,14 @@ pub fn step_rows<D: Dynamics>(
     dispatch(width, Step { dynamics, states, commands, past })
 }
 
-struct Step<'a, D> {
-    dynamics: &'a D,
+struct Step<'a> {
+    dynamics: AnyDynamics<'a>,
     states: &'a [&'a [f64]],
     commands: &'a [&'a [f64]],
     past: &'a [&'a [f64]],
 }
 
-impl<D: Dynamics> Kernel for Step<'_, D> {
+impl Kernel for Step<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
@@ -69,7 +70,7 @@ impl<D: Dynamics> Kernel for Step<'_, D> {
                 self.dynamics.remember(&mut workspace, earlier);
             }
             let mut state: Vec<W::Of32> = pack(states);
-            step_apart(self.dynamics, &mut workspace, &mut state, &command);
+            step_apart(&self.dynamics, &mut workspace, &mut state, &command);
             for l in 0..states.len() {
                 rows.extend(state.iter().map(|state| state.lane(l)));
             }

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
+use crate::any_dynamics::AnyDynamics;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, scalars, with_test_lanes};
-use crate::rollout::{Commands, Seen, Start, Watch, rollout};
+use crate::rollout::{Commands, Seen, Start, Watch, closed, rollout};
 use crate::setting::{Limits, Setting};
 use crate::task::Task;
 
@@ -47,8 +48,8 @@ impl<'a> Influences<'a> {
 }
 
 /// Runs the controller of each parameter vector on the dynamics.
-pub fn record<D: Dynamics>(
-    dynamics: &D,
+pub fn record(
+    dynamics: AnyDynamics<'_>,
     setting: &Setting,
     parameters: &[&[f64]],
     task: &Task,
@@ -58,7 +59,7 @@ pub fn record<D: Dynamics>(
     let runs = groups(parameters.len()).into_iter().flat_map(|group| {
         let influences = influences.of(&group);
         let parameters = &parameters[group];
-        dispatch(width, Record { dynamics, setting, parameters, task, influences })
+        dispatch(width, OfGroup { dynamics, runs: Runs { setting, parameters, task, influences } })
     });
     runs.collect()
 }
@@ -72,12 +73,16 @@ pub fn record_one<D: Dynamics>(
     influences: Influences<'_>,
 ) -> Option<Trajectory> {
     let parameters = &[parameters];
-    Record { dynamics, setting, parameters, task, influences }.lanes::<Scalar>().pop()
+    let runs = Runs { setting, parameters, task, influences };
+    runs.recorded::<Scalar>(first_read(dynamics, &task.initial), |start, recorder| {
+        closed(dynamics, start, recorder)
+    })
+    .pop()
 }
 
 /// A free run from a state (n_x) under recorded commands (n × n_u, n at least 1), without a controller.
-pub fn replay<D: Dynamics>(
-    dynamics: &D,
+pub fn replay(
+    dynamics: AnyDynamics<'_>,
     limits: &Limits,
     initial: &[f64],
     commands: &[f64],
@@ -92,29 +97,50 @@ pub fn replay<D: Dynamics>(
         noise: &[],
         disturbance: &[],
     };
-    recorded(dynamics, &start, initial, 1).remove(0)
+    recorded(&start, initial, first_read(&dynamics, initial), 1, |start, recorder| {
+        rollout(dynamics, start, recorder)
+    })
+    .remove(0)
 }
 
-struct Record<'a, D> {
-    dynamics: &'a D,
+/// Runs side by side, as many as lanes.
+struct Runs<'a> {
     setting: &'a Setting,
     parameters: &'a [&'a [f64]],
     task: &'a Task,
     influences: Influences<'a>,
 }
 
-impl<D: Dynamics> Kernel for Record<'_, D> {
+struct OfGroup<'a> {
+    dynamics: AnyDynamics<'a>,
+    runs: Runs<'a>,
+}
+
+impl Kernel for OfGroup<'_> {
     type Output = Vec<Trajectory>;
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Trajectory> {
-        with_test_lanes!(W, self.parameters.len(), self.lanes())
+        with_test_lanes!(W, self.runs.parameters.len(), self.lanes())
     }
 }
 
-impl<D: Dynamics> Record<'_, D> {
+impl OfGroup<'_> {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> Vec<Trajectory> {
+        let read = first_read(&self.dynamics, &self.runs.task.initial);
+        self.runs.recorded::<V>(read, |start, recorder| rollout(self.dynamics, start, recorder))
+    }
+}
+
+impl Runs<'_> {
+    /// Every step of the runs, which `fly` flies; `read` of the first state.
+    #[inline(always)]
+    fn recorded<V: Vector>(
+        &self,
+        read: Vec<f64>,
+        fly: impl FnOnce(&Start<'_, V>, &mut Recorder<'_>) -> Vec<usize>,
+    ) -> Vec<Trajectory> {
         let Task { initial, target, steps } = self.task;
         let start = Start {
             commands: Commands::Law {
@@ -129,27 +155,28 @@ impl<D: Dynamics> Record<'_, D> {
             noise: &pack::<V, _>(self.influences.noise),
             disturbance: &pack::<V, _>(self.influences.disturbance),
         };
-        recorded(self.dynamics, &start, initial, self.parameters.len())
+        recorded(&start, initial, read, self.parameters.len(), fly)
     }
 }
 
 /// Every step of the first lanes of a roll-out.
 #[inline(always)]
-fn recorded<D: Dynamics, V: Vector>(
-    dynamics: &D,
+fn recorded<V: Vector>(
     start: &Start<'_, V>,
     initial: &[f64],
+    read: Vec<f64>,
     count: usize,
+    fly: impl FnOnce(&Start<'_, V>, &mut Recorder<'_>) -> Vec<usize>,
 ) -> Vec<Trajectory> {
     let empty = || Trajectory {
         states: initial.to_vec(),
-        read: first_read(dynamics, initial),
+        read: read.clone(),
         measured: vec![],
         commands: vec![],
         lasted: 0,
     };
     let mut runs: Vec<_> = (0..count).map(|_| empty()).collect();
-    let lasted = rollout(dynamics, start, &mut Recorder(&mut runs));
+    let lasted = fly(start, &mut Recorder(&mut runs));
     for (l, run) in runs.iter_mut().enumerate() {
         let (states, seen) = (initial.len(), run.measured.len());
         for j in 0..states {
@@ -174,11 +201,23 @@ struct Recorder<'a>(&'a mut [Trajectory]);
 impl<V: Vector> Watch<V> for Recorder<'_> {
     #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
-        for (l, run) in self.0.iter_mut().enumerate() {
-            run.measured.extend(seen.reading.iter().map(|value| value.lane(l)));
-            run.commands.extend(seen.command.iter().map(|value| value.lane(l)));
-            run.states.extend(seen.next.iter().map(|value| value.lane(l)));
-            run.read.extend(seen.read.iter().map(|value| value.lane(l)));
+        let runs = &mut *self.0;
+        let mut lanes = [0.0; 64];
+        for value in seen.reading {
+            value.store(&mut lanes);
+            runs.iter_mut().zip(&lanes).for_each(|(run, &lane)| run.measured.push(lane));
+        }
+        for value in seen.command {
+            value.store(&mut lanes);
+            runs.iter_mut().zip(&lanes).for_each(|(run, &lane)| run.commands.push(lane));
+        }
+        for value in seen.next {
+            value.store(&mut lanes);
+            runs.iter_mut().zip(&lanes).for_each(|(run, &lane)| run.states.push(lane));
+        }
+        for value in seen.read {
+            value.store(&mut lanes);
+            runs.iter_mut().zip(&lanes).for_each(|(run, &lane)| run.read.push(lane));
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Workers: how work is carried out, never what comes out.
 
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 
 use crate::controller::Family;
@@ -39,12 +41,18 @@ impl Workers {
         if self.threads() == 1 || count <= 1 {
             return (0..count).map(work).collect();
         }
-        self.shared(count, &work)
+        let found: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
+        self.shared(count, &|i| {
+            let value = work(i);
+            *found[i].lock().unwrap_or_else(PoisonError::into_inner) = Some(value);
+        });
+        let value = |one: Mutex<Option<T>>| one.into_inner().unwrap_or_else(PoisonError::into_inner);
+        found.into_iter().map(|one| value(one).expect("work for each index")).collect()
     }
 
-    /// The same by many threads. By a pointer: else all that shares out work is compiled again for each kind of it.
-    fn shared<T: Send>(&self, count: usize, work: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
-        self.pool.install(|| (0..count).into_par_iter().map(work).collect())
+    /// Each index, by many threads. By a pointer: else all that shares out work is compiled again for each kind of it.
+    fn shared(&self, count: usize, work: &(dyn Fn(usize) + Sync)) {
+        self.pool.install(|| (0..count).into_par_iter().for_each(work));
     }
 
     /// The same for work that flies controllers of a family: on this thread alone where its law is outside of the engine.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, Dynamics, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Sensors, Signals,
-    Width, effects, state_of, step_rows,
+    Actuation, Actuator, AnyDynamics, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Sensors,
+    Signals, Width, effects, state_of, step_rows,
 };
 
 use crate::arrays::{Cube, Matrix, Vector, optional_blocks, rows, to_matrix, to_vector, vector, views};
@@ -190,7 +190,7 @@ impl PyModel {
         let (n_x, n_u) = (self.signals.states(), self.signals.commands());
         let rows = Rows::new(&states, &commands, past, n_x, n_u)?;
         let width = or_default(workers)?.width();
-        let next = py.detach(|| rows.step(&self.core(), width));
+        let next = py.detach(|| rows.step(AnyDynamics::Model(self.core()), width));
         Ok(to_matrix(py, n_x, next))
     }
 }
@@ -266,7 +266,7 @@ impl Rows {
     }
 
     /// The next states.
-    pub fn step<D: Dynamics>(&self, dynamics: &D, width: Width) -> Vec<f64> {
+    pub fn step(&self, dynamics: AnyDynamics<'_>, width: Width) -> Vec<f64> {
         step_rows(dynamics, &views(&self.states), &views(&self.commands), &views(&self.past), width)
     }
 }

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Quadrotor, Scalar, Vector as _};
+use twinloop_core::{AnyDynamics, Quadrotor, Scalar, Vector as _};
 
 use crate::arrays::{Cube, Matrix, Vector, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
@@ -78,7 +78,7 @@ impl PyQuadrotor {
     ) -> Result<Bound<'py, PyArray2<f64>>> {
         let rows = Rows::new(&states, &commands, past, 6, 4)?;
         let width = or_default(workers)?.width();
-        let next = py.detach(|| rows.step(&self.0, width));
+        let next = py.detach(|| rows.step(AnyDynamics::Quadrotor(&self.0), width));
         Ok(to_matrix(py, 6, next))
     }
 }

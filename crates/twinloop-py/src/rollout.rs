@@ -122,7 +122,7 @@ pub fn rollout(
     let influences = Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
     let width = workers.width();
     let runs = if let Some(known) = known(dynamics, signals)? {
-        flown(py, || record(&known, setting, &parameters, task, influences, width))?
+        flown(py, || record(known, setting, &parameters, task, influences, width))?
     } else {
         let step = StepFunction { function: dynamics, failure: RefCell::new(None) };
         let mut runs = Vec::new();
@@ -163,7 +163,7 @@ pub fn replay(
         )));
     };
     let commands = commands.concat();
-    let run = py.detach(|| twinloop_core::replay(&dynamics, limits, &initial, &commands, steps));
+    let run = py.detach(|| twinloop_core::replay(dynamics, limits, &initial, &commands, steps));
     Ok(PyRuns { runs: vec![run], steps, states, commands: width })
 }
 

@@ -3,9 +3,9 @@
 use super::log_determinant::{log_determinant, place};
 use super::{Flights, Group};
 use crate::difference::Periods;
-use crate::dynamics::Dynamics;
 use crate::error::{Result, invalid};
 use crate::lanes::{Isa, Kernel, Vector, dispatch, with_test_lanes};
+use crate::model::Model;
 use crate::rollout::{Seen, Watch, rollout};
 use crate::workers::Workers;
 
@@ -31,8 +31,8 @@ pub struct Disagreement {
 const BATCH: usize = 4;
 
 /// Disagreement on each candidate. A member that diverges stays, from then on, where it last was within the limits.
-pub fn disagreements<D: Dynamics + Sync>(
-    members: &[D],
+pub fn disagreements(
+    members: &[Model<'_>],
     flights: &Flights,
     sds: &[f64],
     cap: f64,
@@ -67,13 +67,13 @@ pub fn disagreements<D: Dynamics + Sync>(
 }
 
 /// What is read of a group on one member but for noise, n × n_x × lanes.
-struct Fly<'a, D> {
-    member: &'a D,
+struct Fly<'a> {
+    member: &'a Model<'a>,
     flights: &'a Flights,
     group: &'a Group,
 }
 
-impl<D: Dynamics> Kernel for Fly<'_, D> {
+impl Kernel for Fly<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
@@ -82,13 +82,13 @@ impl<D: Dynamics> Kernel for Fly<'_, D> {
     }
 }
 
-impl<D: Dynamics> Fly<'_, D> {
+impl Fly<'_> {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> Vec<f64> {
         let lanes = self.group.lanes::<V>();
         let (steps, row) = (self.flights.steps, lanes.initial.len() * V::LANES);
         let mut states = States(vec![0.0; steps * row]);
-        let lasted = rollout(self.member, &self.flights.start(&lanes, &[]), &mut states);
+        let lasted = rollout((*self.member).into(), &self.flights.start(&lanes, &[]), &mut states);
         let States(mut states) = states;
         for (l, &lasted) in lasted.iter().enumerate() {
             for step in lasted..steps {

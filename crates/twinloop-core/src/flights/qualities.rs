@@ -3,7 +3,7 @@
 use super::envelope::{Envelope, Reach};
 use super::quality::{Quality, Tally};
 use super::{Flights, Group};
-use crate::dynamics::Dynamics;
+use crate::any_dynamics::AnyDynamics;
 use crate::error::{Result, invalid};
 use crate::lanes::{Isa, Kernel, Vector, dispatch, with_test_lanes};
 use crate::rollout::{Seen, Watch, rollout};
@@ -55,8 +55,8 @@ pub struct Judged {
 }
 
 /// Every flight (members × draws × candidates, the last fastest).
-pub fn qualities<D: Dynamics + Sync>(
-    dynamics: &[D],
+pub fn qualities(
+    dynamics: &[AnyDynamics<'_>],
     flights: &Flights,
     quality: &Quality,
     envelope: &Envelope,
@@ -84,8 +84,8 @@ pub fn qualities<D: Dynamics + Sync>(
     Ok(judged.concat())
 }
 
-struct OfGroup<'a, D> {
-    dynamics: &'a D,
+struct OfGroup<'a> {
+    dynamics: &'a AnyDynamics<'a>,
     flights: &'a Flights,
     group: &'a Group,
     quality: &'a Quality,
@@ -97,7 +97,7 @@ struct OfGroup<'a, D> {
     measured: bool,
 }
 
-impl<D: Dynamics> Kernel for OfGroup<'_, D> {
+impl Kernel for OfGroup<'_> {
     type Output = Vec<Judged>;
 
     #[inline(always)]
@@ -106,7 +106,7 @@ impl<D: Dynamics> Kernel for OfGroup<'_, D> {
     }
 }
 
-impl<D: Dynamics> OfGroup<'_, D> {
+impl OfGroup<'_> {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> Vec<Judged> {
         let mut lanes = self.group.lanes::<V>();
@@ -124,7 +124,7 @@ impl<D: Dynamics> OfGroup<'_, D> {
             measured: self.measured,
             reading: lanes.initial.clone(),
         };
-        let lasted = rollout(self.dynamics, &self.flights.start(&lanes, &noise), &mut judge);
+        let lasted = rollout(*self.dynamics, &self.flights.start(&lanes, &noise), &mut judge);
         let (quality, usage) = (judge.tally.total(), judge.reach.usage());
         let of_lane = |l: usize| {
             if lasted[l] < self.flights.steps {

@@ -4,16 +4,17 @@ use super::Outcome;
 use crate::difference::Periods;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, vectors, with_test_lanes};
+use crate::model::Model;
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
 use crate::selected::{Loops, SelectedTests};
 
 /// Outcome of each test's run beside its record (N).
-pub(super) struct ClosedLoop<'a, D> {
-    pub dynamics: D,
+pub(super) struct ClosedLoop<'a> {
+    pub model: Model<'a>,
     pub selected: &'a SelectedTests,
 }
 
-impl<D: Dynamics> Kernel for ClosedLoop<'_, D> {
+impl Kernel for ClosedLoop<'_> {
     type Output = Vec<Outcome>;
 
     #[inline(always)]
@@ -26,7 +27,7 @@ impl<D: Dynamics> Kernel for ClosedLoop<'_, D> {
     }
 }
 
-impl<D: Dynamics> ClosedLoop<'_, D> {
+impl ClosedLoop<'_> {
     #[inline(always)]
     fn of_group<V: Vector>(&self, loops: &Loops, outcomes: &mut Vec<Outcome>) {
         let states = self.selected.signals().states();
@@ -37,7 +38,7 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
                 target: &vectors::<V>(&loops.target),
                 excitation: &vectors::<V>(&loops.excitation),
             },
-            initial: &self.dynamics.state_of(&vectors::<V>(&loops.initial)),
+            initial: &self.model.state_of(&vectors::<V>(&loops.initial)),
             steps: loops.steps.iter().copied().max().unwrap_or(0),
             limits: self.selected.setting().limits(),
             noise: &[],
@@ -47,7 +48,7 @@ impl<D: Dynamics> ClosedLoop<'_, D> {
         let steps = V::load(&steps.collect::<Vec<_>>());
         let periods = &self.selected.signals().periods;
         let mut error = SquaredError { periods, recorded: &loops.recorded, steps, sum: V::splat(0.0) };
-        let lasted = rollout(&self.dynamics, &start, &mut error);
+        let lasted = rollout(self.model.into(), &start, &mut error);
         for (l, (&lasted, &steps)) in lasted.iter().zip(&loops.steps).enumerate() {
             outcomes.push(if lasted < steps {
                 Outcome::Diverged { lasted, of: steps }

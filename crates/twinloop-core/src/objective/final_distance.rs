@@ -1,38 +1,38 @@
 //! Final distance: how far from its target a closed loop ends, δ = ‖η_n − η_d‖.
 
 use crate::difference::Periods;
-use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_test_lanes};
+use crate::model::Model;
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
 use crate::setting::Setting;
 use crate::task::{Task, target_at};
 use crate::workers::Workers;
 
-/// Final distances of each controller on each of the dynamics (dynamics × controllers); infinite where the run diverged.
-pub fn final_distances<D: Dynamics + Sync>(
-    dynamics: &[D],
+/// Final distances of each controller on each model (models × controllers); infinite where the run diverged.
+pub fn final_distances(
+    models: &[Model<'_>],
     setting: &Setting,
     parameters: &[&[f64]],
     task: &Task,
     workers: &Workers,
 ) -> Vec<Vec<f64>> {
     let groups = groups(parameters.len());
-    let distances = workers.map_flights(setting.family(), dynamics.len() * groups.len(), |unit| {
-        let (dynamics, group) = (&dynamics[unit / groups.len()], groups[unit % groups.len()].clone());
+    let distances = workers.map_flights(setting.family(), models.len() * groups.len(), |unit| {
+        let (model, group) = (&models[unit / groups.len()], groups[unit % groups.len()].clone());
         let parameters = &parameters[group];
-        dispatch(workers.width(), OfGroup { dynamics, setting, parameters, task })
+        dispatch(workers.width(), OfGroup { model, setting, parameters, task })
     });
     distances.chunks(groups.len().max(1)).map(<[_]>::concat).collect()
 }
 
-struct OfGroup<'a, D> {
-    dynamics: &'a D,
+struct OfGroup<'a> {
+    model: &'a Model<'a>,
     setting: &'a Setting,
     parameters: &'a [&'a [f64]],
     task: &'a Task,
 }
 
-impl<D: Dynamics> Kernel for OfGroup<'_, D> {
+impl Kernel for OfGroup<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
@@ -41,7 +41,7 @@ impl<D: Dynamics> Kernel for OfGroup<'_, D> {
     }
 }
 
-impl<D: Dynamics> OfGroup<'_, D> {
+impl OfGroup<'_> {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> Vec<f64> {
         let Task { initial, target, steps } = self.task;
@@ -62,7 +62,7 @@ impl<D: Dynamics> OfGroup<'_, D> {
         let periods = &self.setting.signals().periods;
         let target = target_at(&target, initial.len(), *steps);
         let mut last = LastStep { periods, steps: *steps, target, squared: V::splat(0.0) };
-        let lasted = rollout(self.dynamics, &start, &mut last);
+        let lasted = rollout((*self.model).into(), &start, &mut last);
         let of_lane = |l: usize| {
             if lasted[l] < *steps { f64::INFINITY } else { last.squared.lane(l).sqrt() }
         };

@@ -29,7 +29,7 @@ pub fn of_model(model: Model<'_>, selected: &SelectedTests, width: Width) -> Vec
     let worst = Outcome::AT_ONCE.ranked();
     let open = open_loop(model, selected, width).into_iter();
     let open = open.map(|error| if error < worst { error } else { worst });
-    let closed = dispatch(width, ClosedLoop { dynamics: model, selected });
+    let closed = dispatch(width, ClosedLoop { model, selected });
     open.zip(closed).flat_map(|(open, closed)| [open, closed.ranked()]).collect()
 }
 
@@ -67,6 +67,6 @@ pub fn k_steps(
 /// Closed loop of each model on each selected test (models × N).
 pub fn closed_loops(models: &[Model<'_>], selected: &SelectedTests, workers: &Workers) -> Vec<Vec<Outcome>> {
     workers.map_flights(selected.setting().family(), models.len(), |i| {
-        dispatch(workers.width(), ClosedLoop { dynamics: models[i], selected })
+        dispatch(workers.width(), ClosedLoop { model: models[i], selected })
     })
 }

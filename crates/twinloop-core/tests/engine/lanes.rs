@@ -52,7 +52,7 @@ proptest! {
         let frame = Frame::new(form, &World::new().signals);
         let (states, commands): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
         let model = Model { code: &Code::new(&program), frame: &frame };
-        let step = |width| step_rows(&model, &slices(&states), &slices(&commands), &[], width);
+        let step = |width| step_rows(model.into(), &slices(&states), &slices(&commands), &[], width);
         prop_assert!(same_with_every_width(step, all_same));
     }
 
@@ -77,7 +77,7 @@ proptest! {
         let (noise, excitation, disturbance) = (slices(&noise), slices(&excitation), slices(&disturbance));
         let influences =
             Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
-        let runs = |width| record(&model, &setting, &slices(&gains), &task, influences, width);
+        let runs = |width| record(model.into(), &setting, &slices(&gains), &task, influences, width);
         let equal = |a: &[Trajectory], b: &[Trajectory]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same_run(a, b))
         };

@@ -9,7 +9,7 @@ use crate::worlds::{World, any_model, state};
 fn one_step(world: &World, form: Form, program: &Program, state: &[f64], command: &[f64]) -> Vec<f64> {
     let frame = Frame::new(form, &world.signals);
     let model = Model { code: &Code::new(program), frame: &frame };
-    step_rows(&model, &[state], &[command], &[], Width::Baseline)
+    step_rows(model.into(), &[state], &[command], &[], Width::Baseline)
 }
 
 proptest! {

@@ -53,7 +53,7 @@ fn first_flight(gyroscopic: Gyroscopic) -> Trajectory {
     };
     let limits = Limits::new(Arc::new(signals.validated().unwrap()), 1e9).unwrap();
     let setting = Setting::new(limits, Arc::new(family)).unwrap();
-    record(&plant, &setting, &[&gains], &task, Influences::default(), Width::widest()).remove(0)
+    record((&plant).into(), &setting, &[&gains], &task, Influences::default(), Width::widest()).remove(0)
 }
 
 fn final_distance(flight: &Trajectory) -> f64 {
@@ -82,7 +82,7 @@ fn the_hovering_quadrotor_stays_where_it_is() {
     let hover = (0.650 * 9.81 / (4.0 * 3.13e-5_f64)).sqrt();
     assert!((hover - 225.68).abs() < 0.005);
     let next = step_rows(
-        &quadrotor(Gyroscopic::Physical),
+        (&quadrotor(Gyroscopic::Physical)).into(),
         &[&[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]],
         &[&[hover; 4]],
         &[],
@@ -160,9 +160,9 @@ proptest! {
         let states = vec![[0.1; 6]; speeds.len()];
         let (states, speeds): (Vec<&[f64]>, Vec<&[f64]>) =
             (states.iter().map(|x| &x[..]).collect(), speeds.iter().map(|x| &x[..]).collect());
-        let together = step_rows(&plant, &states, &speeds, &[], Width::widest());
+        let together = step_rows((&plant).into(), &states, &speeds, &[], Width::widest());
         let alone: Vec<f64> = (0..speeds.len())
-            .flat_map(|i| step_rows(&plant, &states[i..=i], &speeds[i..=i], &[], Width::Baseline))
+            .flat_map(|i| step_rows((&plant).into(), &states[i..=i], &speeds[i..=i], &[], Width::Baseline))
             .collect();
         prop_assert_eq!(together, alone);
     }
@@ -203,7 +203,7 @@ proptest! {
         for (found, expected) in slope.iter().zip(derivative(&state)) {
             prop_assert!((found.lane(0) - expected).abs() < 1e-10);
         }
-        let found = step_rows(&*plant, &[&state], &[&speeds], &[], Width::widest());
+        let found = step_rows((&*plant).into(), &[&state], &[&speeds], &[], Width::widest());
         for (found, expected) in found.iter().zip(rk4(&state, 0.02, derivative)) {
             prop_assert!((found - expected).abs() < 1e-12);
         }

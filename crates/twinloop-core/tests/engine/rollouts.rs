@@ -48,7 +48,14 @@ impl Scene {
         let model = Model { code: &self.code, frame: &self.frame };
         let (gains, noise) = (slices(gains), slices(noise));
         let influences = Influences { noise: &noise, ..Influences::default() };
-        record(&model, &self.world.setting(self.factor), &gains, &self.task, influences, Width::widest())
+        record(
+            model.into(),
+            &self.world.setting(self.factor),
+            &gains,
+            &self.task,
+            influences,
+            Width::widest(),
+        )
     }
 
     fn expected(&self, gains: &[f64], noise: &[f64]) -> crate::oracle::Run {
@@ -140,7 +147,7 @@ proptest! {
         let run = scene.record(&[gains], &[]).remove(0);
         let model = Model { code: &scene.code, frame: &scene.frame };
         let sent = run.commands.len() / 2;
-        let again = replay(&model, &scene.world.limits(10.0), &scene.task.initial, &run.commands, sent);
+        let again = replay(model.into(), &scene.world.limits(10.0), &scene.task.initial, &run.commands, sent);
         prop_assert_eq!(again.lasted, run.lasted.min(sent));
         prop_assert!(all_same(&again.states, &run.states));
     }
