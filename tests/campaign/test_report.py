@@ -28,7 +28,8 @@ def test_the_fit_is_that_of_the_free_run_under_the_recorded_commands():
     twin, record = begun().run(PLANT, 2).twin, by_hand(40)
     table = twin.fit(record)
     y = record.states[1:]
-    simulated = twin.simulate_commands(record.states[0], record.commands).states[1:]
+    start = twin.model.states_of(record.states[:1])[0]
+    simulated = twin.simulate_commands(start, record.commands).states[1:]
     for i, row in enumerate(table):
         off, around = y[:, i] - simulated[:, i], y[:, i] - y[:, i].mean()
         assert row.name == record_names()[i]
@@ -102,7 +103,10 @@ def test_the_result_holds_flights_and_predictions_as_series():
     campaign.attach(by_hand(30))
     result = json.loads(to_json(summary(campaign, {}, {})))
     for run, entry in zip(campaign.experiments, result["experiments"], strict=True):
-        series, predicted = entry["series"], campaign.twin.simulate(run.replayed)
+        series, predicted = (
+            entry["series"],
+            campaign.twin.simulate(campaign.twin.as_flown(run.replayed, run.trajectory)),
+        )
         assert series["t"] == run.trajectory.t.tolist() and series["states"] == run.trajectory.states.tolist()
         assert series["commands"] == run.trajectory.commands.tolist()
         assert series["simulated"] == predicted.states.tolist() and series["band"] == predicted.band.tolist()

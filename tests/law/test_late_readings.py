@@ -10,7 +10,7 @@ from strategies import program_text
 from twinloop import _core
 from twinloop.flights import candidates, disagreements, qualities, quality
 from twinloop.law.law import Law
-from twinloop.law.linear.margins import margins_of
+from twinloop.law.linear.margins import closed_loops, margins_of
 from twinloop.limits import Limits
 
 SWINGING = [
@@ -152,11 +152,9 @@ def test_around_a_point_readings_are_those_of_small_departures(loop, periods):
 def test_a_late_sensor_takes_from_the_margin_of_delay_what_it_is_late():
     _, signals, lines, test = LOOPS["pendulum"]
     genes = np.array([6.0, 0.0, 0.0])
-    prompt, late = (
-        margins_of([twin_of(signals, lines, offsets).law], test.family, genes, test.target_state, None, ["torque"],
-                   "commands").nominal[0]
-        for offsets in ([0.0, 0.0], [0.3 * DT, 0.0])
-    )  # fmt: skip
+    laws = [twin_of(signals, lines, [late, 0.0]).law for late in (0.0, 0.3 * DT)]
+    loops = closed_loops(laws, test.family, genes, test.target_state, None, "commands")
+    prompt, late = (margins_of([loop], ["torque"], "commands").nominal[0] for loop in loops)
     assert late.delay == pytest.approx(prompt.delay - 0.3 * DT, abs=0.02 * DT)
 
 
