@@ -23,8 +23,13 @@ def floats(what: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Float
         A read-only copy, float64, C order.
 
     Raises:
-        InvalidInput: they are not real numbers, have another shape, or are not all finite.
+        InvalidInput: they are not real numbers, have another shape or gaps, or are not all finite.
     """
+    if np.ma.is_masked(values):
+        raise InvalidInput(
+            f"{what}: expected numbers without gaps, found a masked array that hides"
+            f" {np.ma.count_masked(values)} of them; cut the data before the gap, or fill it and pass a plain array."
+        )
     try:
         raw = np.asarray(values)
         if raw.dtype.kind not in "iufb":

@@ -39,6 +39,7 @@ DATA = {
     "as many commands as states": lambda: tl.Trajectory(T, X, np.zeros((4, 1))),
     "transposed states": lambda: tl.Trajectory(T, np.zeros((2, 4)), U),
     "NaN in states": lambda: tl.Trajectory(T, spoilt(X, np.nan), U),
+    "masked states": lambda: tl.Trajectory(T, np.ma.masked_equal(X + np.arange(4.0)[:, None], 2.0), U),
     "infinity in states": lambda: tl.Trajectory(T, spoilt(X, np.inf), U),
     "NaN in commands": lambda: tl.Trajectory(T, X, spoilt(U, np.nan)),
     "NaN in times": lambda: tl.Trajectory(spoilt(T, np.nan), X, U),

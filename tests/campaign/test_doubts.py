@@ -10,6 +10,7 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS
 from twinloop.campaign.identify_and_plan.diagnostics import distinct, doubts, other_commands
 from twinloop.campaign.identify_and_plan.following import unexplained
+from twinloop.campaign.identify_and_plan.readings import froze, ratio
 
 DT, STEPS = 0.02, 200
 SIGNALS = tl.Signals(
@@ -23,13 +24,15 @@ SIGNALS = tl.Signals(
 )
 
 
-def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False):
+def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False, commands=None):
     """A record of an angle that swings, with its rate, both read with noise."""
     stream, t = np.random.default_rng(seed), DT * np.arange(STEPS + 1)
     angle = size * np.sin(3.0 * t + 0.3 * seed) + 0.2 * size * np.cos(7.0 * t)
     rate = size * 3.0 * np.cos(3.0 * t + 0.3 * seed) - 1.4 * size * np.sin(7.0 * t)
     states = np.column_stack([0.1 * t, angle, rate]) + noise * stream.normal(size=(STEPS + 1, 3))
-    trajectory = tl.Trajectory(t, change(states), np.zeros((STEPS, 1)))
+    trajectory = tl.Trajectory(
+        t, change(states), 0.1 * np.sin(5.0 * t[:-1, None]) if commands is None else commands
+    )
     return SimpleNamespace(trajectory=trajectory, complete=not cut)
 
 
@@ -119,3 +122,48 @@ def test_commands_of_another_controller_are_found(new_campaign, pendulum):
     for states in (run.states * [57.3, 1.0], -run.states):
         wrong = SimpleNamespace(states=states, commands=run.commands)
         assert other_commands([SimpleNamespace(test=test, number=0, trajectory=wrong)]) == [0]
+
+
+def codes(*runs):
+    return [remark.code for remark in doubts(runs, SIGNALS, True, STEPS)]
+
+
+def frozen(x, i=1, row=STEPS // 2):
+    x = x.copy()
+    x[row:, i] = x[row, i]
+    return x
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_a_sensor_that_freezes_half_way_is_a_serious_remark(noise):
+    found = doubts([flown(noise=noise, change=frozen)], SIGNALS, True, STEPS)
+    assert ("frozen", True) in [(remark.code, remark.serious) for remark in found]
+    assert "angle gives one number" in " ".join(remark.sentence for remark in found)
+    back = flown(noise=noise, change=lambda x: np.concatenate([frozen(x, row=60)[:100], x[100:]]))
+    assert "frozen" in codes(back)
+
+
+def test_what_comes_to_rest_or_is_rounded_is_not_frozen():
+    t = DT * np.arange(STEPS + 1)
+    assert not froze(np.round(np.exp(-20.0 * t), 12)) and not froze(np.zeros(STEPS + 1))
+    assert not froze(np.round(np.sin(3.0 * t), 1)) and not froze(np.round(0.5 * t, 2))
+    stream = np.random.default_rng(0)
+    assert not froze(stream.normal(size=STEPS + 1))
+
+
+@pytest.mark.parametrize("value", [0.0, 0.7])
+def test_a_command_that_never_changes_is_named(value):
+    constant = np.full((STEPS, 1), value)
+    assert codes(flown(commands=constant)) == ["constant-command"]
+    assert codes(flown(commands=constant), flown(1)) == []
+
+
+def test_readings_of_nothing_but_noise_are_a_serious_remark():
+    stream = np.random.default_rng(3)
+    noise = flown(change=lambda x: 0.1 * stream.normal(size=x.shape))
+    assert "only-noise" in codes(noise)
+    assert ratio([stream.normal(size=5000)]) == pytest.approx(2.0, abs=0.1)
+    # One state that is at rest, read with noise, beside others that move.
+    assert "only-noise" not in codes(
+        flown(change=lambda x: x * [1.0, 1.0, 0.0] + 0.01 * stream.normal(size=x.shape))
+    )

@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
@@ -47,7 +48,7 @@ def doubts(
     Returns:
         Remarks, none where nothing does.
     """
-    said = list(_against_derivatives(experiments, signals))
+    said = [*_against_derivatives(experiments, signals), *suspicious(experiments, signals)]
     if others:
         said.append(
             serious(
@@ -60,7 +61,7 @@ def doubts(
     if not follows:
         cause = (
             "the remarks before this one say why"
-            if said
+            if any(remark.serious for remark in said)
             else "something acts that no term describes, such as a contact, play, friction that sticks, or a state that"
             " nobody reads; the records themselves show no wrong sign or unit"
         )

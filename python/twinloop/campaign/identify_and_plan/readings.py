@@ -1,0 +1,86 @@
+"""What readings alone give away: sensors that froze, commands that never changed, nothing but noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment
+from twinloop.remarks import Remark, note, serious
+from twinloop.signals import Signals
+
+FROZEN = 0.1
+"""Share of a run over which a sensor that moved before must give one number to be taken for frozen."""
+FEWEST = 10
+"""Readings of such a stretch at least."""
+AT_ONCE = 0.1
+"""Times its usual step that a sensor moved last before it froze: what comes to rest by itself moves less and less."""
+WHITE = 1.5
+"""Von Neumann's ratio, 2 for white noise and near 0 for what moves smoothly, above which nothing else is seen."""
+
+
+def suspicious(experiments: Sequence[Experiment], signals: Signals) -> Iterator[Remark]:
+    """Remarks on readings that no machine gives.
+
+    Args:
+        experiments: that were learnt from.
+        signals: of the system.
+    """
+    runs = [run.trajectory for run in experiments]
+    for i, state in enumerate(signals.states):
+        frozen = sum(froze(run.states[:, i]) for run in runs)
+        if frozen:
+            yield serious(
+                "frozen",
+                f"{state.name} gives one number over a tenth or more of {frozen} of {len(runs)} runs, at once and while"
+                " it was moving: its sensor froze, the log repeats its last value, or it met a stop; take out what is"
+                " no reading.",
+            )
+    for j, command in enumerate(signals.commands):
+        sent = [run.commands[:, j] for run in runs]
+        if min(map(np.min, sent)) == max(map(np.max, sent)):
+            yield note(
+                "constant-command",
+                f"{command.name} is {sent[0][0]:g} {command.unit} in every row: what it does cannot be learnt; check"
+                " that what was sent was logged.",
+            )
+    moved = [i for i in range(signals.n_x) if any(np.ptp(run.states[:, i]) > 0.0 for run in runs)]
+    if moved and all(ratio([run.states[:, i] for run in runs]) > WHITE for i in moved):
+        yield serious(
+            "only-noise",
+            "Readings change from one to the next as much as over whole runs: there is nothing but noise in them; check"
+            " the sensors, their units, and that the period is not far too long.",
+        )
+
+
+def froze(readings: Floats) -> bool:
+    """Whether a sensor that moved gives one number over a stretch of a run, at once.
+
+    Args:
+        readings: of one state (n + 1,).
+    """
+    steps = np.abs(np.diff(readings))
+    ends = np.flatnonzero(np.concatenate([[True], steps != 0.0, [True]]))
+    lengths = np.diff(ends)
+    longest = int(np.argmax(lengths))
+    first, last = int(ends[longest]), int(ends[longest + 1])
+    others = np.concatenate([steps[:first], steps[last - 1 :]])
+    if lengths[longest] < max(FEWEST, FROZEN * len(readings)) or not len(others):
+        return False
+    usual = float(np.median(others))
+    # A reading that is rounded stands still now and then; one of a system at rest moves less and less before.
+    beside = [steps[k] for k in (first - 1, last - 1) if 0 <= k < len(steps)]
+    return bool(usual > 0.0 and beside and min(beside) > AT_ONCE * usual)
+
+
+def ratio(records: Sequence[Floats]) -> float:
+    """Von Neumann's ratio: mean square of successive differences over the variance; 2 for white noise.
+
+    Args:
+        records: of one state, a run each (n + 1,).
+    """
+    differences = sum(float(np.square(np.diff(values)).mean()) for values in records)
+    variance = sum(float(values.var()) for values in records)
+    return differences / variance if variance > 0.0 else 0.0
