@@ -244,14 +244,16 @@ class Planner(Judge):
 
         found = None
         if committee.trusted:
-            allowed = keeps & (quiet.mean <= worst)
+            # The tuned gains as they are tell least, and asked for once more nothing.
+            others = keeps & (exploit | (np.arange(len(keeps)) > 0))
+            allowed = others & (quiet.mean <= worst)
             wanted = [0] if exploit and allowed[0] else []
             wanted += _first(allowed, -tells)
             found = _first_that_lasts(wanted, noisy, worst + by_noise + 2.0 * scatter)
             if found is None:
                 # None that tells much lasts under noise: the one that promises most, if it is no worse than was flown.
                 found = _first_that_lasts(
-                    _first(keeps & (quiet.mean <= most), quiet.mean), noisy, most + 2.0 * scatter
+                    _first(others & (quiet.mean <= most), quiet.mean), noisy, most + 2.0 * scatter
                 )
         if found is None:
             # What was flown and kept the envelope will again, whatever the members make of it.
