@@ -25,10 +25,11 @@ def floats(what: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Float
     Raises:
         InvalidInput: they are not real numbers, have another shape or gaps, or are not all finite.
     """
-    if np.ma.is_masked(values):
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        gaps = int(np.sum(np.ma.getmaskarray(values)))
         raise InvalidInput(
-            f"{what}: expected numbers without gaps, found a masked array that hides"
-            f" {np.ma.count_masked(values)} of them; cut the data before the gap, or fill it and pass a plain array."
+            f"{what}: expected numbers without gaps, found a masked array that hides {gaps} of them; cut the data"
+            " before the gap, or fill it and pass a plain array."
         )
     try:
         raw = np.asarray(values)
