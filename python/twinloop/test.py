@@ -14,11 +14,12 @@ from twinloop.arrays import Floats, floats, whole
 from twinloop.controllers.family import Controller, Family
 from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
+from twinloop.showing import Shown
 from twinloop.signals import Signals
 
 
 @dataclass(frozen=True, eq=False)
-class Test(Recorded, kind="test", given=("family",)):
+class Test(Shown, Recorded, kind="test", given=("family",)):
     """One candidate experiment; run it with `system.run(test)`, or by hand with `test.controller()`.
 
     Args:

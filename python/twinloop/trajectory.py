@@ -10,6 +10,7 @@ from twinloop.arrays import Floats, floats
 from twinloop.errors import InvalidInput, unknown
 from twinloop.limits import Limits
 from twinloop.records import Recorded
+from twinloop.showing import Shown
 from twinloop.signals import Signals
 
 ENDINGS = ("completed", "aborted", "diverged")
@@ -18,7 +19,7 @@ JITTER = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Recorded, kind="trajectory"):
+class Trajectory(Shown, Recorded, kind="trajectory"):
     """A recorded or simulated run of n steps; `commands[k]` is held from `t[k]` to `t[k + 1]`.
 
     Args:

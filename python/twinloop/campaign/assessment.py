@@ -11,6 +11,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.setup import Setup
+from twinloop.identification.sensors.noise import exact
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
 from twinloop.streams import Unit
@@ -66,6 +67,50 @@ def advice(twin: Twin, setup: Setup, lessons: Sequence[Lesson], best: Test | Non
         scatter=scatter,
         stop=None if gain is None or scatter is None or not trusted else gain <= scatter,
     )
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What moves a state beside the commands; standard deviations.
+
+    Args:
+        name: of the state.
+        unit: of the state.
+        white: what is added in a period, in its unit; 0: nothing that is felt.
+        lasting: what is added in a second and lasts, in its unit; 0: nothing that is felt.
+        memory: time after which that is forgotten to 1/e, s.
+    """
+
+    name: str
+    unit: str
+    white: float
+    lasting: float
+    memory: float
+
+
+def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
+    """What moves the states beside the commands, where it is felt at all.
+
+    Args:
+        twin: of the campaign.
+        lesson: the last one.
+
+    Returns:
+        One a state; none by exact readings, of which nothing is told: the least that is believed was held.
+    """
+    if twin.noise is None or exact(lesson.misfit):
+        return ()
+    lasting = {each.states[0]: (each.sd, each.memory) for each in twin.noise.lasting}
+    found = []
+    for i, (state, white) in enumerate(zip(twin.signals.states, twin.noise.moves.tolist(), strict=True)):
+        size, memory = lasting.get(i, (0.0, 0.0))
+        # What is far below the sensor's noise, estimated beside it, within its memory cannot be told from nothing.
+        least = 0.01 * lesson.sensors[i]
+        white = white if white > least else 0.0
+        size = size if size * max(memory, twin.signals.dt) > least else 0.0
+        if white or size:
+            found.append(Disturbance(state.name, state.unit, white, size, memory))
+    return tuple(found)
 
 
 def rmse(twin: Twin, experiments: Sequence[Experiment]) -> Floats:

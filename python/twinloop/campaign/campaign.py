@@ -32,6 +32,7 @@ from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.objectives import closed_loop
 from twinloop.remarks import warn
+from twinloop.showing import Shown
 from twinloop.signals import Signals
 from twinloop.systems import System
 from twinloop.systems.patience import run_within
@@ -59,7 +60,7 @@ GENTLE = "gentle"
 """The excitation of a first test where nothing else is asked for: the preset's own."""
 
 
-class Campaign(Lasting, kind="campaign"):
+class Campaign(Shown, Lasting, kind="campaign"):
     """Learns a twin and a controller from as few experiments as possible.
 
     Args:

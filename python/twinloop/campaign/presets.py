@@ -92,6 +92,11 @@ class Options:
     mutant_step: float = 0.05
     test_mutation_step: float = 0.1
 
+    @property
+    def identifies(self) -> bool:
+        """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
+        return False
+
     def __post_init__(self) -> None:
         _check(self, _RANGES)
         for name, choices in (("form", FORMS), ("tradeoff", TRADEOFFS)):
@@ -130,6 +135,11 @@ class DefaultOptions(PlanningOptions, IdentificationOptions):
     Raises:
         InvalidInput: a value out of range.
     """
+
+    @property
+    def identifies(self) -> bool:
+        """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
+        return True
 
     def __post_init__(self) -> None:
         _check(self, _DEFAULT_RANGES)

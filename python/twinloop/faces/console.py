@@ -13,7 +13,7 @@ from rich.live import Live
 from rich.table import Table
 
 from twinloop.campaign.history import Progress
-from twinloop.campaign.presets import AnyOptions, DefaultOptions, Options
+from twinloop.campaign.presets import AnyOptions, Options
 
 LINE_SECONDS = 5.0
 """Between two plain lines."""
@@ -184,7 +184,7 @@ class Watch:
         self.experiments = experiments
         self.label = name
         self._name, self._campaigns = name, campaigns
-        self._in_steps = isinstance(options, DefaultOptions)
+        self._in_steps = options.identifies
         self._estimate: Remaining = (
             Estimate(options, experiments, campaigns - 1)
             if isinstance(options, Options)

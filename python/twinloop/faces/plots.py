@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.campaign.presets import DefaultOptions
 from twinloop.errors import NotAvailable
 from twinloop.objectives import normalised_error
 from twinloop.signals import State
@@ -71,7 +70,7 @@ def campaign_picture(campaign: Campaign, path: Path, quality: str = "quality") -
         OSError: the file cannot be written.
     """
     with require().rc_context(STYLE):
-        identified = isinstance(campaign.options, DefaultOptions)
+        identified = campaign.options.identifies
         columns, rows = len(campaign.experiments), campaign.signals.n_x + identified
         figure = _figure(max(8.4 if identified else 6.4, 1.2 + 2.2 * columns), 1.15 * rows + 3.4)
         above, below = figure.subfigures(2, 1, height_ratios=[1.15 * rows + 0.6, 2.8])

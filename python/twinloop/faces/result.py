@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.campaign.assessment import expected_quality
+from twinloop.campaign.assessment import disturbances, expected_quality
 from twinloop.campaign.history import Experiment, Lesson
-from twinloop.campaign.presets import DefaultOptions
 from twinloop.controllers import Gain
-from twinloop.identification.sensors.noise import exact
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
@@ -42,7 +40,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         NotAvailable: nothing was told.
     """
     twin, (best, why) = campaign.twin, controller_to_fly(campaign)
-    identified = isinstance(campaign.options, DefaultOptions)
+    identified = campaign.options.identifies
     result: dict[str, object] = {
         "system": dict(system),
         "preset": campaign.setup.preset,
@@ -225,7 +223,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
             }
             for commands, squared, rest, time in lesson.hidden
         ],
-        "disturbances": _disturbances(campaign, twin, lesson),
+        "disturbances": [dataclasses.asdict(each) for each in disturbances(twin, lesson)],
         "remarks": [
             {"code": remark.code, "severity": remark.severity, "sentence": remark.sentence}
             for remark in twin.remarks
@@ -233,26 +231,6 @@ def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
     }
     assert campaign.advice is not None
     result["advice"] = dataclasses.asdict(campaign.advice)
-
-
-def _disturbances(campaign: Campaign, twin: Twin, lesson: Lesson) -> list[dict[str, object]]:
-    """What moves the states beside the commands: white, and lasting with a memory; those that are felt at all."""
-    # By exact readings none is told: the least that is believed was held.
-    if twin.noise is None or exact(lesson.misfit):
-        return []
-    lasting = {each.states[0]: (each.sd, each.memory) for each in twin.noise.lasting}
-    found: list[dict[str, object]] = []
-    for i, (state, white) in enumerate(zip(campaign.signals.states, twin.noise.moves.tolist(), strict=True)):
-        size, memory = lasting.get(i, (0.0, 0.0))
-        # What is far below the sensor's noise, estimated beside it, within its memory cannot be told from nothing.
-        least = 0.01 * lesson.sensors[i]
-        white = white if white > least else 0.0
-        size = size if size * max(memory, campaign.signals.dt) > least else 0.0
-        if white or size:
-            found.append(
-                {"name": state.name, "unit": state.unit, "white": white, "lasting": size, "memory": memory}
-            )
-    return found
 
 
 def plain_dict(values: Mapping[str, object]) -> Result:

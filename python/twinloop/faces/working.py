@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 import click
 
 from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.campaign.presets import DefaultOptions
 from twinloop.errors import InvalidInput
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_picture, check_writable, write_text
@@ -133,7 +132,7 @@ def knows_nothing(campaign: Campaign) -> bool:
     Args:
         campaign: with or without experiments.
     """
-    return isinstance(campaign.options, DefaultOptions) and not campaign.history
+    return campaign.options.identifies and not campaign.history
 
 
 def described(name: str, rig: System) -> dict[str, object]:

@@ -27,6 +27,7 @@ from twinloop.law.noise import Noise
 from twinloop.limits import Limits
 from twinloop.records import Recorded, checked_record, from_text, read, to_text
 from twinloop.remarks import Remark
+from twinloop.showing import Shown
 from twinloop.signals import Signals
 from twinloop.streams import Unit
 from twinloop.test import Test, check_signals
@@ -42,7 +43,7 @@ NINE_OF_TEN = 1.645
 """Standard deviations on either side of the mean between which nine of ten normal numbers lie."""
 
 
-class Twin(Recorded, kind="twin"):
+class Twin(Shown, Recorded, kind="twin"):
     """A model that stands in for the system.
 
     Args:

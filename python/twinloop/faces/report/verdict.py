@@ -66,7 +66,7 @@ def verdict(
 PLAIN = {
     "follows": "flown by itself it does not follow the experiments that it was learnt from",
     "remarks": "its remarks are serious",
-    "unseen-flight": "nothing shows yet that it foretells a flight",
+    "unseen-flight": "it has foretold no flight yet that it had not learnt",
     "band": "readings of that flight were outside of its band",
     "quality": "the last quality that it predicted was far off",
     "whiteness": "what it misses now tells what it will miss next",
@@ -113,7 +113,7 @@ def _unseen(found: Examination) -> str:
         else f"; {100.0 * last.inside:.0f} % of the readings were inside its 90 % band"
     )
     state = words(found.signals.state_names[worst])
-    return f"{which} it foretold the course with a FIT of {fits[worst]:.3g} % at worst, of {state}{inside}."
+    return f"{which} the course was foretold with a FIT of {fits[worst]:.3g} % at worst, of {state}{inside}."
 
 
 def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:
