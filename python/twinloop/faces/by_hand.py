@@ -13,13 +13,10 @@ from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.result import to_json
-from twinloop.faces.text import table
-from twinloop.logs import TIME, load, write_columns
+from twinloop.faces.sheet import columns, facts, sheet
+from twinloop.logs import load, write_columns
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
-
-ROWS = 10
-"""Of the predicted run on a sheet, after the first; the file has all."""
 
 
 @click.command()
@@ -58,8 +55,8 @@ def ask(store: Path, last: bool, again: bool, batch: int | None, threads: int | 
             test = next(iter(campaign.tests), None) or campaign.test(_first(store))
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
-        sheet, facts = _shown(store, campaign, test)
-        click.echo(to_json(facts) if as_json else sheet, nl=False)
+        text, known = _shown(store, campaign, test)
+        click.echo(to_json(known) if as_json else text, nl=False)
 
 
 def _ask_batch(store: Path, batch: int, other: bool, threads: int | None, as_json: bool) -> None:
@@ -76,21 +73,21 @@ def _ask_batch(store: Path, batch: int, other: bool, threads: int | None, as_jso
             )
         shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]
         if as_json:
-            click.echo(to_json({"tests": [facts for _, facts in shown]}), nl=False)
+            click.echo(to_json({"tests": [known for _, known in shown]}), nl=False)
             return
         click.echo(
             f"{len(shown)} alternatives, the one most worth flying first. Fly them in any order, tell each; a test"
             f" that will not be flown: twinloop abandon {store} TEST\n"
         )
-        click.echo("\n".join(sheet for sheet, _ in shown), nl=False)
+        click.echo("\n".join(text for text, _ in shown), nl=False)
 
 
 def _shown(store: Path, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     """The sheet of a test, and the same as facts; its file is written."""
     predicted = campaign.twin.simulate(test) if campaign.experiments else None
     file = store.with_name(f"{store.stem}-test-{test.number}.csv")
-    write_columns(file, _columns(test, predicted))
-    return _sheet(store, test, predicted, file), _facts(test, file)
+    write_columns(file, columns(test, predicted))
+    return sheet(str(store), test, predicted, str(file)), facts(test, file)
 
 
 @click.command()
@@ -213,89 +210,3 @@ def numbered(campaign: Campaign, number: int) -> Test:
         last = len(campaign.tests) - 1
         raise InvalidInput(f"Test: expected a number from 0 to {last}, found {number}; ask for one first.")
     return campaign.tests[number]
-
-
-def _columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
-    """What is added to each command, and the predicted run with its band."""
-    signals = test.family.signals
-    columns = {TIME: signals.dt * np.arange(test.steps + 1)}
-    if test.excitation is not None:
-        columns |= {f"excitation_{n}": test.excitation[:, i] for i, n in enumerate(signals.command_names)}
-    if predicted is not None:
-        for i, name in enumerate(signals.state_names):
-            columns[f"predicted_{name}"] = predicted.states[:, i]
-            if predicted.band is not None:
-                columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
-    return columns
-
-
-def _expected(test: Test, predicted: Trajectory | None) -> str:
-    """What is added to each command and where each state is expected to be, in a few rows of the file's."""
-    signals = test.family.signals
-    heads, cells = ["t, s"], [[f"{signals.dt * k:.4g}" for k in range(test.steps + 1)]]
-    if test.excitation is not None:
-        for i, command in enumerate(signals.commands):
-            heads.append(f"add to {command.name}, {command.unit}".rstrip(", "))
-            cells.append([f"{value:+.3g}" for value in test.excitation[:, i]])
-    if predicted is not None:
-        for i, state in enumerate(signals.states):
-            heads.append(f"{state.name}, {state.unit}".rstrip(", "))
-            middle = [f"{value:.3g}" for value in predicted.states[:, i]]
-            if predicted.band is not None:
-                ends = predicted.band[:, :, i].T
-                middle = [
-                    f"{one} ({low:.3g} to {high:.3g})" for one, (low, high) in zip(middle, ends, strict=True)
-                ]
-            cells.append(middle)
-    chosen = sorted({round(k) for k in np.linspace(0, test.steps, min(test.steps, ROWS) + 1).tolist()})
-    rows = [[column[k] if k < len(column) else "" for column in cells] for k in chosen]
-    return table(heads, rows)
-
-
-def _facts(test: Test, file: Path) -> dict[str, object]:
-    signals = test.family.signals
-    return {
-        "test": test.number,
-        "gains": test.parameters,
-        "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
-        "target_state": dict(zip(signals.state_names, test.target_state.tolist(), strict=True)),
-        "steps": test.steps,
-        "dt": signals.dt,
-        "excited": test.excitation is not None,
-        "predicted": test.predicted,
-        "spread": test.spread,
-        "risk": test.risk,
-        "why": test.reason,
-        "file": str(file),
-    }
-
-
-def _sheet(store: Path, test: Test, predicted: Trajectory | None, file: Path) -> str:
-    """The test sheet, to be printed."""
-    signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.gains}
-    gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
-    ends = zip(signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True)
-    states = [[state.name, start, target, state.unit] for state, start, target in ends]
-    added = "none" if test.excitation is None else f"a row a period in {file}, added before the bounds"
-    lines = [
-        f"TEST {test.number} of {store}: {test.steps} periods of {signals.dt:g} s",
-        "",
-        table(["set this gain", "to", "unit"], gains),
-        "",
-        table(["state", "start", "target", "unit"], states),
-        "",
-        f"Excitation of the commands: {added}.",
-    ]
-    if test.predicted is not None and predicted is not None:
-        spread = "" if test.spread is None else f" ± {test.spread:.3g}"
-        lines.append(
-            f"Predicted quality: {test.predicted:.4g}{spread}; the predicted run with its band: {file}."
-        )
-    if test.excitation is not None or predicted is not None:
-        lines += ["", _expected(test, predicted), ""]
-    if test.risk is not None:
-        lines.append(f"Risk of leaving the envelope: {100 * test.risk:.2g} %.")
-    lines += [test.reason] if test.reason else []
-    lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")
-    lines.append(f"  twinloop tell {store} {test.number} FLIGHT.csv")
-    return "\n".join(lines) + "\n"

@@ -38,6 +38,7 @@ SAID_BY_A_FILE = (
 """Options of `run` that a campaign file has."""
 STUDIES = {
     "bench": "twinloop_exam.command",
+    "dashboard": "twinloop.faces.dashboard.command",
     "reproduce": "twinloop.reproduce.command",
     "sweep": "twinloop.sweep.command",
 }

@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import Column, ForeignKey, Integer, MetaData, String, Table, Text
 
-REVISION = "0001"
+REVISION = "0002"
 """Of these tables; the newest migration makes them."""
 
 metadata = MetaData()
@@ -58,6 +58,15 @@ abandoned = _entries("abandoned")
 """Numbers of tests that will not be flown."""
 ENTRIES = {table.name: table for table in (tests, asked, experiments, failures, abandoned)}
 """Lists of a logbook that only grow, by their names there."""
+
+approvals = Table(
+    "approvals",
+    metadata,
+    Column("campaign", Integer, ForeignKey("campaigns.id"), primary_key=True),
+    Column("number", Integer, primary_key=True),
+    Column("approved", String(40), nullable=False),
+)
+"""Numbers of tests that a person has said may be flown, and when; no campaign depends on it."""
 
 checkpoints = Table(
     "checkpoints",

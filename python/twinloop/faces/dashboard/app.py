@@ -1,0 +1,285 @@
+"""The application: addresses, and what each answers."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Awaitable, Callable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route
+
+from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
+from twinloop.faces.dashboard.desk import Desk
+from twinloop.faces.dashboard.fence import App, Fence
+from twinloop.faces.report.page import report_page, style, templates
+from twinloop.faces.report.source import source
+from twinloop.faces.sheet import columns, sheet
+from twinloop.logs import MOST_BYTES, write_columns
+
+MOST_WORDS = 10_000
+"""Bytes of what a form says."""
+LOGS = (".csv", ".npz")
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+def application(desk: Desk, hosts: tuple[str, ...], token: str = "") -> App:
+    """The dashboard of a store, behind its fence.
+
+    Args:
+        desk: of the store.
+        hosts: names that the server goes by.
+        token: that is asked for; empty: none.
+    """
+    pages = Pages(desk)
+    routes = [
+        Route("/", pages.campaigns),
+        Route("/dashboard.js", pages.script),
+        Route("/c/{place:int}", pages.campaign),
+        Route("/c/{place:int}/state", pages.state),
+        Route("/c/{place:int}/tests", pages.tests),
+        Route("/c/{place:int}/report", pages.report),
+        Route("/c/{place:int}/tests/{number:int}/sheet", pages.sheet),
+        Route("/c/{place:int}/tests/{number:int}/columns.csv", pages.columns),
+        Route("/c/{place:int}/ask", pages.ask, methods=["POST"]),
+        Route("/c/{place:int}/log", pages.attach, methods=["POST"]),
+        Route("/c/{place:int}/tests/{number:int}/approve", pages.approve, methods=["POST"]),
+        Route("/c/{place:int}/tests/{number:int}/log", pages.tell, methods=["POST"]),
+        Route("/c/{place:int}/tests/{number:int}/failed", pages.fail, methods=["POST"]),
+        Route("/c/{place:int}/tests/{number:int}/abandon", pages.abandon, methods=["POST"]),
+    ]
+    handlers: dict[Any, Any] = {TwinloopError: _refused}
+    return Fence(Starlette(routes=routes, exception_handlers=handlers), hosts, token)
+
+
+class Pages:
+    """What each address shows; the store is read for each, so that it shows what is kept now.
+
+    Args:
+        desk: of the store.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self._reports: dict[str, tuple[str, str]] = {}
+        folder = resources.files("twinloop.faces.dashboard")
+        self._files = {
+            name: folder.joinpath(name).read_text("utf-8") for name in ("page.html", "dashboard.js")
+        }
+        self._style = style() + folder.joinpath("dashboard.css").read_text("utf-8")
+
+    async def campaigns(self, request: Request) -> Response:
+        """The campaigns of the store; where there is one, that one."""
+        found = await run_in_threadpool(self.desk.campaigns)
+        if len(found) == 1:
+            return RedirectResponse("/c/1", 303)
+        return self._page(title="Campaigns", campaigns=found, name=None)
+
+    async def script(self, request: Request) -> Response:
+        """The page's own script."""
+        return Response(self._files["dashboard.js"], media_type="text/javascript")
+
+    async def campaign(self, request: Request) -> Response:
+        """The page of a campaign."""
+        name = await self._named(request)
+        return self._page(title=name, campaigns=[], name=name, at=f"/c/{request.path_params['place']}")
+
+    async def state(self, request: Request) -> Response:
+        """What the page looks for every other second."""
+        return JSONResponse(await run_in_threadpool(self.desk.state, await self._named(request)))
+
+    async def tests(self, request: Request) -> Response:
+        """The tests that wait to be flown, with what can be said of each."""
+        name = await self._named(request)
+        return JSONResponse(await run_in_threadpool(self._waiting, name))
+
+    async def report(self, request: Request) -> Response:
+        """The report, as it would be written now."""
+        name = await self._named(request)
+        return HTMLResponse(await run_in_threadpool(self._report, name))
+
+    async def sheet(self, request: Request) -> Response:
+        """A test sheet, to be printed."""
+        name, number = await self._named(request), request.path_params["number"]
+        return PlainTextResponse(await run_in_threadpool(self._sheet, name, number))
+
+    async def columns(self, request: Request) -> Response:
+        """What is added to the commands, and the predicted run."""
+        name, number = await self._named(request), request.path_params["number"]
+        text = await run_in_threadpool(self._columns, name, number)
+        disposition = f'attachment; filename="test-{number}.csv"'
+        return Response(text, media_type="text/csv", headers={"content-disposition": disposition})
+
+    async def ask(self, request: Request) -> Response:
+        """Plans the next test, behind."""
+        said = await _words(request)
+        return await self._done(
+            self.desk.ask, await self._named(request), said.get("last") is True, status=202
+        )
+
+    async def approve(self, request: Request) -> Response:
+        """Keeps that a test may be flown."""
+        return await self._done(self.desk.approve, await self._named(request), request.path_params["number"])
+
+    async def abandon(self, request: Request) -> Response:
+        """Keeps that a test will not be flown."""
+        return await self._done(self.desk.abandon, await self._named(request), request.path_params["number"])
+
+    async def fail(self, request: Request) -> Response:
+        """Keeps that a test failed, and why."""
+        reason = _reason(await _words(request), needed=True)
+        return await self._done(
+            self.desk.fail, await self._named(request), request.path_params["number"], reason
+        )
+
+    async def tell(self, request: Request) -> Response:
+        """Tells a log: the body is the file, its name and the reason of an abort stand in the address."""
+        name, number = await self._named(request), request.path_params["number"]
+        reason = _reason(dict(request.query_params), needed=False)
+        with tempfile.TemporaryDirectory() as folder:
+            log = await _received(request, Path(folder))
+            return await self._done(self.desk.tell, name, number, log, reason)
+
+    async def attach(self, request: Request) -> Response:
+        """Adds a log that nobody asked for."""
+        name = await self._named(request)
+        with tempfile.TemporaryDirectory() as folder:
+            return await self._done(self.desk.attach, name, await _received(request, Path(folder)))
+
+    async def _named(self, request: Request) -> str:
+        """Campaigns go by their place in the store: a name may hold anything."""
+        place: int = request.path_params["place"]
+        known = await run_in_threadpool(self.desk.campaigns)
+        if not 1 <= place <= len(known):
+            raise InvalidInput(f"Campaign: expected 1 to {len(known)} of this store, found {place}.")
+        return str(known[place - 1]["name"])
+
+    async def _done(self, act: Callable[..., str], *given: object, status: int = 200) -> Response:
+        return JSONResponse({"said": await run_in_threadpool(act, *given)}, status)
+
+    def _page(self, **facts: object) -> Response:
+        template = templates().from_string(self._files["page.html"])
+        policy = (
+            "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'self';"
+            " base-uri 'none'"
+        )
+        return HTMLResponse(
+            template.render(sheet=_unescaped(self._style), store=Path(self.desk.store).name, **facts),
+            headers={"content-security-policy": policy},
+        )
+
+    def _waiting(self, name: str) -> dict[str, object]:
+        campaign, may = self.desk.look(name), self.desk.approved(name)
+        first = not campaign.experiments
+        tests = [test for test in campaign.tests if test in campaign.waiting or (first and test.number == 0)]
+        return {
+            "experiments": len(campaign.experiments),
+            "tests": [
+                {
+                    "number": test.number,
+                    "gains": {gain: f"{value:.6g}" for gain, value in test.parameters.items()},
+                    "predicted": None if test.predicted is None else f"{test.predicted:.4g}",
+                    "spread": None if test.spread is None else f"{test.spread:.2g}",
+                    "risk": None if test.risk is None else f"{100 * test.risk:.2g} %",
+                    "reason": test.reason,
+                    "approved": may.get(test.number) if test.number is not None else None,
+                }
+                for test in tests
+            ],
+        }
+
+    def _report(self, name: str) -> str:
+        now = str(self.desk.state(name)["state"])
+        if self._reports.get(name, ("", ""))[0] != now:
+            found = source(self.desk.store, name)
+            page = report_page(found.campaign, found.name, {"name": found.system}, {}, found.sessions)
+            self._reports[name] = now, page
+        return self._reports[name][1]
+
+    def _sheet(self, name: str, number: int) -> str:
+        campaign = self.desk.look(name)
+        test = _of(campaign.tests, number)
+        predicted = campaign.twin.simulate(test) if campaign.experiments else None
+        return sheet(Path(self.desk.store).name, test, predicted, f"test-{number}.csv")
+
+    def _columns(self, name: str, number: int) -> str:
+        campaign = self.desk.look(name)
+        test = _of(campaign.tests, number)
+        predicted = campaign.twin.simulate(test) if campaign.experiments else None
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "columns.csv"
+            write_columns(path, columns(test, predicted))
+            return path.read_text("utf-8")
+
+
+def _of(tests: Any, number: int) -> Any:
+    if not 0 <= number < len(tests):
+        raise InvalidInput(f"Test: expected a number from 0 to {len(tests) - 1}, found {number}.")
+    return tests[number]
+
+
+async def _body(request: Request, most: int) -> bytes:
+    """The body of a request, of which no more is ever held than is allowed."""
+    found = bytearray()
+    try:
+        async for piece in request.stream():
+            found += piece
+            if len(found) > most:
+                raise InvalidInput(
+                    f"Upload: expected at most {most} bytes, found more; cut it to the flight."
+                )
+    except ClientDisconnect:
+        raise InvalidInput(
+            "Upload: expected it whole, found that it stopped half-way; send it again."
+        ) from None
+    return bytes(found)
+
+
+async def _words(request: Request) -> dict[str, Any]:
+    body = await _body(request, MOST_WORDS)
+    try:
+        found = json.loads(body or b"{}")
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise InvalidInput("Form: expected one JSON object, found something else.")
+    return found
+
+
+def _reason(said: dict[str, Any], needed: bool) -> str:
+    reason = said.get("reason", "")
+    if not isinstance(reason, str) or len(reason) > 500 or (needed and not reason.strip()):
+        raise InvalidInput(
+            "Reason: expected a few words, at most 500 characters, found none or more; say why."
+        )
+    return reason.strip()
+
+
+async def _received(request: Request, folder: Path) -> Path:
+    """The body as a file; of the name that it had elsewhere only the ending counts."""
+    suffix = Path(request.query_params.get("file", "")).suffix.lower()
+    if suffix not in LOGS:
+        raise InvalidInput(f"Log: expected a file that ends with {' or '.join(LOGS)}, found another one.")
+    path = folder / f"log{suffix}"
+    path.write_bytes(await _body(request, MOST_BYTES))
+    return path
+
+
+async def _refused(request: Request, failure: Exception) -> Response:
+    """A sentence instead of a page."""
+    status = 409 if isinstance(failure, StoreFailure) else 422
+    if request.url.path.endswith("/report"):
+        return PlainTextResponse(f"{failure}\n", 200)
+    return JSONResponse({"failed": str(failure)}, status)
+
+
+def _unescaped(text: str) -> Any:
+    from markupsafe import Markup
+
+    return Markup(text)

@@ -1,0 +1,113 @@
+// Looks every other second whether anything has changed, and sends what people say.
+"use strict";
+(() => {
+  const at = document.body.dataset.at;
+  if (at === undefined) return;
+  const get = (id) => document.getElementById(id);
+  const frame = get("report");
+  let state = null, busy = false;
+
+  const say = (text, bad) => {
+    const said = get("said");
+    said.textContent = text || "";
+    said.className = bad ? "bad" : "";
+  };
+  const send = async (path, body) => {
+    say("");
+    try {
+      const answer = await fetch(at + path, { method: "POST", body });
+      const found = await answer.json();
+      say(found.said || found.failed, !answer.ok);
+    } catch (failure) {
+      say("The dashboard does not answer: " + failure.message, true);
+    }
+    await look();
+  };
+  const words = (path, what) => send(path, JSON.stringify(what));
+  const log = (path, file, reason) => {
+    const asked = new URLSearchParams({ file: file.name });
+    if (reason) asked.set("reason", reason);
+    return send(path + "?" + asked, file);
+  };
+  const droppable = (zone, input, take) => {
+    zone.addEventListener("dragover", (event) => { event.preventDefault(); zone.classList.add("over"); });
+    zone.addEventListener("dragleave", () => zone.classList.remove("over"));
+    zone.addEventListener("drop", (event) => {
+      event.preventDefault();
+      zone.classList.remove("over");
+      if (event.dataTransfer.files.length === 1) take(event.dataTransfer.files[0]);
+      else say("Expected one file, found " + event.dataTransfer.files.length + ".", true);
+    });
+    input.addEventListener("change", () => { if (input.files.length) take(input.files[0]); input.value = ""; });
+  };
+
+  const card = (test) => {
+    const part = get("test").content.cloneNode(true), one = (name) => part.querySelector(name);
+    const path = "/tests/" + test.number;
+    one("h3").textContent = "Test " + test.number;
+    one(".reason").textContent = test.reason || "";
+    const rows = Object.entries(test.gains);
+    if (test.predicted !== null) rows.push(["quality predicted", test.predicted + (test.spread === null ? "" : " ± " + test.spread)]);
+    if (test.risk !== null) rows.push(["risk of leaving the envelope", test.risk]);
+    for (const [name, value] of rows) {
+      const row = one("tbody").insertRow(), head = document.createElement("th");
+      head.scope = "row";
+      head.textContent = name;
+      row.append(head);
+      row.insertCell().textContent = value;
+    }
+    one(".sheet").href = at + path + "/sheet";
+    one(".columns").href = at + path + "/columns.csv";
+    one(".approve").hidden = test.approved !== null;
+    one(".approved").textContent = test.approved === null ? "" : "Approved " + test.approved.slice(0, 16).replace("T", " ") + " UTC";
+    one(".approve").addEventListener("click", () => words(path + "/approve", {}));
+    const aborted = one(".aborted"), why = one(".why");
+    one(".fail").addEventListener("click", () => words(path + "/failed", { reason: why.value }));
+    one(".abandon").addEventListener("click", () => words(path + "/abandon", {}));
+    droppable(one(".drop"), one(".drop input[type=file]"), (file) => log(path + "/log", file, aborted.value));
+    return part;
+  };
+
+  const show = async () => {
+    const found = await (await fetch(at + "/tests")).json();
+    const cards = found.tests ? found.tests.map(card) : [];
+    if (!cards.length) {
+      const none = document.createElement("p");
+      none.textContent = found.failed || "None waits to be flown.";
+      cards.push(none);
+    }
+    get("tests").replaceChildren(...cards);
+    if (state !== null) frame.contentWindow.location.replace(at + "/report");
+  };
+  const look = async () => {
+    if (busy) return;
+    busy = true;
+    try {
+      const now = await (await fetch(at + "/state")).json();
+      get("ask").disabled = now.working !== null;
+      get("status").textContent = now.working === null ? "Up to date." : "Working: " + now.working + " (" + now.seconds + " s)";
+      if (now.failed) say(now.failed, true);
+      if (now.state !== state && now.working === null) {
+        await show();
+        state = now.state;
+      }
+    } catch (failure) {
+      get("status").textContent = "The dashboard does not answer.";
+    } finally {
+      busy = false;
+    }
+  };
+
+  const fit = () => {
+    const page = frame.contentDocument && frame.contentDocument.documentElement;
+    if (page) frame.style.height = page.scrollHeight + "px";
+  };
+  frame.addEventListener("load", () => {
+    fit();
+    new ResizeObserver(fit).observe(frame.contentDocument.body);
+  });
+  get("ask").addEventListener("click", () => words("/ask", { last: get("last").checked }));
+  droppable(get("attach"), get("attached"), (file) => log("/log", file, ""));
+  look();
+  setInterval(look, 2000);
+})();

@@ -1,0 +1,119 @@
+"""The test sheet: gains to set, where to begin and end, what is added to the commands, and what is foretold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from twinloop.faces.text import table
+from twinloop.logs import TIME
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+ROWS = 10
+"""Of the predicted run on a sheet, after the first; the file has all."""
+
+
+def columns(test: Test, predicted: Trajectory | None) -> dict[str, np.ndarray]:
+    """What is added to each command, and the predicted run with its band, by name.
+
+    Args:
+        test: to be flown.
+        predicted: its run on the twin; None where nothing is known yet.
+    """
+    signals = test.family.signals
+    columns = {TIME: signals.dt * np.arange(test.steps + 1)}
+    if test.excitation is not None:
+        columns |= {f"excitation_{n}": test.excitation[:, i] for i, n in enumerate(signals.command_names)}
+    if predicted is not None:
+        for i, name in enumerate(signals.state_names):
+            columns[f"predicted_{name}"] = predicted.states[:, i]
+            if predicted.band is not None:
+                columns[f"low_{name}"], columns[f"high_{name}"] = predicted.band[:, :, i]
+    return columns
+
+
+def _expected(test: Test, predicted: Trajectory | None) -> str:
+    """What is added to each command and where each state is expected to be, in a few rows of the file's."""
+    signals = test.family.signals
+    heads, cells = ["t, s"], [[f"{signals.dt * k:.4g}" for k in range(test.steps + 1)]]
+    if test.excitation is not None:
+        for i, command in enumerate(signals.commands):
+            heads.append(f"add to {command.name}, {command.unit}".rstrip(", "))
+            cells.append([f"{value:+.3g}" for value in test.excitation[:, i]])
+    if predicted is not None:
+        for i, state in enumerate(signals.states):
+            heads.append(f"{state.name}, {state.unit}".rstrip(", "))
+            middle = [f"{value:.3g}" for value in predicted.states[:, i]]
+            if predicted.band is not None:
+                ends = predicted.band[:, :, i].T
+                middle = [
+                    f"{one} ({low:.3g} to {high:.3g})" for one, (low, high) in zip(middle, ends, strict=True)
+                ]
+            cells.append(middle)
+    chosen = sorted({round(k) for k in np.linspace(0, test.steps, min(test.steps, ROWS) + 1).tolist()})
+    rows = [[column[k] if k < len(column) else "" for column in cells] for k in chosen]
+    return table(heads, rows)
+
+
+def facts(test: Test, file: Path) -> dict[str, object]:
+    """The sheet as values.
+
+    Args:
+        test: to be flown.
+        file: where its columns are.
+    """
+    signals = test.family.signals
+    return {
+        "test": test.number,
+        "gains": test.parameters,
+        "initial_state": dict(zip(signals.state_names, test.initial_state.tolist(), strict=True)),
+        "target_state": dict(zip(signals.state_names, test.target_state.tolist(), strict=True)),
+        "steps": test.steps,
+        "dt": signals.dt,
+        "excited": test.excitation is not None,
+        "predicted": test.predicted,
+        "spread": test.spread,
+        "risk": test.risk,
+        "why": test.reason,
+        "file": str(file),
+    }
+
+
+def sheet(store: str, test: Test, predicted: Trajectory | None, file: str) -> str:
+    """The test sheet, to be printed.
+
+    Args:
+        store: of the campaign, as the next command names it.
+        test: to be flown.
+        predicted: its run on the twin; None where nothing is known yet.
+        file: where its columns are.
+    """
+    signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.gains}
+    gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
+    ends = zip(signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True)
+    states = [[state.name, start, target, state.unit] for state, start, target in ends]
+    added = "none" if test.excitation is None else f"a row a period in {file}, added before the bounds"
+    lines = [
+        f"TEST {test.number} of {store}: {test.steps} periods of {signals.dt:g} s",
+        "",
+        table(["set this gain", "to", "unit"], gains),
+        "",
+        table(["state", "start", "target", "unit"], states),
+        "",
+        f"Excitation of the commands: {added}.",
+    ]
+    if test.predicted is not None and predicted is not None:
+        spread = "" if test.spread is None else f" ± {test.spread:.3g}"
+        lines.append(
+            f"Predicted quality: {test.predicted:.4g}{spread}; the predicted run with its band: {file}."
+        )
+    if test.excitation is not None or predicted is not None:
+        lines += ["", _expected(test, predicted), ""]
+    if test.risk is not None:
+        lines.append(f"Risk of leaving the envelope: {100 * test.risk:.2g} %.")
+    lines += [test.reason] if test.reason else []
+    lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")
+    lines.append(f"  twinloop tell {store} {test.number} FLIGHT.csv")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,69 @@
+"""What people say of tests that a campaign has asked for: this one may be flown. And whether anything has changed."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+
+from twinloop.store.database import Store
+
+
+def approve(store: Store, name: str, number: int) -> None:
+    """Keeps that a test may be flown; once is enough.
+
+    Args:
+        store: open, to be written.
+        name: of the campaign, which is there.
+        number: of the test, which is there.
+
+    Raises:
+        StoreFailure: the database refuses.
+    """
+    from sqlalchemy import insert, select
+
+    from twinloop.store.schema import approvals, campaigns
+
+    with store.transaction() as connection:
+        campaign = connection.execute(select(campaigns.c.id).where(campaigns.c.name == name)).scalar_one()
+        of_test = (approvals.c.campaign == campaign) & (approvals.c.number == number)
+        if connection.execute(select(approvals.c.number).where(of_test)).first() is None:
+            when = datetime.now(timezone.utc).isoformat(timespec="seconds")
+            connection.execute(insert(approvals).values(campaign=campaign, number=number, approved=when))
+
+
+def approved(store: Store, name: str) -> dict[int, str]:
+    """When each test was approved, in UTC, by its number.
+
+    Args:
+        store: open.
+        name: of the campaign.
+    """
+    from sqlalchemy import select
+
+    from twinloop.store.schema import approvals, campaigns
+
+    with store.transaction() as connection:
+        chosen = (
+            select(approvals.c.number, approvals.c.approved).join(campaigns).where(campaigns.c.name == name)
+        )
+        return {number: when for number, when in connection.execute(chosen.order_by(approvals.c.number))}
+
+
+def state(store: Store, name: str) -> str:
+    """A text that is another one whenever anything of a campaign was kept since; it reads no record.
+
+    Args:
+        store: open.
+        name: of the campaign.
+    """
+    from sqlalchemy import func, select
+
+    from twinloop.store.schema import ENTRIES, approvals, campaigns, checkpoints
+
+    of_this = select(campaigns.c.id).where(campaigns.c.name == name).scalar_subquery()
+    counts = [
+        select(func.count()).select_from(table).where(table.c.campaign == of_this).scalar_subquery()
+        for table in (*ENTRIES.values(), approvals)
+    ]
+    saved = select(checkpoints.c.saved).where(checkpoints.c.campaign == of_this).scalar_subquery()
+    with store.transaction() as connection:
+        return " ".join(str(value) for value in connection.execute(select(*counts, saved)).one())

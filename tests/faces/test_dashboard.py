@@ -1,0 +1,281 @@
+"""The dashboard as people and strangers meet it: over HTTP, and in a browser."""
+
+import contextlib
+import http.client
+import json
+import os
+import threading
+import time
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from conftest import PENDULUM_GAINS
+from lives import PLANT, stored
+
+pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
+pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
+
+from twinloop.faces.dashboard import app, desk
+from twinloop.faces.dashboard.command import prepared
+from twinloop.logs import write_columns
+
+HOSTILE = "<script>alert(1)</script> & ../../etc"
+
+
+@contextlib.contextmanager
+def served(store, **how):
+    """A dashboard that runs, and its address."""
+    server, address = prepared(str(store), 0, threads=1, **how)
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    for _ in range(100):
+        if server.server.started:
+            break
+        time.sleep(0.05)
+    try:
+        yield address
+    finally:
+        server.stop()
+        thread.join(10.0)
+
+
+def call(address, method, path, body=None, **headers):
+    """Status, headers and text of an answer."""
+    where = urlsplit(address)
+    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=60)
+    sent = {"Origin": f"http://{where.netloc}"} if method == "POST" else {}
+    connection.request(method, path, body, {**sent, **{k.replace("_", "-"): v for k, v in headers.items()}})
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, dict(answer.getheaders()), text
+
+
+def flight(path, test, steps=None):
+    """The log of a test, as a rig would have written it."""
+    run = PLANT.run(test)
+    n = run.steps if steps is None else steps
+    columns = {"t": run.t[: n + 1], "angle": run.states[: n + 1, 0], "rate": run.states[: n + 1, 1]}
+    write_columns(path, {**columns, "torque": run.commands[:n, 0]})
+    return path.read_bytes()
+
+
+@pytest.fixture
+def store(tmp_path):
+    path = tmp_path / "hover.db"
+    campaign = stored(path, preset="default")
+    test = campaign.test(PENDULUM_GAINS)
+    campaign.tell(test, PLANT.run(test))
+    campaign.ask()
+    campaign.close()
+    return path
+
+
+def look(store, name="campaign"):
+    return tl.Campaign.load(store, name, read_only=True)
+
+
+def test_a_test_is_approved_told_and_the_next_one_planned(store, tmp_path):
+    with served(store) as address:
+        shown = json.loads(call(address, "GET", "/c/1/tests")[2])
+        assert [test["number"] for test in shown["tests"]] == [1] and shown["tests"][0]["approved"] is None
+        assert call(address, "POST", "/c/1/tests/1/approve")[0] == 200
+        assert json.loads(call(address, "GET", "/c/1/tests")[2])["tests"][0]["approved"]
+        sheet = call(address, "GET", "/c/1/tests/1/sheet")[2]
+        assert "TEST 1" in sheet and "angle.kp" in sheet
+        columns = call(address, "GET", "/c/1/tests/1/columns.csv")[2]
+        assert columns.startswith("t,") and "predicted_angle" in columns
+        log = flight(tmp_path / "flight.csv", look(store).tests[1])
+        status, _, said = call(address, "POST", "/c/1/tests/1/log?file=flight.csv", log)
+        assert status == 200 and "2 experiments" in said
+        assert call(address, "POST", "/c/1/ask", "{}")[0] == 202
+        for _ in range(300):
+            state = json.loads(call(address, "GET", "/c/1/state")[2])
+            if state["working"] is None:
+                break
+            time.sleep(0.1)
+        assert state["failed"] is None
+    campaign = look(store)
+    assert [test.number for test in campaign.waiting] == [2]
+    np.testing.assert_array_equal(
+        campaign.experiments[1].trajectory.states, PLANT.run(campaign.tests[1]).states
+    )
+
+
+def test_what_went_wrong_is_told(store, tmp_path):
+    with served(store) as address:
+        log = flight(tmp_path / "flight.csv", look(store).tests[1], steps=10)
+        status, _, said = call(address, "POST", "/c/1/tests/1/log?file=flight.csv", log)
+        assert status == 422 and "found 10" in said
+        status, _, _ = call(address, "POST", "/c/1/tests/1/log?file=a.csv&reason=wind", log)
+        assert status == 200
+        assert look(store).experiments[1].trajectory.reason == "wind"
+        attached = flight(tmp_path / "other.csv", look(store).tests[0])
+        assert call(address, "POST", "/c/1/log?file=x.csv", attached)[0] == 200
+    with served(store) as address:
+        other = tl.Campaign.load(store, threads=1)
+        asked = other.ask()
+        assert call(address, "POST", f"/c/1/tests/{asked.number}/abandon", "{}")[0] == 409  # a second writer
+        other.close()
+        words = json.dumps({"reason": "the motor cut out"})
+        assert call(address, "POST", f"/c/1/tests/{asked.number}/failed", words)[0] == 200
+    assert [failure.reason for failure in look(store).failures] == ["the motor cut out"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "word"),
+    [
+        ("/c/1/tests/1/log?file=flight.csv", b"no columns", "column"),
+        ("/c/1/tests/1/log?file=flight.exe", b"", "csv"),
+        ("/c/1/tests/1/log?file=../../../etc/passwd", b"", "csv"),
+        ("/c/1/tests/1/log?file=a.npz", b"\x80\x04pickle", "NumPy"),
+        ("/c/1/tests/99/log?file=a.csv", b"t,angle,rate,torque\n0,0,0,0\n.05,0,0,0\n", "0 to 1"),
+        ("/c/1/tests/1/failed", b"{}", "say why"),
+        ("/c/1/tests/1/failed", b"[1", "JSON"),
+        ("/c/1/tests/0/approve", b"", "waits"),
+        ("/c/7/tests/1/approve", b"", "of this store"),
+        ("/c/..%2F..%2Fetc/tests/1/approve", b"", "Not Found"),
+    ],
+)
+def test_what_cannot_be_used_is_one_sentence_and_changes_nothing(store, path, body, word):
+    with served(store) as address:
+        before = call(address, "GET", "/c/1/state")[2]
+        status, _, said = call(address, "POST", path, body)
+        assert status in (404, 422) and word in said and "Traceback" not in said
+        assert call(address, "GET", "/c/1/state")[2] == before
+
+
+def test_an_upload_without_end_is_cut_off(store, monkeypatch):
+    monkeypatch.setattr(app, "MOST_BYTES", 100_000)
+    with served(store) as address:
+        with contextlib.suppress(ConnectionError, BrokenPipeError):
+            status, _, said = call(address, "POST", "/c/1/log?file=a.csv", bytes(5_000_000))
+            assert status == 422 and "at most" in said
+        assert call(address, "GET", "/c/1/state")[0] == 200
+
+
+def test_pages_elsewhere_and_other_names_are_refused(store):
+    with served(store) as address:
+        before = call(address, "GET", "/c/1/state")[2]
+        for headers in (
+            {"Origin": "http://evil.example"},
+            {"Origin": "null"},
+            {"Sec_Fetch_Site": "cross-site"},
+            {"Origin": "http://127.0.0.1:1"},
+        ):
+            assert call(address, "POST", "/c/1/tests/1/abandon", "{}", **headers)[0] == 403
+        assert call(address, "GET", "/", Host="evil.example")[0] == 421
+        assert call(address, "GET", "/c/1/state", Host="127.0.0.1.evil.example:80")[0] == 421
+        assert call(address, "GET", "/c/1/state")[2] == before
+        _, headers, _ = call(address, "GET", "/c/1")
+        assert "default-src 'self'" in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff" and "access-control-allow-origin" not in headers
+
+
+def test_others_need_the_token(store):
+    with served(store, token="a-secret-that-is-long") as address:
+        assert address.endswith("?token=a-secret-that-is-long")
+        assert call(address, "GET", "/c/1")[0] == 401
+        assert call(address, "GET", "/c/1?token=another")[0] == 401
+        assert call(address, "POST", "/c/1/tests/1/approve", "{}")[0] == 401
+        status, headers, _ = call(address, "GET", "/c/1?token=a-secret-that-is-long")
+        cookie = headers["set-cookie"]
+        assert status == 200 and "HttpOnly" in cookie and "SameSite=Strict" in cookie
+        known = cookie.partition(";")[0]
+        assert call(address, "GET", "/c/1/state", Cookie=known)[0] == 200
+        assert call(address, "POST", "/c/1/tests/1/approve", "{}", Cookie=known)[0] == 200
+
+
+def test_a_host_that_others_see_gets_a_token_of_its_own(store):
+    server, address = prepared(str(store), 0, host="0.0.0.0")
+    server.socket.close()
+    assert len(urlsplit(address).query) > 30
+    with pytest.raises(tl.InvalidInput, match="16 characters"):
+        prepared(str(store), 0, token="short")
+
+
+def test_a_store_that_is_none_and_a_port_that_is_taken_are_refused(store, tmp_path):
+    with pytest.raises(tl.InvalidInput):
+        prepared(str(tmp_path / "none.db"), 0)
+    with served(store) as address, pytest.raises(tl.InvalidInput, match="free port"):
+        prepared(str(store), urlsplit(address).port)
+
+
+def test_names_of_strangers_stay_text(tmp_path):
+    path = tmp_path / "many.db"
+    for name in (HOSTILE, "other"):
+        campaign = stored(path, name=name)
+        campaign.test(PENDULUM_GAINS)
+        campaign.close()
+    with served(path) as address:
+        page = call(address, "GET", "/")[2]
+        assert "<script>alert" not in page and "&lt;script&gt;" in page
+        assert "None yet" not in page and page.count("<li>") == 2
+        assert "<script>alert" not in call(address, "GET", "/c/1")[2]
+        assert call(address, "GET", "/c/1/tests/0/sheet")[0] == 200
+
+
+def test_only_one_long_thing_goes_on_at_a_time(store, monkeypatch):
+    table = desk.Desk(str(store), threads=1)
+    held = threading.Event()
+    monkeypatch.setattr(tl.Campaign, "ask", lambda *_, **__: held.wait(10.0))
+    table.ask("campaign", False)
+    with pytest.raises(tl.InvalidInput, match="under way"):
+        table.ask("campaign", False)
+    with pytest.raises(tl.InvalidInput, match="under way"):
+        table.abandon("campaign", 1)
+    held.set()
+    for _ in range(100):
+        if table.state("campaign")["working"] is None:
+            break
+        time.sleep(0.05)
+    table.abandon("campaign", 1)
+
+
+# In a browser
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    browser = pytest.importorskip("browser")
+    with browser.browser() as started:
+        yield started
+
+
+@pytest.mark.parametrize("size", ["desktop", "phone", "dark"])
+def test_a_log_is_dropped_and_the_page_follows(chromium, store, tmp_path, size):
+    from browser import SIZES, kept, serious
+
+    width, height, scheme = SIZES[size]
+    with served(store) as address:
+        context = chromium.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+        page, said = context.new_page(), []
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto(address)
+        page.get_by_role("heading", name="Test 1").wait_for()
+        page.get_by_role("button", name="Approve").click()
+        page.get_by_text("Approved 20").wait_for()
+        page.frame_locator("#report").locator("svg.plot").first.wait_for()
+        page.wait_for_timeout(300)
+        kept(page, f"dashboard-{size}")
+        assert serious(page) == []
+        bad = tmp_path / "bad.csv"
+        bad.write_text("a,b\n1,2\n")
+        page.locator(".test input[type=file]").set_input_files(bad)
+        page.get_by_role("alert").get_by_text("column").wait_for()
+        flight(tmp_path / "flight.csv", look(store).tests[1])
+        page.locator(".test input[type=file]").set_input_files(tmp_path / "flight.csv")
+        page.get_by_text("2 experiments are kept").wait_for()
+        page.get_by_text("None waits to be flown").wait_for(timeout=30_000)
+        page.get_by_role("button", name="Plan the next test").click()
+        page.get_by_role("heading", name="Test 2").wait_for(timeout=60_000)
+        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+        assert wide[0] <= wide[1]
+        # A refused upload is an answer that the browser reports by itself.
+        assert [text for text in said if "422" not in text] == []
+        context.close()
+    assert os.path.exists(store) and len(look(store).experiments) == 2
