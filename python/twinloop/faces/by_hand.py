@@ -123,7 +123,9 @@ def tell(store: Path, test: int, flight: Path | None, failed: str | None, aborte
                     f"Log {flight}: expected the {known.steps} steps of test {test}, found {run.steps}; record it"
                     " whole, or say why it was stopped: --aborted REASON."
                 )
-            if any(_same(run, told.trajectory) for told in campaign.experiments):
+            if any(
+                _same(run, told.trajectory) and not _again(told.test, known) for told in campaign.experiments
+            ):
                 raise InvalidInput(
                     f"Log {flight}: expected a flight that was not told yet, found one that was, to the last digit;"
                     " nothing has changed. Name the log of this flight."
@@ -157,6 +159,15 @@ def abandon(store: Path, test: int) -> None:
 def _count(campaign: Campaign) -> str:
     told = len(campaign.experiments)
     return f"{told} experiment{'' if told == 1 else 's'}"
+
+
+def _again(earlier: Test | None, test: Test) -> bool:
+    """Whether a test asks for what another one did: an exact simulator then flies the same."""
+    if earlier is None or earlier.number == test.number or not np.array_equal(earlier.genes, test.genes):
+        return False
+    if earlier.excitation is None or test.excitation is None:
+        return earlier.excitation is test.excitation
+    return bool(np.array_equal(earlier.excitation, test.excitation))
 
 
 def _same(one: Trajectory, other: Trajectory) -> bool:
