@@ -400,3 +400,24 @@ def test_ctrl_c_under_default_shows_the_best_so_far_if_there_is_any(monkeypatch,
     result = json.loads(done.stdout)
     assert result["interrupted"] is True and len(result["experiments"]) == 2
     assert [lesson["tests"] for lesson in result["iterations"]] == [[0]]
+
+
+def test_a_test_that_is_too_risky_is_not_flown_and_the_command_fails(monkeypatch):
+    def refused(self, system, experiments=4, *, timeout=None, max_risk=None):
+        plain(self, system, 1)
+        raise twinloop.TooRisky(f"Campaign.run: expected at most {max_risk:g}, found 0.4; it waits.")
+
+    plain = twinloop.Campaign.run
+    monkeypatch.setattr(twinloop.Campaign, "run", refused)
+    small = [
+        "--set",
+        "moves=1500",
+        "--set",
+        "generations=0",
+        "--set",
+        "evaluations=256",
+        "--set",
+        "lags=false",
+    ]
+    answer = invoke("run", "quadrotor", "--max-risk", "0.1", "--threads", "1", *small)
+    assert answer.exit_code == 1 and "expected at most 0.1, found 0.4" in answer.stderr

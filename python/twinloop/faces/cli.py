@@ -115,6 +115,7 @@ def main(context: click.Context) -> None:
     "--store", metavar="FILE.db|URL", help="Keep the campaign there; go on with the one that is there."
 )
 @click.option("--name", default="campaign", show_default=True, help="Of the campaign in its store.")
+@click.option("--max-risk", type=float, help="Fly no test that leaves the envelope more probably.")
 @answers
 @click.pass_context
 def run(
@@ -134,6 +135,7 @@ def run(
     changes: tuple[str, ...],
     store: str | None,
     name: str,
+    max_risk: float | None,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -174,7 +176,7 @@ def run(
         store=store,
         name=name,
     )
-    context.exit(work(campaign, rig, watch, experiments, output, plot, as_json))
+    context.exit(work(campaign, rig, watch, experiments, output, plot, as_json, max_risk=max_risk))
 
 
 for command in (new, ask, tell, attach, abandon):

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import click
 
 from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.errors import InvalidInput
+from twinloop.errors import InvalidInput, TooRisky
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_picture, check_writable, write_text
 from twinloop.faces.result import Result, summary, to_json
@@ -71,6 +71,7 @@ def work(
     as_json: bool,
     name: str = "quadrotor",
     timeout: float | None = None,
+    max_risk: float | None = None,
 ) -> int:
     """Flies a campaign to its end, and shows what came out.
 
@@ -84,17 +85,23 @@ def work(
         as_json: whether the result is printed as JSON.
         name: of the system.
         timeout: seconds that a run may take; None: as long as it wants.
+        max_risk: probability of leaving the envelope above which a test is not flown; None: any.
 
     Returns:
-        The exit code: 130 after an interruption, 1 where no controller is fit to fly.
+        The exit code: 130 after an interruption, 1 where no controller is fit to fly, or a test was too risky.
 
     Raises:
         KeyboardInterrupt: an interruption before there was a result.
     """
     clock = Stopwatch(campaign.threads)
+    stopped = False
     try:
         with watch, suppress(KeyboardInterrupt):
-            campaign.run(rig, experiments, timeout=timeout)
+            try:
+                campaign.run(rig, experiments, timeout=timeout, max_risk=max_risk)
+            except TooRisky as reason:
+                click.echo(str(reason), err=True)
+                stopped = True
             controller_to_fly(campaign)  # learns the last flight
         if campaign.interrupted and campaign.store is not None:
             click.echo(f"Kept: twinloop resume {campaign.store} goes on from here.", err=True)
@@ -112,7 +119,7 @@ def work(
     if plot is not None:
         _uninterrupted(lambda: campaign.plot(plot))
         click.echo(f"Picture: {plot}", err=True)
-    return 130 if campaign.interrupted else 1 if result["controller"] is None else 0
+    return 130 if campaign.interrupted else 1 if stopped or result["controller"] is None else 0
 
 
 def show_result(result: Result, as_json: bool) -> None:
