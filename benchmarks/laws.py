@@ -100,7 +100,7 @@ def learnt(name, noise, changes, seed=0):
         "r2": followed(found.model, run_of(system, system.tested)),
         "seconds": seconds,
         "equations": [str(sp.N(equation, 4)) for equation in equations],
-        "remarks": [str(remark) for remark in found.remarks],
+        "remarks": [remark.sentence for remark in found.remarks],
     }
 
 

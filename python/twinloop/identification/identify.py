@@ -1,6 +1,6 @@
 """Identification: from recorded runs to a model of readable equations and a committee of plausible ones.
 
-The steps, each of them an option: the noise is estimated; terms are selected up a ladder of libraries, then evolved;
+The steps, each of them an option: what outputs mean is decided; the noise is estimated; terms are selected up a ladder of libraries, then evolved;
 offsets of sensors, lags and delays of the actuators are searched by description length; constants are tuned on
 predictions; the whole is repeated on states that the model has smoothed.
 """
@@ -19,6 +19,7 @@ from twinloop.arrays import Floats
 from twinloop.identification.fit.committee import committee
 from twinloop.identification.fit.fitting import Fitting, Tuned, described
 from twinloop.identification.fit.parts import parts
+from twinloop.identification.forms import candidates, likeliest
 from twinloop.identification.identified import Identified
 from twinloop.identification.inputs.hidden import PRICE, enter_directions, filled, search_hidden
 from twinloop.identification.inputs.lags import search_actuators
@@ -46,6 +47,8 @@ SEATS = 4
 """Of so many members one is of a part of the only run."""
 WHOLE = 0
 """Number of the unit of work that searches whole runs; those of parts follow."""
+FORMS = 100
+"""Number of the unit of work that tries the first form; those of others follow."""
 
 
 def identify_runs(
@@ -77,8 +80,28 @@ def identify_runs(
         What was learnt.
     """
     runs = [run.continued(signals) for run in runs]
-    learner = _Learner(runs, signals, options, rests, seed, iteration, known, workers, watch)
-    return learner.learn()
+    unit = Unit(seed, (iteration,))
+    forms = candidates(options.form, signals, runs)
+    if known is not None and len(runs) > LAGS_AGAIN and known.model.form in forms:
+        forms = (known.model.form,)
+
+    def length(form: str) -> float:
+        place = FORMS + forms.index(form)
+        brief = replace(options.brief(), form=form)
+        pool = Pool(signals.n_x + signals.n_u, len(options.operators))
+        selection = Selection(runs, signals, brief, pool, None, unit.part(place), workers)
+        direct = stages(runs, signals, Actuation.direct(signals))
+        problem = Problem(pool, runs, direct, signals.dt, workers, selection.told, as_integrated=True)
+        return total(selection.alone(problem))
+
+    if len(forms) > 1:
+        watch("form")
+    form, said = likeliest(forms, length)
+    learner = _Learner(
+        runs, signals, replace(options, form=form), rests, seed, iteration, known, workers, watch
+    )
+    found = learner.learn()
+    return replace(found, remarks=[*said, *found.remarks])
 
 
 class _Learner:
@@ -102,7 +125,7 @@ class _Learner:
         self.unit = Unit(seed, (iteration,))
         self._looks = 0
         self.watch = watch
-        self.known = known if known is not None and known.model.form == options.form_for(signals) else None
+        self.known = known if known is not None and known.model.form == options.form else None
         if self.known is None:
             self.pool = Pool(signals.n_x + signals.n_u, len(options.operators))
         else:

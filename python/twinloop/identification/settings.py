@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from twinloop.identification.terms.libraries import LIBRARIES
-from twinloop.signals import Signals
 
 FORMS = ("auto", "absolute", "increment", "acceleration")
 LEAST_MOVES = 100
@@ -17,8 +16,9 @@ class IdentificationOptions:
     """How a twin is learnt.
 
     Args:
-        form: what a program's outputs mean; "auto": accelerations where the signals declare derivatives or a rigid
-            body, else increments.
+        form: what a program's outputs mean, "acceleration" (derivatives of the states whose motion no others give),
+            "increment" (what a period adds) or "absolute" (the next state); "auto": derivatives, unless increments
+            describe the readings more briefly, as they do those of a simulator that takes one Euler step a period.
         libraries: that terms are taken from, any of "linear", "quadratic", "damping", "roots", "friction",
             "trigonometric", "quotients", "cubic"; none: evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
@@ -85,8 +85,7 @@ class IdentificationOptions:
     parts: bool = True
     divergence_factor: float = 10.0
 
-    def form_for(self, signals: Signals) -> str:
-        """The form, where "auto" is decided by the signals."""
-        if self.form != "auto":
-            return self.form
-        return "acceleration" if len(signals.driven) < signals.n_x else "increment"
+    def brief(self) -> IdentificationOptions:
+        """The same for a short look: a fourth of the moves, and terms of libraries only, where there are any."""
+        generations = 0 if self.libraries else self.generations
+        return replace(self, generations=generations, moves=max(LEAST_MOVES, self.moves // 4))

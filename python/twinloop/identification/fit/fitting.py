@@ -76,7 +76,7 @@ class Fitting:
         self.runs = list(runs)
         self.pool = pool
         self.signals = signals
-        self.form = options.form_for(signals)
+        self.form = options.form
         self.options = options
         self.run_limits = RunLimits(signals, options.divergence_factor)
         self.unit = unit

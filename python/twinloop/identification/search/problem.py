@@ -26,6 +26,8 @@ class Problem:
         dt: period, s.
         workers: how the work is carried out.
         told: what is known of the law.
+        as_integrated: whether chains on increments bear what integration leaves, too: where forms are compared, what a
+            derivative could not show is no evidence for them.
     """
 
     def __init__(
@@ -36,8 +38,10 @@ class Problem:
         dt: float,
         workers: _core.Workers,
         told: Told,
+        as_integrated: bool = False,
     ) -> None:
         self.told = told
+        self.as_integrated = as_integrated
         self.pool = pool
         self.runs = runs
         self.stages = stages
@@ -114,7 +118,7 @@ class Problem:
 
     def integration(self, chain: Chain) -> float:
         """Variance, a period, of what integrating terms leaves of what moves a chain's first state."""
-        return float(self.stages.left[chain.states[0]])
+        return float(self.stages.left[chain.states[0]]) if chain.integrated or self.as_integrated else 0.0
 
     def readings(self, chain: Chain) -> int:
         """Readings of a chain that count."""

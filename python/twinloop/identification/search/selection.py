@@ -17,7 +17,7 @@ from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.sensors.chains import Chain, chains
 from twinloop.identification.sensors.noise import declared_noise, first_noise, given_noise, unexplained
-from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
+from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.directions import directions, terms_of, unequal
 from twinloop.identification.terms.evolution import evolve
 from twinloop.identification.terms.formulas import parsed_term
@@ -63,7 +63,7 @@ class Selection:
         self.workers = workers
         self.watch = watch
         self.scales = np.array([state.scale for state in signals.states])
-        every = chains(signals, options.form_for(signals), guessed_noise(runs, self.scales))
+        every = chains(signals, options.form, guessed_noise(runs, self.scales))
         self.driven = [declared_noise(chain, signals) for chain in every if chain.output is not None]
         self.given = [given_noise(chain, signals) for chain in every if chain.output is None]
         self.ladder = self._ladder()
@@ -73,9 +73,7 @@ class Selection:
 
     def of_part(self, run: Run, unit: Unit) -> Selection:
         """A brief one on part of a run, where nothing is known."""
-        generations = 0 if self.options.libraries else self.options.generations
-        moves = max(LEAST_MOVES, self.options.moves // 4)
-        options = replace(self.options, generations=generations, moves=moves)
+        options = self.options.brief()
         return Selection([run], self.signals, options, self.pool, None, unit, self.workers)
 
     def alone(self, problem: Problem) -> list[Sum]:

@@ -97,7 +97,7 @@ def floor_of(chain: Chain, dt: float, integration: float = 0.0) -> tuple[Floats,
     """
     sensors = BEST_SENSOR * BEST_SENSOR * chain.rough
     period = dt if chain.integrated else 1.0
-    white = 1e-9 * float(sensors[0]) + (integration if chain.integrated else 0.0)
+    white = 1e-9 * float(sensors[0]) + integration
     return sensors, (white / period, 1e-9 * float(sensors[0]) / (period * period), dt)
 
 
