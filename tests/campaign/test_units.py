@@ -189,10 +189,19 @@ TANKS = {
 }
 
 
+LAWS = {
+    "increments": {"form": "increment"},
+    # Nothing tells these readings' quotients and roots from other terms: one leaves alone what it would divide by less
+    # than 1e-6, the other makes a unit of 2 one of its root.
+    "a form that is searched": {"libraries": ["linear", "quadratic", "damping", "friction", "cubic"]},
+}
+
+
 @pytest.fixture(scope="module")
 def in_si():
     one = Units([1.0, 1.0])
-    return {plant: decisions(plant, one) for plant in (Cart, Tanks)}
+    tanks = {law: decisions(Tanks, one, options=options) for law, options in LAWS.items()}
+    return {Cart: decisions(Cart, one), **tanks}
 
 
 @pytest.mark.parametrize("units", CARTS.values(), ids=CARTS)
@@ -200,14 +209,15 @@ def test_a_cart_is_learnt_and_flown_alike_in_any_units(in_si, units):
     same(decisions(Cart, units), in_si[Cart])
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("units", TANKS.values(), ids=TANKS)
-def test_vessels_are_learnt_and_flown_alike_in_any_units(in_si, units):
-    same(decisions(Tanks, units), in_si[Tanks])
+def test_vessels_are_learnt_and_flown_alike_in_any_units(in_si, units, law):
+    same(decisions(Tanks, units, options=LAWS[law]), in_si[law])
 
 
 @pytest.mark.parametrize(("plant", "units"), [(Cart, CARTS["all at once"]), (Tanks, TANKS["all at once"])])
 def test_evolved_terms_change_nothing_where_the_law_needs_none(plant, units):
-    evolved = {"options": {"generations": 2}}
+    evolved = {"options": {"generations": 2, **(LAWS["increments"] if plant is Tanks else {})}}
     same(
         decisions(plant, units, flights=2, **evolved),
         decisions(plant, Units([1.0, 1.0]), flights=2, **evolved),

@@ -1,7 +1,8 @@
 """What a law's outputs mean is a hypothesis too: derivatives, or increments, as a simulator's own step makes them.
 
-The map over a period of a law that is a polynomial is none. The step of a simulator that takes one Euler step a period is
-that polynomial. Both forms are learnt briefly from the same readings, and the shorter description of these is believed.
+The map over a period of a law that is a polynomial is none. The step of a simulator that takes one Euler step a period
+is that polynomial. Both forms are learnt briefly from the same readings, and the shorter description of these is
+believed.
 """
 
 from __future__ import annotations
@@ -10,28 +11,32 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from twinloop.elementary import log
 from twinloop.identification.records import Run
 from twinloop.identification.search.description import shorter
+from twinloop.identification.settings import IdentificationOptions
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
 
 PRICE = 12.0
 """What increments must gain in description length: a law of a step holds for that step alone."""
+SURE = 5.0
+"""Standard errors from 0 of a share that is believed."""
+FEWEST = 10
+"""Periods from which one is estimated."""
 MEANINGS = {"acceleration": "derivatives", "increment": "what a period adds", "absolute": "the next state"}
 """Forms in words."""
 
 
-def candidates(form: str, signals: Signals, runs: Sequence[Run]) -> tuple[str, ...]:
+def candidates(options: IdentificationOptions, signals: Signals, runs: Sequence[Run]) -> tuple[str, ...]:
     """Forms that may be the law's, the one that is believed unless another is shorter first.
 
     Args:
-        form: of the options; any but "auto" is the only one.
+        options: of the identification.
         signals: of the system.
         runs: recorded.
     """
-    if form != "auto":
-        return (form,)
+    if options.form != "auto" or options.fixed_terms or options.bounded_terms:
+        return (options.form_for(signals),)
     declared = any(state.derivative_of is not None for state in signals.states)
     if signals.kinematics is not None or (declared and not steps_like_euler(runs, signals)):
         return ("acceleration",)
@@ -41,35 +46,44 @@ def candidates(form: str, signals: Signals, runs: Sequence[Run]) -> tuple[str, .
 def steps_like_euler(runs: Sequence[Run], signals: Signals) -> bool:
     """Whether a state goes on by its declared derivative at the start or at the end of a period, not by the mean.
 
+    What the mean leaves of a move is then half of what the derivative changes by, with one sign or the other. Noise of
+    the derivative adds to neither.
+
     Args:
         runs: recorded.
         signals: of the system.
     """
-    gain = 0.0
     for rate, state in enumerate(signals.states):
         if state.derivative_of is None:
             continue
         place = signals.state_names.index(state.derivative_of)
-        moves = np.concatenate([np.diff(run.states[:, place]) for run in runs])
-        begun, ended = (
-            signals.dt * np.concatenate([run.states[rows, rate] for run in runs])
-            for rows in (slice(None, -1), slice(1, None))
+        moves, begun, ended = (
+            np.concatenate(parts)
+            for parts in zip(
+                *(
+                    (np.diff(run.states[:, place]), run.states[:-1, rate], run.states[1:, rate])
+                    for run in runs
+                ),
+                strict=True,
+            )
         )
-        # Medians: a wild reading, or a wrap, is none of this.
-        start, end, mean = (
-            float(np.median(np.abs(moves - by))) for by in (begun, ended, 0.5 * (begun + ended))
-        )
-        least = 2.0**-40 * float(np.abs(moves).max(initial=0.0))
-        if mean > least:
-            gain += 2.0 * len(moves) * float(log(mean / max(min(start, end), least)))
-    return gain > PRICE
+        left = moves - 0.5 * signals.dt * (begun + ended)
+        half = 0.5 * signals.dt * (ended - begun)
+        size = float((half * half).sum())
+        if size > 0.0 and len(half) > FEWEST:
+            share = float((left * half).sum()) / size
+            rest = left - share * half
+            error = float(np.sqrt((rest * rest).sum() / (len(half) - 1.0) / size))
+            if abs(share) > max(0.5, SURE * error):
+                return True
+    return False
 
 
 def likeliest(forms: Sequence[str], length: Callable[[str], float]) -> tuple[str, list[Remark]]:
     """The form of the shorter description, with what a person should know of the choice.
 
     Args:
-        forms: to choose from, at least one; the first one is believed where others are as short.
+        forms: to choose from, one or two; the second one has to pay for being the law of a step.
         length: description length of the readings under a form.
 
     Returns:
@@ -78,15 +92,14 @@ def likeliest(forms: Sequence[str], length: Callable[[str], float]) -> tuple[str
     if len(forms) == 1:
         return forms[0], []
     lengths = [length(form) for form in forms]
-    best = 0
-    for number in range(1, len(forms)):
-        if shorter(lengths[number] + PRICE, lengths[best]):
-            best = number
-    others = [above for number, above in enumerate(lengths) if number != best]
+    best = int(shorter(lengths[1] + PRICE, lengths[0]))
+    own, other = forms[best], forms[1 - best]
+    gain = lengths[1 - best] - lengths[best]
+    than = "longer" if gain > 0.0 else "shorter"
     said = note(
         "form",
-        f"What the law gives was not declared: the readings are described best as {MEANINGS[forms[best]]} (form"
-        f" {forms[best]!r}), {min(others) - lengths[best]:.3g} shorter than as"
-        f" {MEANINGS[forms[1 - best]]}; the option form={forms[best]!r} fixes it.",
+        f"The form of the law was searched. The readings are described as {MEANINGS[own]} (form {own!r}): as"
+        f" {MEANINGS[other]} (form {other!r}) their description is {abs(gain):.3g} {than},"
+        f" where {PRICE:g} would decide. The option form fixes it.",
     )
-    return forms[best], [said]
+    return own, [said]

@@ -1,8 +1,8 @@
 """Identification: from recorded runs to a model of readable equations and a committee of plausible ones.
 
-The steps, each of them an option: what outputs mean is decided; the noise is estimated; terms are selected up a ladder of libraries, then evolved;
-offsets of sensors, lags and delays of the actuators are searched by description length; constants are tuned on
-predictions; the whole is repeated on states that the model has smoothed.
+The steps, each of them an option: what outputs mean is decided; the noise is estimated; terms are selected up a ladder
+of libraries, then evolved; offsets of sensors, lags and delays of the actuators are searched by description length;
+constants are tuned on predictions; the whole is repeated on states that the model has smoothed.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def identify_runs(
     """
     runs = [run.continued(signals) for run in runs]
     unit = Unit(seed, (iteration,))
-    forms = candidates(options.form, signals, runs)
+    forms = candidates(options, signals, runs)
     if known is not None and len(runs) > LAGS_AGAIN and known.model.form in forms:
         forms = (known.model.form,)
 
@@ -92,7 +92,7 @@ def identify_runs(
         selection = Selection(runs, signals, brief, pool, None, unit.part(place), workers)
         direct = stages(runs, signals, Actuation.direct(signals))
         problem = Problem(pool, runs, direct, signals.dt, workers, selection.told, as_integrated=True)
-        return total(selection.alone(problem))
+        return total(selection.undisturbed(problem, selection.alone(problem)))
 
     if len(forms) > 1:
         watch("form")

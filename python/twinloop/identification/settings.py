@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from twinloop.identification.terms.libraries import LIBRARIES
+from twinloop.signals import Signals
 
 FORMS = ("auto", "absolute", "increment", "acceleration")
 LEAST_MOVES = 100
@@ -19,6 +20,8 @@ class IdentificationOptions:
         form: what a program's outputs mean, "acceleration" (derivatives of the states whose motion no others give),
             "increment" (what a period adds) or "absolute" (the next state); "auto": derivatives, unless increments
             describe the readings more briefly, as they do those of a simulator that takes one Euler step a period.
+            Under fixed or bounded terms, whose constants mean one of the two, nothing is searched: derivatives where
+            any are declared, else increments.
         libraries: that terms are taken from, any of "linear", "quadratic", "damping", "roots", "friction",
             "trigonometric", "quotients", "cubic"; none: evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
@@ -84,6 +87,12 @@ class IdentificationOptions:
     committee_size: int = 8
     parts: bool = True
     divergence_factor: float = 10.0
+
+    def form_for(self, signals: Signals) -> str:
+        """What formulas of a user are taken for where the form is "auto": it is not searched under them."""
+        if self.form != "auto":
+            return self.form
+        return "acceleration" if len(signals.driven) < signals.n_x else "increment"
 
     def brief(self) -> IdentificationOptions:
         """The same for a short look: a fourth of the moves, and terms of libraries only, where there are any."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,11 +11,11 @@ from twinloop.elementary import log
 from twinloop.identification.identified import Identified
 from twinloop.identification.inputs.hidden import filled
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.search.description import shortest
+from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.sensors.chains import Chain, chains
-from twinloop.identification.sensors.noise import declared_noise, first_noise, given_noise, unexplained
+from twinloop.identification.sensors.noise import calm, declared_noise, first_noise, given_noise, unexplained
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.directions import directions, terms_of, unequal
 from twinloop.identification.terms.evolution import evolve
@@ -26,6 +25,9 @@ from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import told
 from twinloop.signals import Signals
 from twinloop.streams import Purpose, Unit
+
+CALMER = 20.0
+"""What terms must gain, in units of χ², that take the place of what disturbs."""
 
 
 class Selection:
@@ -149,6 +151,25 @@ class Selection:
             moves=moves, starts=starts, largest=self.options.largest,
             unit=self._next() if unit is None else unit, purpose=purpose, fixed_noise=fixed_noise,
         )  # fmt: skip
+
+    def undisturbed(self, problem: Problem, known: Sequence[Sum]) -> list[Sum]:
+        """The best sums where what disturbs is explained by terms as well, with noise that is estimated behind them.
+
+        Under a disturbance that explains all that is left no further term gains anything. So terms are searched as if
+        nothing disturbed, too: first those that are known, for it may be that only their noise was mistaken.
+        """
+        best, moves = list(known), self.options.moves // 2
+        own = list(dict.fromkeys(node for found in known for node in found.weights))
+        for terms, tried in ((own, moves // 10), (self.ladder[-1], moves)):
+            driven = [calm(problem, found.chain) for found in best]
+            if all(quiet is found.chain for quiet, found in zip(driven, best, strict=True)):
+                break
+            calmer = self.search(problem, terms, best, driven, tried, 1)
+            best = [
+                new if shorter(new.energy + CALMER, old.energy) else old
+                for old, new in zip(best, calmer, strict=True)
+            ]
+        return best
 
     def admit_hidden(self) -> None:
         """Terms of a hidden state stand on the first rung, and so do those that were known of it."""

@@ -27,6 +27,8 @@ BEST_SENSOR = 0.1
 """Share of its readings' roughness that a sensor's standard deviation is at least."""
 NOTHING = 0.01
 """χ² a reading below which the noise was not estimated but held at the least that is believed: readings are exact."""
+CALM = 1e-2
+"""Variance, in a sensor's, of what disturbs in a period and is hardly seen."""
 FEW_READINGS = 20
 """Below so many, the noise of an angle that body rates turn is not estimated."""
 OUTLYING = 6.0
@@ -99,6 +101,19 @@ def floor_of(chain: Chain, dt: float, integration: float = 0.0) -> tuple[Floats,
     period = dt if chain.integrated else 1.0
     white = 1e-9 * float(sensors[0]) + integration
     return sensors, (white / period, 1e-9 * float(sensors[0]) / (period * period), dt)
+
+
+def calm(problem: Problem, chain: Chain) -> Chain:
+    """The chain with next to no disturbance, and its sensors' noise; itself where there is hardly any.
+
+    Args:
+        problem: of the chain.
+        chain: with its noise.
+    """
+    _, slow = floor_of(chain, problem.dt, problem.integration(chain))
+    period = problem.dt if chain.integrated else 1.0
+    moved = chain.motion[0] * period + chain.motion[1] * period * period
+    return chain if moved <= CALM * float(chain.sensors[0]) else chain.with_noise(chain.sensors, slow)
 
 
 def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:

@@ -42,7 +42,7 @@ def told(options: IdentificationOptions, pool: Pool, signals: Signals) -> Told:
         InvalidInput: text that is no such formula or bound, a state that no output drives, a term that is fixed or
             bounded twice, or one that is both.
     """
-    form = options.form
+    form = options.form_for(signals)
     fixed: dict[int, list[int]] = {}
     for text in options.fixed_terms:
         state, node = fixed_term(text, pool, signals)
