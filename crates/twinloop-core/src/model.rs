@@ -295,7 +295,7 @@ pub struct ModelWorkspace<V: Vector> {
     /// What the actuators hold, where there are any.
     line: Option<Line<V>>,
     /// What sensors may read yet.
-    recent: Recent<V>,
+    recent: Recent,
     /// Of a rigid body: the states and the quaternion of its angles behind them; the states of a stage.
     turned: Vec<V>,
     seen: Vec<V>,
@@ -318,7 +318,7 @@ impl<'a> Model<'a> {
         let body = if states > 0 && self.frame.body.is_some() { states } else { 0 };
         let turned = vec![V::splat(0.0); if body > 0 { body + 4 } else { 0 }];
         let (stages, seen) = (Stages::new(states.max(turned.len())), turned[..body].to_vec());
-        ModelWorkspace { bank, stages, line, recent: Recent::new(), turned, seen }
+        ModelWorkspace { bank, stages, line, recent: Recent::default(), turned, seen }
     }
 }
 

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use crate::attitude::{angles, quaternion, turning};
 use crate::error::{Result, invalid};
-use crate::lanes::Vector;
+use crate::lanes::{Scalar, Vector};
 use crate::signals::{RigidBody, Signals};
 
 /// By how much later than others each state is read.
@@ -78,39 +78,60 @@ impl Sensors {
     }
 
     /// Puts what is read (n_x) at a state that a run has come to. To be called at each state in turn.
-    #[inline(always)]
-    pub(crate) fn read<V: Vector>(&self, recent: &mut Recent<V>, state: &[V], reading: &mut [V]) {
-        recent.keep(state, self.reach());
+    pub(crate) fn read<V: Vector>(&self, recent: &mut Recent, state: &[V], reading: &mut [V]) {
         reading.copy_from_slice(state);
-        let now = recent.seen - 1;
+        recent.lanes.resize_with(V::LANES, Lane::default);
+        for (l, lane) in recent.lanes.iter_mut().enumerate() {
+            let state: Vec<Scalar> = state.iter().map(|value| Scalar::splat(value.lane(l))).collect();
+            for (i, found) in self.read_lane(lane, state) {
+                set_lane(&mut reading[i], l, found.lane(0));
+            }
+        }
+    }
+
+    /// What is read late or early of one run that has come to a state.
+    fn read_lane(&self, lane: &mut Lane, state: Vec<Scalar>) -> Vec<(usize, Scalar)> {
+        lane.keep(state, self.reach());
+        let now = lane.seen - 1;
+        let mut read = vec![];
         for (periods, states) in &self.groups {
             let at = now as f64 - periods;
             let found = if at < 0.0 {
-                self.coasted(&recent.states[0], None, at * self.dt)
+                self.coasted(&lane.states[0], None, at * self.dt)
             } else if at > now as f64 {
-                self.coasted(state, recent.back(1), -periods * self.dt)
+                self.coasted(&lane.states[lane.states.len() - 1], lane.back(1), -periods * self.dt)
             } else {
                 let back = libm::ceil(*periods) as usize;
                 let share = back as f64 - periods;
-                match (recent.back(back), recent.back(back - 1)) {
+                match (lane.back(back), lane.back(back - 1)) {
                     (Some(before), Some(after)) if share > 0.0 => self.between(before, after, share),
                     (Some(there), _) => there.to_vec(),
                     (None, _) => unreachable!("as far back as sensors reach all states are kept"),
                 }
             };
-            for &state in states {
-                reading[state] = found[state];
-            }
+            read.extend(states.iter().map(|&state| (state, found[state])));
         }
+        read
     }
 
     /// The state (n_x) whose reading this is, at the start of a run.
-    #[inline(always)]
     pub(crate) fn state_of<V: Vector>(&self, reading: &[V]) -> Vec<V> {
         let mut found = reading.to_vec();
+        for l in 0..V::LANES {
+            let of: Vec<Scalar> = reading.iter().map(|value| Scalar::splat(value.lane(l))).collect();
+            for (found, state) in found.iter_mut().zip(self.state_of_lane(of)) {
+                set_lane(found, l, state.lane(0));
+            }
+        }
+        found
+    }
+
+    /// The same of one run.
+    fn state_of_lane(&self, reading: Vec<Scalar>) -> Vec<Scalar> {
+        let mut found = reading;
         // Rates first: what they are rates of is moved along them.
         let order = |state: usize| std::iter::successors(self.rates[state], |&rate| self.rates[rate]).count();
-        let longest = (0..reading.len()).map(order).max().unwrap_or(0);
+        let longest = (0..found.len()).map(order).max().unwrap_or(0);
         for depth in 0..=longest {
             for (periods, states) in &self.groups {
                 let moved = self.coasted(&found, None, periods * self.dt);
@@ -129,8 +150,7 @@ impl Sensors {
 
     /// A state some time later (s; before 0: earlier) by kinematics alone, the states that are driven going on as they
     /// did from the one a period before.
-    #[inline(always)]
-    fn coasted<V: Vector>(&self, state: &[V], before: Option<&[V]>, time: f64) -> Vec<V> {
+    fn coasted(&self, state: &[Scalar], before: Option<&[Scalar]>, time: f64) -> Vec<Scalar> {
         let mut rates = state.to_vec();
         if let Some(before) = before {
             // Their mean over the time.
@@ -157,8 +177,7 @@ impl Sensors {
     }
 
     /// What lies between two states of a run a period apart, at a share of it.
-    #[inline(always)]
-    fn between<V: Vector>(&self, before: &[V], after: &[V], share: f64) -> Vec<V> {
+    fn between(&self, before: &[Scalar], after: &[Scalar], share: f64) -> Vec<Scalar> {
         let cubic = Cubic::at(share, self.dt);
         let mut found = after.to_vec();
         for (i, found) in found.iter_mut().enumerate() {
@@ -171,8 +190,8 @@ impl Sensors {
             let begun = quaternion(from);
             let ended = quaternion(body.angles.map(|angle| after[angle]));
             // A quaternion and its negative are the same attitude.
-            let along = (0..4).fold(V::splat(0.0), |sum, i| sum + begun[i] * ended[i]);
-            let sign = along.select_less(V::splat(0.0), V::splat(-1.0), V::splat(1.0));
+            let along = (0..4).fold(Scalar::splat(0.0), |sum, i| sum + begun[i] * ended[i]);
+            let sign = along.select_less(Scalar::splat(0.0), Scalar::splat(-1.0), Scalar::splat(1.0));
             let ended = ended.map(|part| part * sign);
             let first = turning(begun, body.rates.map(|rate| before[rate]));
             let last = turning(ended, body.rates.map(|rate| after[rate]));
@@ -183,36 +202,41 @@ impl Sensors {
     }
 }
 
+/// What of each lane's run is kept for its sensors. Late sensors are rare, and each lane is read by itself: that is one
+/// copy of the code, where there would be one for each width.
+#[derive(Default)]
+pub(crate) struct Recent {
+    lanes: Vec<Lane>,
+}
+
 /// The last states of a run, the newest at the end.
-pub(crate) struct Recent<V> {
-    states: VecDeque<Vec<V>>,
+#[derive(Default)]
+struct Lane {
+    states: VecDeque<Vec<Scalar>>,
     seen: usize,
 }
 
-impl<V: Vector> Recent<V> {
-    pub fn new() -> Self {
-        Self { states: VecDeque::new(), seen: 0 }
-    }
-
-    #[inline(always)]
-    fn keep(&mut self, state: &[V], reach: usize) {
-        let mut kept = if self.states.len() > reach {
-            self.states.pop_front().unwrap_or_default()
-        } else {
-            Vec::with_capacity(state.len())
-        };
-        kept.clear();
-        kept.extend_from_slice(state);
-        self.states.push_back(kept);
+impl Lane {
+    fn keep(&mut self, state: Vec<Scalar>, reach: usize) {
+        if self.states.len() > reach {
+            self.states.pop_front();
+        }
+        self.states.push_back(state);
         self.seen += 1;
     }
 
     /// The state some periods before the newest.
-    #[inline(always)]
-    fn back(&self, periods: usize) -> Option<&[V]> {
+    fn back(&self, periods: usize) -> Option<&[Scalar]> {
         let place = self.states.len().checked_sub(periods + 1)?;
         Some(&self.states[place])
     }
+}
+
+fn set_lane<V: Vector>(vector: &mut V, l: usize, value: f64) {
+    let mut values = vec![0.0; V::LANES];
+    vector.store(&mut values);
+    values[l] = value;
+    *vector = V::load(&values);
 }
 
 /// Weights of Hermite's cubic through two values and their derivatives.
@@ -231,15 +255,13 @@ impl Cubic {
         }
     }
 
-    #[inline(always)]
-    fn of<V: Vector>(&self, before: V, begun: V, after: V, ended: V) -> V {
+    fn of(&self, before: Scalar, begun: Scalar, after: Scalar, ended: Scalar) -> Scalar {
         before * self.values[0] + after * self.values[1] + begun * self.slopes[0] + ended * self.slopes[1]
     }
 }
 
 /// A quaternion after some time of turning at body rates that stay.
-#[inline(always)]
-fn turned<V: Vector>(attitude: [V; 4], rates: [V; 3], time: f64) -> [V; 4] {
+fn turned(attitude: [Scalar; 4], rates: [Scalar; 3], time: f64) -> [Scalar; 4] {
     let [p, q, r] = rates;
     let half = (p * p + q * q + r * r).sqrt() * (0.5 * time);
     let (cosine, sine) = (half.map(libm::cos), half.map(|x| if x == 0.0 { 1.0 } else { libm::sin(x) / x }));
@@ -248,8 +270,7 @@ fn turned<V: Vector>(attitude: [V; 4], rates: [V; 3], time: f64) -> [V; 4] {
 }
 
 /// Writes the angles of an attitude, by whole turns the nearest to what they were.
-#[inline(always)]
-fn put<V: Vector>(state: &mut [V], body: &RigidBody, attitude: [V; 4], before: [V; 3]) {
+fn put(state: &mut [Scalar], body: &RigidBody, attitude: [Scalar; 4], before: [Scalar; 3]) {
     for (&at, angle) in body.angles.iter().zip(angles(attitude, before)) {
         state[at] = angle;
     }
