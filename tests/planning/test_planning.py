@@ -13,7 +13,7 @@ from twinloop.campaign.history import Experiment
 from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
 from twinloop.limits import Limits
-from twinloop.planning.excitation import binary, chirps
+from twinloop.planning.excitation import SHARE, answered, binary, chirps, first_chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner
@@ -100,9 +100,53 @@ def test_an_excitation_keeps_its_amplitude_and_fades(steps, amplitude, fade, see
 
 def test_the_first_excitation_is_the_tests_own_and_none_where_it_is_switched_off():
     planner = planner_of(signals())
-    assert not same_bits(planner.first_excitation(0), planner.first_excitation(1))
-    assert np.abs(planner.first_excitation(0)).max() <= planner.options.excitation
-    assert planner_of(signals(), excitation=0.0).first_excitation(0) is None
+    assert not same_bits(planner.first_excitation(0, TUNED), planner.first_excitation(1, TUNED))
+    assert np.abs(planner.first_excitation(0, TUNED)).max() <= planner.options.excitation
+    assert planner_of(signals(), excitation=0.0).first_excitation(0, TUNED) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_first_excitation_asks_for_no_more_than_the_controller_sends_for_a_tenth_of_the_envelope(seed):
+    random = np.random.default_rng(seed)
+    known = tl.Signals(
+        [
+            tl.State(name, "rad", scale=3.0, envelope=(-width, width))
+            for name, width in zip("abc", random.uniform(0.5, 4.0, 3), strict=True)
+        ],
+        [
+            tl.Command(name, "N", (-9.0, 9.0), scale=size)
+            for name, size in zip("uvwx", random.uniform(1, 5, 4), strict=True)
+        ],
+        0.02,
+    )
+    matrix = random.normal(size=(4, 3)) * [3.0, 0.5, 0.1]
+    gains = {f"{name}.{term}": (0.0, 9.0) for name in "abc" for term in ("kp", "ki", "kd")}
+    family = tl.controllers.PID([(name, None) for name in "abc"], gains, tl.controllers.Mixer(matrix)).bind(
+        known
+    )
+    genes = np.tile([random.uniform(0.5, 2.0), 0.0, 0.0], 3)
+    target = random.normal(size=3)
+    # Oracle: pseudo-inverse of what the gains send for shares of the envelope, in scales of the commands.
+    widths = np.array([state.envelope[1] for state in known.states])
+    slopes = matrix * genes[0] * widths / np.array([[command.scale] for command in known.commands])
+    expected = np.abs(np.linalg.pinv(slopes)).sum(axis=1).max()
+    assert answered(family, genes, target) == pytest.approx(expected, rel=1e-6)
+    sent = first_chirps(family, genes, target, 100, 10.0, 0.25, Unit(seed, (0,)).stream("exam"))
+    off = np.linalg.pinv(slopes) @ (sent / [command.scale for command in known.commands]).T
+    assert 0.03 < np.abs(off).max() <= SHARE + 1e-9
+    assert not sent[0].any() and np.abs(sent[:3]).max() < 0.15 * np.abs(sent).max()
+    # Ten times the authority, a tenth of the gain: a tenth of the excitation, which is ten times as strong.
+    tenth = first_chirps(family, 0.1 * genes, target, 100, 10.0, 0.25, Unit(seed, (0,)).stream("exam"))
+    np.testing.assert_allclose(10.0 * tenth, sent, rtol=1e-6, atol=1e-12)
+    # Where the controller is made for little authority, the option is the limit.
+    small = first_chirps(family, genes, target, 100, 1e-4, 0.25, Unit(seed, (0,)).stream("exam"))
+    assert np.abs(small / [command.scale for command in known.commands]).max() == pytest.approx(1e-4, rel=0.1)
+
+
+def test_a_controller_that_answers_no_error_does_not_limit_its_excitation():
+    known = signals()
+    family = family_of(known)
+    assert answered(family, np.zeros(family.size), np.zeros(known.n_x)) == 0.0
 
 
 # Gains

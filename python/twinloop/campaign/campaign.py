@@ -169,7 +169,7 @@ class Campaign(Shown, Lasting, kind="campaign"):
                 raise InvalidInput(
                     f"Campaign.test, excitation: expected an array, None or {GENTLE!r}, found {excitation!r}."
                 )
-            added = self._method.first_excitation(len(self._book.tests))
+            added = self._method.first_excitation(len(self._book.tests), genes)
         elif excitation is not None:
             shape = (self.setup.steps, self.signals.n_u)
             added = floats("Campaign.test, excitation (steps, commands)", excitation, shape)

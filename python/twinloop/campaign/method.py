@@ -69,7 +69,7 @@ class Method(Protocol):
         """The controller to fly; everything told is learnt."""
         ...
 
-    def first_excitation(self, number: int) -> Floats | None:
+    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
         """What is added to the commands of a test with gains of the user's own, where nothing else is asked for."""
         ...
 

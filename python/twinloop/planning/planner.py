@@ -15,7 +15,7 @@ from twinloop.elementary import log
 from twinloop.flights import disagreements
 from twinloop.limits import Limits
 from twinloop.planning.candidates import Candidates, candidates
-from twinloop.planning.excitation import binary, chirps
+from twinloop.planning.excitation import binary, chirps, first_chirps
 from twinloop.planning.gains import nearby, tune_gains
 from twinloop.planning.judging import Committee, Judge, Judged, Task, expected, risk
 from twinloop.planning.quality import Quality
@@ -168,13 +168,16 @@ class Planner(Judge):
 
     # Proposing
 
-    def first_excitation(self, number: int) -> Floats | None:
-        """The gentle excitation of a test with gains of the user's own; None where it is switched off."""
+    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
+        """The gentle excitation of a test with gains of the user's own (size,); None where it is switched off."""
         options = self.options
         if options.excitation <= 0.0:
             return None
         stream = self.unit.part(number).stream("excitation")
-        return chirps(self.signals, self.task.steps, options.excitation, options.fade, stream)
+        target = np.atleast_2d(self.task.target_state)[0]
+        return first_chirps(
+            self.family, genes, target, self.task.steps, options.excitation, options.fade, stream
+        )
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""

@@ -126,7 +126,7 @@ class Coevolution:
         best = best.quiet()
         return best.judged(self._predicted(best.genes), book.measured(best.number))
 
-    def first_excitation(self, number: int) -> Floats | None:
+    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
         """None: the paper adds none."""
         return None
 

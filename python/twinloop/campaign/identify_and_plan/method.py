@@ -270,9 +270,9 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, best=(book.revision, answer))
         return answer
 
-    def first_excitation(self, number: int) -> Floats | None:
+    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
         """A gentle chirp that fades out."""
-        return self.planner.first_excitation(number)
+        return self.planner.first_excitation(number, genes)
 
     def twin(self, book: Logbook) -> Twin:
         """The best model, with the committee and the sensors' noise for its band."""

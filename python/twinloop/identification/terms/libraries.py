@@ -88,7 +88,11 @@ def quotients(pool: Pool, signals: Signals) -> Terms:
     """Inverses of distances and levels, and of their squares, alone and times every command and its square."""
     commands = range(signals.n_x, pool.inputs)
     above = [pool.one, *commands, *(pool.product(j, j) for j in commands)]
-    below = [size for i in distances(signals) for size in (i, pool.product(i, i))]
+    below: Terms = []
+    for i in distances(signals):
+        # In shares of its scale: what is too small to divide by must not depend on the unit.
+        share = pool.add("*", i, 1.0 / signals.states[i].scale)
+        below += [share, pool.product(share, share)]
     return [pool.add("/", a, size) for size in below for a in above]
 
 
