@@ -193,10 +193,18 @@ def test_goal_quality_and_the_harsh_vehicle_reach_the_campaign():
         "model",
         "--quality",
         "ise",
+        "--weight",
+        "roll=2",
         "--json",
     )
     result = json.loads(done.stdout)
-    assert (result["goal"], result["quality"]) == ("model", {"kind": "ise", "unit": "rad² s"})
+    measure = result["quality"]
+    assert (result["goal"], measure["kind"], measure["unit"]) == ("model", "ise", "")
+    assert [(each["name"], each["weight"]) for each in measure["counts"]] == [
+        ("roll", 2.0),
+        ("pitch", 1.0),
+        ("yaw", 1.0),
+    ]
     assert result["system"]["motor_lag"] == 0.03 and result["system"]["noise"] == 1e-3
     assert result["advice"]["gain"] is None  # nobody was asked for a flight
 

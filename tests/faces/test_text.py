@@ -61,7 +61,10 @@ def result_of_default(**advice):
     """The least that `render` needs of a run of the preset `default`."""
     return {
         "system": {"name": "rig"}, "preset": "default", "seed": 7, "interrupted": False,
-        "quality": {"kind": "iae", "unit": "rad s"},
+        "quality": {
+            **{"kind": "iae", "unit": "rad s", "effort": 0.0, "effort_rate": 0.0},
+            "counts": [{"name": "angle", "unit": "rad", "weight": 1.0}],
+        },
         "signals": {"states": [{"unit": "rad"}, {"unit": "rad/s"}]},
         "experiments": [
             {

@@ -50,6 +50,7 @@ ARGUMENTS = (
     "options",
     "goal",
     "quality",
+    "weights",
     "operators",
     "threads",
     "progress",
@@ -77,6 +78,8 @@ class Campaign(Shown, Lasting, kind="campaign"):
             everywhere), or "both", the default.
         quality: what is minimised: "iae" (integrated absolute error, the default), "ise" (squared) or "final_distance"
             (the paper's).
+        weights: of states in the quality, by name, such as {"pitch": 2.0}. By default the states that a task is about
+            count with 1 and rates with 0, each in units of its scale ("final_distance": all with 1, as they are).
         operators: that evolved programs may use; by default the preset's.
         threads: how many the engine may use, by default all that there are; no result depends on it.
         progress: called with a `Progress` a few times a second while the loops run.
@@ -104,6 +107,7 @@ class Campaign(Shown, Lasting, kind="campaign"):
         options: Mapping[str, object] | None = None,
         goal: str | None = None,
         quality: str | None = None,
+        weights: Mapping[str, float] | None = None,
         operators: Sequence[str] | None = None,
         threads: int | None = None,
         progress: Callable[[Progress], None] | None = None,
@@ -124,6 +128,7 @@ class Campaign(Shown, Lasting, kind="campaign"):
             goal,
             quality,
             operators,
+            weights,
         )
         self._begin(setup, threads, progress)
         if store is not None:

@@ -32,7 +32,7 @@ SECTIONS = (
     *("autopilot", "system"),
 )
 TASK = ("initial_state", "target_state", "duration")
-CAMPAIGN = ("preset", "seed", "goal", "quality")
+CAMPAIGN = ("preset", "seed", "goal", "quality", "weights")
 TEMPLATE = """\
 # A campaign of twinloop. Fill in what your system is, then: twinloop ask {store}
 # Units are SI and radians; names of states and commands become symbols in equations.
@@ -87,6 +87,7 @@ preset = "default"               # or "paper"
 seed = 0
 # goal = "both"                  # "control", "model" or "both"
 # quality = "iae"                # "iae", "ise" or "final_distance"
+# weights = {{ angle = 2.0 }}      # of states in it; by default 1, of rates 0, each in units of its scale
 
 # [system]                       # what flies by itself: twinloop run {file}; leave it out if a person flies
 # use = "rig:Rig"                # a class in rig.py beside this file, which is run; or a name: {names}

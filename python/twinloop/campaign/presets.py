@@ -357,7 +357,7 @@ def _typed(name: str, kind: str, value: object) -> object:
 def _article(kind: str) -> str:
     words = {"bool": "true or false", "float": "a number", "str": "a word"}
     if kind.startswith("tuple"):
-        return "a list of numbers" if "float" in kind else "a list of names"
+        return "a list of finite numbers" if "float" in kind else "a list of names"
     return words.get(kind, "a whole number")
 
 

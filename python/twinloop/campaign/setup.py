@@ -24,7 +24,7 @@ from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import told
 from twinloop.limits import Limits
 from twinloop.planning.planner import GOALS
-from twinloop.planning.quality import KINDS, Quality, quality_of
+from twinloop.planning.quality import KINDS, Quality, quality_of, weights_of
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.signals import Signals
 from twinloop.test import checked_target
@@ -152,6 +152,7 @@ def checked(
     goal: str | None,
     quality: str | None,
     operators: Sequence[str] | None,
+    weights: Mapping[str, float] | None = None,
 ) -> Setup:
     """The arguments of a campaign, if they can be used.
 
@@ -168,6 +169,7 @@ def checked(
         goal: what flights are for; None: the preset's.
         quality: what is minimised; None: the preset's.
         operators: that evolved programs may use; None: the preset's.
+        weights: of states in the quality, by name, in place of 1 or 0; kept as the option `quality_weights`.
 
     Returns:
         The setup.
@@ -200,6 +202,8 @@ def checked(
     changes = dict(given) if isinstance(given, Mapping) else given
     if operators is not None and isinstance(changes, dict):
         changes["operations" if preset == "paper" else "operators"] = operators
+    if weights and isinstance(changes, dict):
+        changes["quality_weights"] = _weighed(weights, signals, preset, quality, changes)
     chosen = options_of(preset, changes)
     purpose, measure = _purpose(preset, goal, quality, chosen, signals)
     family = controller.bind(signals)
@@ -214,6 +218,26 @@ def checked(
             _check_inside(f"Campaign, {what}", state, signals, chosen.margin)
     _check_use(chosen, signals)
     return setup
+
+
+def _weighed(
+    weights: Mapping[str, float],
+    signals: Signals,
+    preset: str,
+    quality: str | None,
+    options: Mapping[str, Any],
+) -> tuple[float, ...]:
+    """Weights by name as the option that holds them."""
+    if preset == "paper":
+        raise InvalidInput(
+            f"Campaign, weights: expected none with the preset 'paper', which weighs all states alike, found"
+            f' {weights!r}; leave them out, or choose preset="default".'
+        )
+    if options.get("quality_weights"):
+        raise InvalidInput(
+            "Campaign: expected either weights or the option 'quality_weights', found both; leave one out."
+        )
+    return tuple(weights_of("iae" if quality is None else quality, signals, weights).tolist())
 
 
 def _sampled(reference: Callable[[float], ArrayLike], signals: Signals, steps: int) -> Floats:
@@ -258,8 +282,8 @@ def _purpose(
             (*options.quality_weights, options.effort, options.effort_rate)
         ):
             raise InvalidInput(
-                "Option 'quality_weights': expected one state to count at least, found 0 for each; any flight would be"
-                " as good as any other."
+                "Option 'quality_weights', or weights: expected one state to count at least, found 0 for each; any"
+                " flight would be as good as any other."
             )
         weights, effort, rate = options.quality_weights, options.effort, options.effort_rate
         return purpose, quality_of(kind, signals, weights, effort, rate)

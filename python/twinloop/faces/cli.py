@@ -32,10 +32,23 @@ from twinloop.planning.quality import KINDS
 from twinloop.systems import BUILT_IN, Quadrotor
 
 SAID_BY_A_FILE = (
-    *("seed", "preset", "goal", "quality", "generations", "test_generations", "noise", "gyroscopic", "harsh"),
+    *(
+        "seed",
+        "preset",
+        "goal",
+        "quality",
+        "weights",
+        "generations",
+        "test_generations",
+        "noise",
+        "gyroscopic",
+        "harsh",
+    ),
     "changes",
 )
 """Options of `run` that a campaign file has."""
+SPELT = {"changes": "set", "weights": "weight"}
+"""Options of `run` whose names differ from those of their values."""
 STUDIES = {
     "bench": "twinloop_exam.command",
     "dashboard": "twinloop.faces.dashboard.command",
@@ -99,6 +112,13 @@ def main(context: click.Context) -> None:
 )
 @click.option("--goal", help=f"What flights are for: {', '.join(GOALS)}; by default both.")
 @click.option("--quality", help=f"What is minimised: {', '.join(KINDS)}; by default the preset's.")
+@click.option(
+    "--weight",
+    "weights",
+    multiple=True,
+    metavar="STATE=NUMBER",
+    help="Of a state in the quality; again for others.",
+)
 @click.option("--generations", type=int, help="Preset paper: of the model loop, in each iteration.")
 @click.option(
     "--test-generations",
@@ -127,6 +147,7 @@ def run(
     experiments: int,
     goal: str | None,
     quality: str | None,
+    weights: tuple[str, ...],
     generations: int | None,
     test_generations: int | None,
     noise: float | None,
@@ -171,6 +192,7 @@ def run(
         options=options,
         goal=goal,
         quality=quality,
+        weights=dict(_weight(text) for text in weights),
         threads=threads,
         progress=watch,
         store=store,
@@ -194,7 +216,7 @@ def _refuse_beside_a_file(context: click.Context) -> None:
     """Refuses options that a campaign file has."""
     for name in SAID_BY_A_FILE:
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
-            option = f"--{'set' if name == 'changes' else name.replace('_', '-')}"
+            option = f"--{SPELT.get(name, name.replace('_', '-'))}"
             raise InvalidInput(
                 f"twinloop run: expected {option} in the campaign file, found it beside it; write it there."
             )
@@ -213,6 +235,16 @@ def _change(preset: str, text: str) -> tuple[str, object]:
                     f" {other!r}; leave it out, or choose --preset {other}."
                 )
     return name, parsed(preset, name, value)
+
+
+def _weight(text: str) -> tuple[str, float]:
+    name, _, number = (part.strip() for part in text.partition("="))
+    try:
+        return name, float(number)
+    except ValueError as reason:
+        raise InvalidInput(
+            f"--weight: expected STATE=NUMBER, found {text!r}; such as --weight pitch=2."
+        ) from reason
 
 
 def _generations(preset: str, models: int | None, tests: int | None) -> dict[str, object]:

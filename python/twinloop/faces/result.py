@@ -46,7 +46,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         "preset": campaign.setup.preset,
         "options": dataclasses.asdict(campaign.options),
         "goal": campaign.setup.goal,
-        "quality": {"kind": campaign.setup.quality.kind, "unit": quality_unit(campaign.setup.quality)},
+        "quality": _quality(campaign.setup.quality),
         "seed": campaign.setup.seed,
         "interrupted": campaign.interrupted,
         "task": {
@@ -88,6 +88,19 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
     if identified:
         _add_identified(result, campaign)
     return plain_dict(result)
+
+
+def _quality(quality: Quality) -> dict[str, object]:
+    """What is minimised, and what counts in it."""
+    counts = [
+        {"name": state.name, "unit": state.unit, "weight": weight}
+        for state, weight in zip(quality.signals.states, quality.weights.tolist(), strict=True)
+        if weight != 0.0
+    ]
+    return {
+        **{"kind": quality.kind, "unit": quality_unit(quality), "counts": counts},
+        **{"effort": quality.effort, "effort_rate": quality.effort_rate},
+    }
 
 
 def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, object]:

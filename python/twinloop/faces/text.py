@@ -330,7 +330,10 @@ def _flights(result: Mapping[str, Any]) -> str:
         f"Test {failure['test']} failed: {failure['reason']}." for failure in result.get("failures", ())
     ]
     measure = result["quality"]
-    title = f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; less is better."
+    title = (
+        f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; less is better.\n"
+        f"What counts: {counted(measure)}."
+    )
     note = (
         "Spread: standard deviation that the measured quality is expected to have.\nRisk: probability that the flight"
         " leaves the envelope."
@@ -408,6 +411,25 @@ def quality_words(kind: str, unit: str) -> str:
         Such as "integrated absolute error (rad s)".
     """
     return QUALITIES[kind] + (f" ({unit})" if unit else "")
+
+
+def counted(measure: Mapping[str, Any]) -> str:
+    """What counts in a quality, with weights and units, for a person.
+
+    Args:
+        measure: `quality` of a result.
+
+    Returns:
+        Such as "2 × pitch (rad), 1 × yaw (rad)".
+    """
+    squared = "" if measure["kind"] == "iae" else "²"
+    parts = [
+        f"{each['weight']:.4g} × {each['name']}{squared} ({each['unit'] or '1'})"
+        for each in measure["counts"]
+    ]
+    efforts = (("effort", "commands²"), ("effort_rate", "their rates²"))
+    parts += [f"{measure[key]:.4g} × {what} (in scales)" for key, what in efforts if measure[key]]
+    return ", ".join(parts)
 
 
 def _squares(result: Mapping[str, Any]) -> str:

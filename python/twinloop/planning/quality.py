@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.errors import engine_input
+from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.flights import quality as engine_quality
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -54,11 +55,7 @@ class Quality:
 def quality_of(
     kind: str, signals: Signals, weights: Sequence[float] = (), effort: float = 0.0, effort_rate: float = 0.0
 ) -> Quality:
-    """A quality with the weights that its kind has by default.
-
-    The final distance counts every state alike, as in the paper. The integrals count the states that a task is about,
-    which are those that are no other's derivative and no body rate, each in units of its scale; where all of them have
-    one unit, times the scale of the first, so that the quality of states of equal scales is in their unit.
+    """A quality with the weights that its kind has by default: see `weights_of`.
 
     Args:
         kind: "iae", "ise" or "final_distance".
@@ -70,18 +67,55 @@ def quality_of(
     Returns:
         The quality.
     """
-    chosen = np.asarray(weights, dtype=np.float64)
-    if not len(chosen):
-        chosen = np.ones(signals.n_x)
-        if kind != "final_distance":
-            body = signals.kinematics
-            counted = [
-                state.derivative_of is None and not (body is not None and state.name in body.rates)
-                for state in signals.states
-            ]
-            units = {state.unit for state, counts in zip(signals.states, counted, strict=True) if counts}
-            first = next((s.scale for s, counts in zip(signals.states, counted, strict=True) if counts), 1.0)
-            for i, state in enumerate(signals.states):
-                share = (first if len(units) == 1 else 1.0) / state.scale
-                chosen[i] = (share if kind == "iae" else share * share) if counted[i] else 0.0
+    chosen = np.asarray(weights, dtype=np.float64) if len(weights) else weights_of(kind, signals)
     return Quality(kind, chosen, effort, effort_rate, signals)
+
+
+def weights_of(kind: str, signals: Signals, changed: Mapping[str, float] | None = None) -> Floats:
+    """How much each state counts in a quality.
+
+    The final distance counts every state alike, as in the paper: 1. The integrals count the states that a task is
+    about: 1 where a state is no other's derivative and no body rate, else 0; each in units of its scale; where all
+    that count have one unit, times the scale of the first, so that the quality of states of equal scales is in
+    their unit.
+
+    Args:
+        kind: "iae", "ise" or "final_distance".
+        signals: of the system.
+        changed: other numbers than those of 0 and 1, of at least 0, by the states' names. They have no unit.
+
+    Returns:
+        Factors (n_x,) of the states' errors ("iae"), or of their squares.
+
+    Raises:
+        InvalidInput: no state has such a name, or a number that cannot be used.
+    """
+    body, final = signals.kinematics, kind == "final_distance"
+    shares = {
+        state.name: 1.0
+        if final or (state.derivative_of is None and not (body is not None and state.name in body.rates))
+        else 0.0
+        for state in signals.states
+    }
+    for name, share in _numbers({} if changed is None else changed).items():
+        if name not in shares:
+            raise unknown("state of the argument weights", name, shares)
+        shares[name] = share
+    if final:
+        return np.array(list(shares.values()))
+    counted = [state for state in signals.states if shares[state.name] > 0.0]
+    unit = counted[0].scale if len({state.unit for state in counted}) == 1 else 1.0
+    sizes = np.array([unit / state.scale for state in signals.states])
+    return np.asarray(list(shares.values()) * (sizes if kind == "iae" else sizes * sizes), dtype=np.float64)
+
+
+def _numbers(weights: object) -> dict[str, float]:
+    """Weights by name, checked: finite numbers of at least 0."""
+    expected = "Campaign, weights: expected a finite number of at least 0 for each state by name"
+    if not isinstance(weights, Mapping):
+        raise InvalidInput(f'{expected}, found {weights!r}; write {{"angle": 2.0}}.')
+    for name, value in weights.items():
+        is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+        if not (is_number and 0.0 <= value <= sys.float_info.max):
+            raise InvalidInput(f"{expected}, found {name!r}: {value!r}; change it.")
+    return {name: float(value) for name, value in weights.items()}

@@ -11,7 +11,7 @@ from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.poles import Pole
 from twinloop.campaign.examination.use import envelope_use
 from twinloop.faces.figures.units import said, words
-from twinloop.faces.text import cell
+from twinloop.faces.text import cell, counted, quality_words
 
 RIVALS = 3
 """Rivals of each equation that are shown."""
@@ -338,4 +338,6 @@ def flights(result: Mapping[str, Any]) -> Table:
         for run in result["experiments"]
     ]  # fmt: skip
     head = ["flight", "predicted", "± spread", "flown", "predicted − flown", "risk", "why"]
-    return _table("flights-table", "Flights", head, rows, texts=(6,))
+    measure = result["quality"]
+    note = f"Quality: {quality_words(measure['kind'], measure['unit'])}. What counts: {counted(measure)}."
+    return _table("flights-table", "Flights", head, rows, note, texts=(6,))
