@@ -20,4 +20,14 @@ import sys
 found = json.load(open(sys.argv[1], encoding="utf-8"))
 assert len(found["experiments"]) == 4 and not found["interrupted"], "expected four experiments"
 CHECK
-echo "$(basename "$wheel"): installed and flown in $(($(date +%s) - begun)) s"
+seconds=$(($(date +%s) - begun))
+# What is no Python has come along: templates, styles, sources of exports.
+"$place/venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary :all: "$wheel[report,dashboard]"
+(
+    cd "$place" && PATH="$place/venv/bin"
+    twinloop run quadrotor --preset paper --generations 5 --experiments 2 --store demo.db >/dev/null 2>&1
+    twinloop report demo.db -o demo.html 2>/dev/null
+    python -c 'from pathlib import Path; import twinloop; root = Path(twinloop.__file__).parent; assert all(any(root.rglob(f"*.{e}")) for e in ("html", "css", "js", "c", "h")), "files are missing"'
+)
+test -s "$place/demo.html"
+echo "$(basename "$wheel"): installed and flown in $seconds s"
