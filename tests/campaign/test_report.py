@@ -65,7 +65,7 @@ def test_serious_remarks_are_warnings_and_values_of_the_twin():
     campaign = made()
     first = campaign.test(GAINS)
     campaign.tell(first, backwards(PLANT.run(first)))
-    with pytest.warns(RemarkWarning, match=r"check the signs.*\(does-not-follow\)") as said:
+    with pytest.warns(RemarkWarning, match=r"does not follow.*\(does-not-follow\)") as said:
         twin = campaign.twin
     assert said[0].filename == __file__
     (remark,) = [remark for remark in twin.remarks if remark.code == "does-not-follow"]

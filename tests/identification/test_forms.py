@@ -5,6 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import twinloop as tl
+from late_sensors import DT as LATE_DT
+from late_sensors import PENDULUM, read, swinging
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.forms import candidates, likeliest, steps_like_euler
@@ -87,6 +89,12 @@ def test_a_declared_derivative_does_not_hide_a_step_of_euler(step, noise):
     for _ in range(20):
         free.append(found.model.step([free[-1]], [[0.0]])[0])
     np.testing.assert_allclose(free, run.states[:21], atol=1e-2 if noise else 1e-5)
+
+
+@pytest.mark.parametrize("late", [0.1, 0.3, -0.2, 0.7])
+def test_a_sensor_that_is_late_is_no_step_of_euler(late):
+    run = read(swinging, PENDULUM, 1, late * LATE_DT)
+    assert candidates(options_of("default", {}), PENDULUM, [run]) == ("acceleration",)
 
 
 def test_declared_derivatives_of_a_flow_are_believed_at_once():

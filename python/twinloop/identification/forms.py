@@ -21,6 +21,8 @@ PRICE = 12.0
 """What increments must gain in description length: a law of a step holds for that step alone."""
 SURE = 5.0
 """Standard errors from 0 of a share that is believed."""
+WHOLE = 0.15
+"""By how much a share may differ from a whole step of Euler; a sensor that is late leaves any other share."""
 FEWEST = 10
 """Periods from which one is estimated."""
 MEANINGS = {"acceleration": "derivatives", "increment": "what a period adds", "absolute": "the next state"}
@@ -46,8 +48,8 @@ def candidates(options: IdentificationOptions, signals: Signals, runs: Sequence[
 def steps_like_euler(runs: Sequence[Run], signals: Signals) -> bool:
     """Whether a state goes on by its declared derivative at the start or at the end of a period, not by the mean.
 
-    What the mean leaves of a move is then half of what the derivative changes by, with one sign or the other. Noise of
-    the derivative adds to neither.
+    What the mean leaves of a move is then half of what the derivative changes by, with one sign or the other: a share
+    of 1. A sensor that is late by τ leaves a share of 2 τ / dt. Noise of the derivative adds to neither.
 
     Args:
         runs: recorded.
@@ -74,7 +76,7 @@ def steps_like_euler(runs: Sequence[Run], signals: Signals) -> bool:
             share = float((left * half).sum()) / size
             rest = left - share * half
             error = float(np.sqrt((rest * rest).sum() / (len(half) - 1.0) / size))
-            if abs(share) > max(0.5, SURE * error):
+            if abs(share) > SURE * error and abs(abs(share) - 1.0) < WHOLE:
                 return True
     return False
 
