@@ -161,6 +161,21 @@ def test_a_place_in_the_box_is_gains_within_their_bounds_and_back(places):
     np.testing.assert_allclose(family.to_unit(genes), places, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("places", "bounds"),
+    [
+        ([0.0, 1.0, 0.5], ["lower", "upper", ""]),
+        ([0.009, 0.991, 0.009], ["lower", "upper", "lower"]),
+        ([0.011, 0.989, 0.011], ["", "", ""]),
+    ],
+)
+def test_a_gain_within_a_hundredth_of_its_range_is_at_a_bound_in_decades_where_they_matter(places, bounds):
+    family = family_of(signals())
+    assert family.at_bounds(family.from_unit(places)) == dict(
+        zip(("angle.kp", "angle.ki", "angle.kd"), bounds, strict=True)
+    )
+
+
 def test_gains_are_tuned_to_the_bottom_of_a_bowl_and_never_worse_than_the_start():
     family = family_of(signals())
     bottom = np.array([0.3, 0.7, 0.5])

@@ -1,5 +1,7 @@
 """Weights of the quality by the states' names: what counts, in any units, and what is refused."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 import twinloop as tl
 from lives import CONTROLLER, SIGNALS, SMALL, lived
 from twinloop.faces.cli import main
+from twinloop.faces.report.tables import gains
 from twinloop.faces.result import summary
 from twinloop.faces.text import counted, render
 from twinloop.planning.quality import KINDS, quality_of, weights_of
@@ -84,6 +87,20 @@ def test_the_result_and_its_text_say_what_counts():
         "effort_rate": 0.0,
     }
     assert counted(squares) == "1 × x² (1)"
+
+
+@pytest.mark.parametrize(("value", "bound"), [(5.99, "upper"), (5.9, ""), (0.0, "lower")])
+def test_a_gain_at_a_bound_is_marked_in_json_text_and_report(value, bound, monkeypatch):
+    campaign = lived(begun(), ("tell",))
+    best = dataclasses.replace(campaign.experiments[0].test, genes=np.array([value, 2.0, 0.3]))
+    monkeypatch.setattr("twinloop.faces.result.controller_to_fly", lambda campaign: (best, ""))
+    result = summary(campaign, {"name": "it"}, {})
+    assert [gain["at_bound"] for gain in result["controller"]["gains"]] == [bound, "", ""]
+    assert render(result).count("at its ") == (bound != "") and f"{bound} bound" * (bound != "") in render(
+        result
+    )
+    cells = [row[-1] for row in gains(result).rows]
+    assert cells == [f"at its {bound} bound" if bound else "", "", ""]
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,9 @@ from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.signals import Signals
 
+AT_A_BOUND = 0.01
+"""Share of its range within which a gain counts as at a bound."""
+
 
 @runtime_checkable
 class UnboundFamily(Protocol):
@@ -142,6 +145,24 @@ class Family:
             InvalidInput: another number of genes.
         """
         return self._in_the_box(self.engine.places, genes)
+
+    def at_bounds(self, genes: ArrayLike) -> dict[str, str]:
+        """Which bound each gain is at, or within 1 % of its range of: there the box decides, not the quality.
+
+        Args:
+            genes: (size,), in the units of the gains.
+
+        Returns:
+            "lower", "upper" or "", by the gains' names; of decades where these matter.
+
+        Raises:
+            InvalidInput: another number of genes.
+        """
+        places = self.to_unit(genes).tolist()
+        return {
+            gain.name: "lower" if place <= AT_A_BOUND else "upper" if place >= 1.0 - AT_A_BOUND else ""
+            for gain, place in zip(self.gains, places, strict=True)
+        }
 
     def from_unit(self, places: ArrayLike) -> Floats:
         """The genes at places in the box; the inverse of `to_unit`, clipped to the bounds.

@@ -104,6 +104,7 @@ def _quality(quality: Quality) -> dict[str, object]:
 
 
 def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, object]:
+    bounds = campaign.family.at_bounds(best.genes)
     found: dict[str, object] = {
         "test": best.number,
         "gains": [
@@ -113,6 +114,7 @@ def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, o
                 "unit": gain.unit,
                 "low": gain.low if isinstance(gain, Gain) else None,
                 "high": gain.high if isinstance(gain, Gain) else None,
+                "at_bound": bounds.get(gain.name, ""),
             }
             for gain in campaign.family.law_gains
         ],

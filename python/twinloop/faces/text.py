@@ -171,10 +171,24 @@ def _gains(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[lis
             gain["value"],
             None if first is None else first["gains"][gain["name"]],
             gain["unit"],
-            "fixed" if gain["low"] is None else f"{gain['low']:g} to {gain['high']:g}",
+            "fixed"
+            if gain["low"] is None
+            else f"{gain['low']:g} to {gain['high']:g}" + (f", {held_at(gain)}" if held_at(gain) else ""),
         ]
         for gain in best["gains"]
     ]
+
+
+def held_at(gain: Mapping[str, Any]) -> str:
+    """Where a gain of a result stands at a bound, for a person.
+
+    Args:
+        gain: of the controller; results of before this was told have none of it.
+
+    Returns:
+        "at its upper bound", "at its lower bound" or "".
+    """
+    return f"at its {gain['at_bound']} bound" if gain.get("at_bound") else ""
 
 
 def _controller(result: Mapping[str, Any]) -> str:

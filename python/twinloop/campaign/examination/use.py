@@ -8,7 +8,6 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign.setup import Setup
-from twinloop.controllers import Gain
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
 from twinloop.signals import Signals
@@ -72,7 +71,7 @@ class GainSlope:
         factors: on it.
         qualities: on the twin, without noise, for each factor; infinite where the flight diverges; None where the
             bounds do not allow it.
-        at_bound: "", "low" or "high", where it stands at an end of its box.
+        at_bound: "", "lower" or "upper": see `Family.at_bounds`.
     """
 
     gain: str
@@ -91,6 +90,7 @@ def gain_slopes(twin: Twin, setup: Setup, best: Test) -> tuple[GainSlope, ...]:
         best: test of the controller.
     """
     found = []
+    bounds = setup.family.at_bounds(best.genes)
     for i, gain in enumerate(setup.family.gains):
         value = float(best.genes[i])
         qualities: list[float | None] = []
@@ -102,18 +102,13 @@ def gain_slopes(twin: Twin, setup: Setup, best: Test) -> tuple[GainSlope, ...]:
             genes = best.genes.copy()
             genes[i] = tried
             qualities.append(_quality(twin, setup, replace(best.quiet(), genes=genes)))
-        found.append(GainSlope(gain.name, value, SHARES, tuple(qualities), _bound(gain, value)))
+        found.append(GainSlope(gain.name, value, SHARES, tuple(qualities), bounds[gain.name]))
     return tuple(found)
 
 
 def _quality(twin: Twin, setup: Setup, test: Test) -> float:
     run = fly(twin.model, test, limits=twin.limits)
     return setup.quality.flown(run, test.target_state) if run.steps == test.steps else float("inf")
-
-
-def _bound(gain: Gain, value: float) -> str:
-    room = AT_A_BOUND * (gain.high - gain.low)
-    return "low" if value <= gain.low + room else "high" if value >= gain.high - room else ""
 
 
 def envelope_use(states: Floats, signals: Signals) -> tuple[tuple[str, float], ...]:

@@ -97,7 +97,7 @@ def gains(found: Examination) -> Figure | None:
         there = [
             (100.0 * (f - 1.0), q) for f, q in zip(each.factors, each.qualities, strict=True) if q is not None
         ]
-        held = f" (at its {'upper' if each.at_bound == 'high' else 'lower'} bound)" if each.at_bound else ""
+        held = f" (at its {each.at_bound} bound)" if each.at_bound else ""
         panels.append(
             Panel(
                 f"{each.gain} = {each.value:.4g}{held}",

@@ -11,7 +11,7 @@ from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.poles import Pole
 from twinloop.campaign.examination.use import envelope_use
 from twinloop.faces.figures.units import said, words
-from twinloop.faces.text import cell, counted, quality_words
+from twinloop.faces.text import cell, counted, held_at, quality_words
 
 RIVALS = 3
 """Rivals of each equation that are shown."""
@@ -160,13 +160,6 @@ def gains(result: Mapping[str, Any]) -> Table | None:
     rows = []
     for gain in best["gains"]:
         box = "fixed" if gain["low"] is None else f"{gain['low']:g} to {gain['high']:g}"
-        at = (
-            ""
-            if gain["low"] is None
-            else "at a bound"
-            if gain["value"] in (gain["low"], gain["high"])
-            else ""
-        )
         rows.append(
             [
                 gain["name"],
@@ -174,7 +167,7 @@ def gains(result: Mapping[str, Any]) -> Table | None:
                 None if first is None else first["gains"][gain["name"]],
                 gain["unit"],
                 box,
-                at,
+                held_at(gain),
             ]
         )
     return _table(
