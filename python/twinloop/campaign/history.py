@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.envelope import readings_leave
 from twinloop.errors import engine_input
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
@@ -62,9 +63,8 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     @property
     def left_envelope(self) -> bool:
-        """Whether two readings in a row were outside; a single one may be the sensor's."""
-        outside = self._usages() > 1.0
-        return bool((outside[1:] & outside[:-1]).any())
+        """Whether two readings in a row were outside: see `twinloop.envelope`."""
+        return readings_leave(self._usages())
 
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""

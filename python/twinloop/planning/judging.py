@@ -10,6 +10,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
+from twinloop.envelope import outside
 from twinloop.flights import candidates, qualities
 from twinloop.limits import Limits
 from twinloop.planning.quality import Quality
@@ -87,7 +88,7 @@ def risk(usages: Floats) -> float:
     Args:
         usages: of the envelope, any shape.
     """
-    return (float((usages > 1.0).sum()) + 0.5) / (usages.size + 1.0)
+    return (float(outside(usages).sum()) + 0.5) / (usages.size + 1.0)
 
 
 def expected(qualities: Floats) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.elementary import log
+from twinloop.envelope import outside
 from twinloop.flights import disagreements
 from twinloop.limits import Limits
 from twinloop.planning.candidates import Candidates, candidates
@@ -265,7 +266,7 @@ class Planner(Judge):
             found = chosen, noisy([chosen])
         chosen, flights = found
         repeats = chosen >= drafts.repeats
-        inside = quiet.worst_usage[chosen] <= 1.0 - self.options.margin and flights.usages.max() <= 1.0
+        inside = quiet.worst_usage[chosen] <= 1.0 - self.options.margin and not outside(flights.usages).any()
         safe = bool(inside)
         predicted, spread = expected(flights.qualities[:, :, 0])
         excitation, disagreement = drafts.excitation[chosen], float(tells[chosen])
@@ -389,7 +390,7 @@ def _first_that_lasts(
     for at in range(0, min(len(wanted), TRIED), TOGETHER):
         batch = list(wanted[at : at + TOGETHER])
         flights = noisy(batch)
-        lasts = np.flatnonzero((flights.worst_usage <= 1.0) & (flights.mean <= worst))
+        lasts = np.flatnonzero(~outside(flights.worst_usage) & (flights.mean <= worst))
         if len(lasts):
             i = int(lasts[0])
             return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])

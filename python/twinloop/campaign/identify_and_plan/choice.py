@@ -12,6 +12,7 @@ from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.logbook import Logbook
+from twinloop.envelope import outside
 from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judged, expected, risk
@@ -94,7 +95,7 @@ class Choice:
             return "a flight with gains close to those that the twin prefers failed or was cut"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
-        if max(float(flights.usages[:, :, 0].max()) for flights in (judged, elsewhere)) > 1.0:
+        if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
             return "a model sees those that the twin prefers leave the envelope"
         return ""
 

@@ -1,0 +1,35 @@
+"""Leaving the envelope, the one definition: a flight leaves it when its true state is outside, be it for one period.
+
+A simulated flight knows its true states, drawn noise or not, so that one beyond a bound is enough. Of a flown one
+readings are all that is known, and a single one may be the sensor's: two in a row must be outside, as noise is drawn
+anew for each. Both look at the usage of the envelope, the most of all states: 1 at a bound, and more outside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twinloop.arrays import Floats
+
+
+def outside(usages: Floats) -> NDArray[np.bool_]:
+    """Where the envelope is left.
+
+    Args:
+        usages: of it, any shape; at a bound it is still kept.
+
+    Returns:
+        A flag each. Of the worst usages of simulated flights, in their true states, it says which ones leave it.
+    """
+    return ~np.asarray(usages <= 1.0)
+
+
+def readings_leave(usages: Floats) -> bool:
+    """Whether a flown flight left the envelope, as far as its readings tell.
+
+    Args:
+        usages: of it at each reading (n + 1,).
+    """
+    beyond = outside(usages)
+    return bool((beyond[1:] & beyond[:-1]).any())
