@@ -27,6 +27,8 @@ from measure import Disagreement, Section
 from rich.console import Console
 from rich.table import Table
 
+import guard
+
 SECTIONS = {
     "rows": rows.report,
     "closed-loop": closed_loop.report,
@@ -37,6 +39,7 @@ SECTIONS = {
     "subsets": subsets.report,
     "tuning": fitting.report,
     "committees": committees.report,
+    "guard": guard.report,
 }
 
 

@@ -37,6 +37,7 @@ __all__ = [
     "Flights",
     "Gram",
     "Grammar",
+    "LookAhead",
     "Model",
     "ModelSearch",
     "Program",
@@ -401,6 +402,30 @@ class Runs:
     @property
     def lasted(self) -> _Integers:
         """Steps before each run stopped (m,); n if it did not."""
+
+@final
+class LookAhead:
+    """Where a flight is in its midst, and what a committee says of the periods to come."""
+
+    def __new__(
+        cls,
+        members: Sequence[Model],
+        setting: Setting,
+        parameters: ArrayLike,
+        target: ArrayLike,
+        steps: int,
+        envelope: ArrayLike,
+        *,
+        excitation: ArrayLike | None = None,
+    ) -> LookAhead:
+        """Parameters (size,), target (n_x,) or (steps + 1, n_x), envelope (n_x, 2), excitation (steps, n_u)."""
+    def reset(self) -> None: ...
+    def leaving(self, reading: ArrayLike, horizon: int) -> tuple[int, int, int] | None:
+        """Periods until the soonest leaving within a horizon if the controller goes on, the state, and the member."""
+    def sent(self, reading: ArrayLike, target: ArrayLike, command: ArrayLike) -> None:
+        """Moves on by a period."""
+    def following(self, state: ArrayLike, command: ArrayLike) -> _Floats:
+        """What the first member makes of a state and a command, a period later."""
 
 def replay(
     dynamics: Model | Quadrotor,

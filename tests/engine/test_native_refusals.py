@@ -72,6 +72,9 @@ class World:
         self.setting = _core.Setting(self.limits, self.family)
         empty = _core.SelectedTests(self.setting)
         self.selected = empty.with_test(self.gains[0], self.target, self.states, self.commands)
+        self.ahead = _core.LookAhead(
+            [self.model], self.setting, self.gains[0], self.target, 4, [(-2.0, 2.0)] * n_x
+        )
         self.variation = _core.Variation(4)
         self.workers = _core.Workers(1)
         self.settings = _core.TestSettings(mutants=2)
@@ -137,10 +140,22 @@ def calls(world):
     problem = (w.regression, w.coefficients, w.sensors, w.motion, w.sensors * 1e-3, (1e-6, 0.0, 1.0))
     crossed = {"first": w.program, "second": w.other_program, "seed": 0}
     flown = {"setting": w.setting, "parameters": w.gains, "task": w.task}
+    ahead = {
+        "members": [w.model], "setting": w.setting, "parameters": w.gains[0], "target": w.target, "steps": 5,
+        "envelope": np.array([(-1.0, 1.0)] * w.n_x), "excitation": np.zeros((5, w.n_u)),
+    }  # fmt: skip
     learnt = {"form": "absolute", "signals": w.signals}
     found = {
         "vector_widths": (_core.vector_widths, {}),
         "Workers": (_core.Workers, {"threads": 1, "width": "auto"}),
+        "LookAhead": (_core.LookAhead, ahead),
+        "LookAhead.reset": (w.ahead.reset, {}),
+        "LookAhead.leaving": (w.ahead.leaving, {"reading": w.states[0], "horizon": 3}),
+        "LookAhead.sent": (
+            w.ahead.sent,
+            {"reading": w.states[0], "target": w.target, "command": w.commands[0]},
+        ),
+        "LookAhead.following": (w.ahead.following, {"state": w.states[0], "command": w.commands[0]}),
         "Program.parse": (_core.Program.parse, {"text": str(w.program)}),
         "Program.effective": (w.program.effective, {}),
         "Program.run": (w.program.run, {"inputs": np.ones((2, w.n_x + w.n_u)), "workers": w.workers}),
@@ -612,6 +627,7 @@ def test_hostile_arguments_are_refused_or_answered_but_never_a_panic(name):
         ("tune", "draws"),
         ("Task", "steps"),
         ("Flights", "steps"),
+        ("LookAhead", "steps"),
         ("Archive", "columns"),
         ("Workers", "threads"),
         ("CmaEs", "population"),

@@ -94,6 +94,7 @@ impl Actuation {
 }
 
 /// What the actuators of a run hold, and what they pass on in the current period.
+#[derive(Clone)]
 pub struct Line<V> {
     actuators: Vec<Actuator>,
     hidden: Vec<Filling<V>>,

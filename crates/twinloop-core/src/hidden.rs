@@ -39,6 +39,7 @@ impl Hidden {
 }
 
 /// A hidden state in the course of a run.
+#[derive(Clone)]
 pub(crate) struct Filling<V> {
     hidden: Hidden,
     /// What is left of it after half a period.

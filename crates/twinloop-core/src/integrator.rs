@@ -3,6 +3,7 @@
 use crate::lanes::Vector;
 
 /// Scratch of a step: the stage's derivative, its argument, and the sum of the derivatives.
+#[derive(Clone)]
 pub struct Stages<V: Vector> {
     slope: Vec<V>,
     point: Vec<V>,

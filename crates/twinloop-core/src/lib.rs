@@ -16,6 +16,7 @@ mod integrator;
 mod lanes;
 mod lgp;
 mod linear_algebra;
+mod look_ahead;
 mod model;
 mod model_loop;
 mod objective;
@@ -51,6 +52,7 @@ pub use integrator::{Field, Stages, rk4};
 pub use lanes::{Apart, Isa, Kernel, Scalar, Vector, Width, dispatch};
 pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};
 pub use linear_algebra::{Cholesky, Eigen};
+pub use look_ahead::{Ahead, Leaving, LookAhead};
 pub use model::{Form, Frame, Model};
 pub use model_loop::{Learnt, ModelSearch};
 pub use objective::{

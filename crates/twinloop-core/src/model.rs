@@ -289,6 +289,7 @@ impl<V: Vector> Inputs<V> for Interleaved<'_> {
 }
 
 /// Registers and integrator stages of a model's run.
+#[derive(Clone)]
 pub struct ModelWorkspace<V: Vector> {
     bank: Bank<V>,
     stages: Stages<V>,

@@ -1,6 +1,6 @@
 //! The roll-out: dynamics under the commands of a controller that reads them, or of a record. There is no second one.
 
-use crate::any_dynamics::AnyDynamics;
+use crate::any_dynamics::{AnyDynamics, AnyWorkspace};
 use crate::controller::{Controllers, Family};
 use crate::dynamics::{Dynamics, read_apart};
 use crate::lanes::{Apart, Vector};
@@ -69,22 +69,45 @@ pub fn rollout<V: Vector>(
     watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
     let mut lasted = vec![];
-    V::apart(Run { dynamics, start, watch: &mut Aside(watch), lasted: &mut lasted });
+    V::apart(Run { dynamics, midway: None, start, watch: &mut Aside(watch), lasted: &mut lasted });
+    lasted
+}
+
+/// What a run carries from step to step beside its state.
+pub(crate) struct Midway<W, V> {
+    /// Workspace of the dynamics.
+    pub workspace: W,
+    /// Of a law; none of a record.
+    pub controllers: Option<Controllers<V>>,
+}
+
+/// The same from the midst of a run; targets and excitation are those from there on.
+#[inline(always)]
+pub(crate) fn resumed<'a, V: Vector>(
+    dynamics: AnyDynamics<'a>,
+    midway: Midway<AnyWorkspace<'a, V>, V>,
+    start: &Start<'_, V>,
+    watch: &mut impl Watch<V>,
+) -> Vec<usize> {
+    let mut lasted = vec![];
+    V::apart(Run { dynamics, midway: Some(midway), start, watch: &mut Aside(watch), lasted: &mut lasted });
     lasted
 }
 
 /// The roll-out as a function of its own: it is compiled once for each vector, whatever looks on.
-struct Run<'a, V> {
-    dynamics: AnyDynamics<'a>,
+struct Run<'a, 'd, V: Vector> {
+    dynamics: AnyDynamics<'d>,
+    /// Where the run is; none at its beginning.
+    midway: Option<Midway<AnyWorkspace<'d, V>, V>>,
     start: &'a Start<'a, V>,
     watch: &'a mut dyn Watch<V>,
     lasted: &'a mut Vec<usize>,
 }
 
-impl<V: Vector> Apart for Run<'_, V> {
+impl<V: Vector> Apart for Run<'_, '_, V> {
     #[inline(always)]
     fn run(self) {
-        *self.lasted = closed(&self.dynamics, self.start, self.watch);
+        *self.lasted = looped(&self.dynamics, self.midway, self.start, self.watch);
     }
 }
 
@@ -116,12 +139,28 @@ pub(crate) fn closed<D: Dynamics, V: Vector>(
     start: &Start<'_, V>,
     watch: &mut dyn Watch<V>,
 ) -> Vec<usize> {
+    looped(dynamics, None, start, watch)
+}
+
+#[inline(always)]
+fn looped<D: Dynamics, V: Vector>(
+    dynamics: &D,
+    midway: Option<Midway<D::Workspace<V>, V>>,
+    start: &Start<'_, V>,
+    watch: &mut dyn Watch<V>,
+) -> Vec<usize> {
     let Start { commands, initial, steps, limits, noise, disturbance } = *start;
     let states = initial.len();
-    let mut workspace = dynamics.workspace::<V>();
-    let (mut controllers, width) = match commands {
-        Commands::Law { family, parameters, .. } => (Some(family.start(parameters)), family.commands()),
-        Commands::Record(rows) => (None, rows.len() / steps),
+    let width = match commands {
+        Commands::Law { family, .. } => family.commands(),
+        Commands::Record(rows) => rows.len() / steps,
+    };
+    let Midway { mut workspace, mut controllers } = match (midway, commands) {
+        (Some(midway), _) => midway,
+        (None, Commands::Law { family, parameters, .. }) => {
+            Midway { workspace: dynamics.workspace(), controllers: Some(family.start(parameters)) }
+        }
+        (None, Commands::Record(_)) => Midway { workspace: dynamics.workspace(), controllers: None },
     };
     let mut state = initial.to_vec();
     let mut reading = initial.to_vec();

@@ -204,13 +204,13 @@ impl Sensors {
 
 /// What of each lane's run is kept for its sensors. Late sensors are rare, and each lane is read by itself: that is one
 /// copy of the code, where there would be one for each width.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Recent {
     lanes: Vec<Lane>,
 }
 
 /// The last states of a run, the newest at the end.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Lane {
     states: VecDeque<Vec<Scalar>>,
     seen: usize,

@@ -7,6 +7,7 @@ mod elementary;
 mod error;
 mod flights;
 mod law;
+mod look_ahead;
 mod model;
 mod objective;
 mod pareto;
@@ -37,6 +38,8 @@ mod _core {
     use crate::elementary::{cos, exp, log, power, sin, tanh};
     #[pymodule_export]
     use crate::flights::{PyFlights, PyQuality, disagreements, qualities, usages};
+    #[pymodule_export]
+    use crate::look_ahead::PyLookAhead;
     #[pymodule_export]
     use crate::model::{PyModel, PySignals, command_effects};
     #[pymodule_export]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -27,6 +28,7 @@ from twinloop.campaign.ranking import ranked
 from twinloop.campaign.setup import checked, refuse_arguments
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
+from twinloop.guard import Guard, Guarded
 from twinloop.law.exports.export import asked, delivered, exported_controller
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
@@ -386,8 +388,90 @@ class Campaign(Shown, Lasting, kind="campaign"):
             if again or not self._book.experiments:
                 raise
             return True
-        self.tell(test, trajectory)
+        if trajectory.ended == "aborted" and trajectory.steps < 2:
+            # Ended before there was anything to learn from: that it was is the result.
+            self.tell_failed(test, trajectory.reason or "ended at once")
+        else:
+            self.tell(test, trajectory)
         return False
+
+    # Guarding
+
+    def guard(
+        self,
+        test: Test,
+        fallback: Mapping[str, float] | ArrayLike | None = None,
+        *,
+        horizon: float | None = None,
+        false_alarms: float = 0.01,
+        overrun: float = 0.5,
+        clock: Callable[[], float] | None = time.monotonic,
+    ) -> Guard:
+        """A test's controller with a watch, for a loop of one's own: `reset`, `command(state, target)`, `tripped`.
+
+        It looks at readings, envelope and clock, and, where a twin follows the flights so far, at its band and ahead
+        with its committee. Once something is wrong it gives the fallback's commands; `guard.trajectory(last)` is told.
+
+        Args:
+            test: that is flown.
+            fallback: gains by name; or a command that is safe to hold (n_u,), in its units. None: the first controller
+                that was flown, or, before any was, the test's own without its excitation.
+            horizon: how far it looks ahead, s; 0: not at all. None: a fifth of the test.
+            false_alarms: share of flights, by the committee's own account, that the watch of the band may end.
+            overrun: share of the period by which a period may be late.
+            clock: gives the time in s; None: time is not watched.
+
+        Returns:
+            The guard, at the start of a flight.
+
+        Raises:
+            InvalidInput: a test for other signals, or arguments that do not fit.
+            NotAvailable: controllers in Python, in whose memory nobody can look ahead; pass horizon=0.
+        """
+        check_signals(test, self.signals)
+        if fallback is None:
+            first = self._book.first_flown()
+            genes = test.genes if first is None or first.test is None else first.test.genes
+            instead: Controller | ArrayLike = self.family.controller(genes)
+        elif isinstance(fallback, Mapping):
+            instead = self.family.controller(self.family.genes(fallback))
+        else:
+            instead = fallback
+        twin = self.twin if self._book.experiments else None
+        return Guard(
+            test,
+            instead,
+            twin=None if twin is None or not twin.follows else twin,
+            flown=[(run.replayed, run.trajectory) for run in self._book.experiments if not run.attached],
+            horizon=horizon,
+            false_alarms=false_alarms,
+            overrun=overrun,
+            clock=clock,
+        )
+
+    def guarded(
+        self,
+        system: System,
+        fallback: Mapping[str, float] | ArrayLike | None = None,
+        *,
+        horizon: float | None = None,
+        false_alarms: float = 0.01,
+    ) -> Guarded:
+        """A system whose every run has a guard in its loop, for `run`; the clock is not watched.
+
+        Args:
+            system: anything with `signals` and `run(test)` that closes the loop with the test's controller.
+            fallback: as for `guard`.
+            horizon: as for `guard`.
+            false_alarms: as for `guard`.
+
+        Returns:
+            A system; its runs are "aborted" where the guard ended them.
+        """
+        return Guarded(
+            system,
+            lambda test: self.guard(test, fallback, horizon=horizon, false_alarms=false_alarms, clock=None),
+        )
 
     # What came out
 

@@ -276,25 +276,10 @@ class Twin(Shown, Recorded, kind="twin"):
             Mean and variance of what is read but for the sensors' noise (n + 1, n_x), over the runs that last; None
             where no committee stands behind the twin.
         """
-        if not self.members or self.noise is None:
+        drawn = self.drawn(test, DRAWS)
+        if drawn is None:
             return None
-        noise, moves = self.noise.drawn(DRAWS, test.steps, Unit(self.seed).part(0).stream("band"))
-        excitation = None if test.excitation is None else np.tile(test.excitation, (DRAWS, 1, 1))
-        setting = self.limits.setting(test.family)
-        runs = []
-        for member in self.members:
-            with engine_input():
-                drawn = _core.rollout(
-                    member,
-                    setting,
-                    np.tile(test.genes, (DRAWS, 1)),
-                    test.task,
-                    noise=noise,
-                    disturbance=moves,
-                    excitation=excitation,
-                )
-            runs.append(drawn.read)
-        states = np.concatenate(runs)
+        states = drawn[0]
         lasted = np.isfinite(states)
         count = np.maximum(1, lasted.sum(axis=0))
         # From one of the runs: sums of whole states round by more than runs may differ.
@@ -303,6 +288,37 @@ class Twin(Shown, Recorded, kind="twin"):
         middle = off.sum(axis=0) / count
         variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
         return origin + middle, variance
+
+    def drawn(self, test: Test, draws: int) -> tuple[Floats, Floats] | None:
+        """Runs of a test by each member, under drawn disturbances and sensor noise.
+
+        Args:
+            test: any test for the same signals.
+            draws: for each member.
+
+        Returns:
+            What is read but for the sensors' noise (members × draws, n + 1, n_x), NaN after a run has diverged, and that
+            noise; None where no committee stands behind the twin.
+        """
+        if not self.members or self.noise is None:
+            return None
+        noise, moves = self.noise.drawn(draws, test.steps, Unit(self.seed).part(0).stream("band"))
+        excitation = None if test.excitation is None else np.tile(test.excitation, (draws, 1, 1))
+        setting = self.limits.setting(test.family)
+        runs = []
+        for member in self.members:
+            with engine_input():
+                drawn = _core.rollout(
+                    member,
+                    setting,
+                    np.tile(test.genes, (draws, 1)),
+                    test.task,
+                    noise=noise,
+                    disturbance=moves,
+                    excitation=excitation,
+                )
+            runs.append(drawn.read)
+        return np.concatenate(runs), np.tile(noise, (len(runs), 1, 1))
 
     def predict(self, states: ArrayLike, commands: ArrayLike, past: ArrayLike | None = None) -> Floats:
         """One step.

@@ -38,6 +38,12 @@ pub struct Controllers<V> {
 }
 
 impl<V: Vector> Controllers<V> {
+    /// The same with the same memory, to be run ahead of them; none of a foreign law, whose memory is its own.
+    pub fn ahead(&self) -> Option<Self> {
+        let own = self.foreign.is_empty();
+        own.then(|| Self { gains: self.gains.clone(), memory: self.memory.clone(), foreign: vec![] })
+    }
+
     /// Back to the start of a run.
     pub fn reset(&mut self) {
         self.memory.fill(V::splat(0.0));

@@ -31,6 +31,7 @@ impl PartialEq for Code {
 }
 
 /// The registers of a run, as wide as a vector, constants behind them.
+#[derive(Clone)]
 pub struct Bank<V>(Vec<V>);
 
 /// Where inputs come from. A trait and not a closure, because only a named function can be made to be inlined.

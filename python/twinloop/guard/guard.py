@@ -1,0 +1,263 @@
+"""A controller that is watched while it flies, and replaced by a fallback before it does harm."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from twinloop import _core
+from twinloop.arrays import Floats, at_least_zero, floats, number
+from twinloop.controllers import Controller
+from twinloop.errors import InvalidInput, NotAvailable, engine_input
+from twinloop.guard.band import BandWatch
+from twinloop.guard.sensors import SensorWatch
+from twinloop.law.twin import Twin
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+HORIZON = 0.2
+"""Share of a test's length that is looked ahead where no horizon is given."""
+CERTAIN = 2
+"""Periods in a row in which the committee must see the flight leave: noise of one reading ends no flight."""
+
+
+class Guard:
+    """A test's controller with somebody who watches: `reset()`, then `command(state, target)` once a period.
+
+    Each period it looks, in this order, whether the reading is finite and not frozen, the period was kept, the reading
+    is inside the envelope, the reading is where the twin's band has it, and no member of the committee, under the
+    test's own controller and excitation, leaves the envelope within the horizon. At the first no it has *tripped*: from
+    then on the fallback's commands are given, and `trajectory` holds the flight until then.
+
+    A reading that cannot be believed is replaced, for the fallback, by what the twin makes of the one before.
+
+    Args:
+        test: that is flown.
+        fallback: a controller, or a command that is safe to hold (n_u,), in its units.
+        twin: that looks ahead and has the band; None: only readings, envelope and clock are watched.
+        flown: flights so far, with the tests that they were, which the band is checked on.
+        horizon: how far it looks ahead, s; 0: not at all. None: a fifth of the test.
+        false_alarms: share of flights, by the committee's own account, that the watch of the band ends without cause.
+        overrun: share of the period by which a period may be late.
+        clock: gives the time in s; None: time is not watched, as in a simulation.
+
+    Raises:
+        InvalidInput: arguments that do not fit each other.
+        NotAvailable: a law in Python, in whose memory nobody can look ahead; pass horizon=0.
+    """
+
+    def __init__(
+        self,
+        test: Test,
+        fallback: Controller | ArrayLike,
+        *,
+        twin: Twin | None = None,
+        flown: Sequence[tuple[Test, Trajectory]] = (),
+        horizon: float | None = None,
+        false_alarms: float = 0.01,
+        overrun: float = 0.5,
+        clock: Callable[[], float] | None = time.monotonic,
+    ) -> None:
+        self.test = test
+        self.signals = test.family.signals
+        n_x, n_u = self.signals.n_x, self.signals.n_u
+        if isinstance(fallback, Controller):
+            self.fallback: Controller | Floats = fallback
+        else:
+            self.fallback = floats("Guard, fallback (a command)", fallback, (n_u,))
+        dt = self.signals.dt
+        length = HORIZON * test.steps * dt if horizon is None else horizon
+        self.horizon = round(at_least_zero("Guard, horizon (s)", length) / dt)
+        self.overrun = at_least_zero("Guard, overrun (share of the period)", overrun)
+        share = number("Guard, false_alarms (share of flights)", false_alarms, above=0.0)
+        if share >= 1.0:
+            raise InvalidInput(f"Guard, false_alarms: expected a share below 1, found {share:g}.")
+        self.clock = clock
+        bounds = [
+            (-np.inf, np.inf) if state.envelope is None else state.envelope for state in self.signals.states
+        ]
+        self.low, self.high = np.array(bounds).T
+        self._ahead = None if twin is None or not self.horizon else _look_ahead(test, twin, bounds)
+        drawn = twin is not None and twin.members and twin.noise is not None
+        self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
+        self._sensors = SensorWatch(n_x, () if twin is None else twin.flights)
+        self._controller = test.controller()
+        self._states = np.empty((test.steps + 1, n_x))
+        self._commands = np.empty((test.steps, n_u))
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the start of a flight; call it at the start of every one."""
+        self.period = 0
+        self.tripped = False
+        self.reason = ""
+        self.tripped_at: int | None = None
+        self._leaving = 0
+        self._last: Floats | None = None
+        self._time: float | None = None
+        self._broken = np.zeros(self.signals.n_x, bool)
+        self._estimate: Floats | None = None
+        self._controller.reset()
+        self._sensors.reset()
+        if isinstance(self.fallback, Controller):
+            self.fallback.reset()
+        if self._ahead is not None:
+            self._ahead.reset()
+        if self._band is not None:
+            self._band.reset()
+
+    def command(self, state: ArrayLike, target: ArrayLike) -> Floats:
+        """What to send for the coming period.
+
+        Args:
+            state: as read (n_x,), SI units, radians; what a sensor did not give is NaN.
+            target: state to lead to (n_x,), the same units.
+
+        Returns:
+            Command (n_u,), within its bounds: the test's, or the fallback's once the guard has tripped.
+
+        Raises:
+            InvalidInput: other shapes.
+        """
+        reading = np.array(state, dtype=np.float64)
+        if reading.shape != (self.signals.n_x,):
+            raise InvalidInput(
+                f"Guard.command, state: expected {self.signals.n_x} numbers, found shape {reading.shape}."
+            )
+        goal = floats("Guard.command, target", target, (self.signals.n_x,))
+        if not self.tripped:
+            self._watch(reading)
+        reading = self._believed(reading)
+        if not self.tripped:
+            command = self._controller.command(reading, goal)
+            if self.period < self.test.steps:
+                self._states[self.period] = reading
+                self._commands[self.period] = command
+        elif isinstance(self.fallback, Controller):
+            command = self.fallback.command(reading, goal)
+        else:
+            command = self.fallback.copy()
+        self._estimate = reading
+        if self._ahead is not None:
+            with engine_input():
+                self._estimate = self._ahead.following(reading, command)
+                self._ahead.sent(reading, goal, command)
+        self.period += 1
+        return command
+
+    def trajectory(self, last: ArrayLike | None = None) -> Trajectory:
+        """The flight: whole, or until the guard tripped, with the reason.
+
+        Args:
+            last: the reading after the last command (n_x,); needed unless the guard has tripped.
+
+        Returns:
+            A run of even periods; `ended` is "aborted" where the guard tripped, or where the loop ended sooner than the
+            test.
+
+        Raises:
+            InvalidInput: no last reading of a flight that was not ended.
+        """
+        dt, n = self.signals.dt, min(self.period, self.test.steps)
+        if self.tripped_at is not None:
+            n = min(self.tripped_at, self.test.steps)
+            # The reading on which it tripped, unless that is none: then the flight ends a period sooner.
+            if self._last is None:
+                n = max(0, n - 1)
+                last = self._states[n]
+            else:
+                last = self._last
+        elif last is None:
+            raise InvalidInput(
+                "Guard.trajectory: expected the reading after the last command, found none; pass it, or end the flight"
+                " first."
+            )
+        states = self._states[: n + 1].copy()
+        states[n] = floats("Guard, last reading", last, (self.signals.n_x,))
+        complete = self.tripped_at is None and n == self.test.steps
+        reason = self.reason or ("" if complete else f"the loop ended after {n} of {self.test.steps} periods")
+        ended = "completed" if complete else "aborted"
+        return Trajectory(
+            dt * np.arange(n + 1, dtype=np.float64), states, self._commands[:n].copy(), ended, reason
+        )
+
+    # Inside
+
+    def _watch(self, reading: Floats) -> None:
+        """Trips on the first thing that is wrong."""
+        missing, frozen = self._sensors.wrong(reading)
+        states = self.signals.states
+        self._last = None if missing.any() else reading.copy()
+        if missing.any() or frozen.any():
+            self._broken = missing | frozen
+            i = int(np.argmax(self._broken))
+            what = "is not a finite number" if missing[i] else "has not changed in its last bit for too long"
+            return self._trip(f"the reading of {states[i].name} {what}")
+        late = self._late()
+        if late is not None:
+            return self._trip(f"a period took {late:.3g} s instead of {self.signals.dt:g} s")
+        outside = (reading < self.low) | (reading > self.high)
+        if outside.any():
+            i = int(np.argmax(outside))
+            return self._trip(
+                f"{states[i].name} has left its envelope: {reading[i]:.4g} {states[i].unit}".rstrip()
+            )
+        if self._band is not None and self._band.alarms(reading):
+            count = self._band.outside
+            return self._trip(
+                f"readings were outside of the twin's band for too long, {count} periods in a row now"
+            )
+        if self._ahead is not None and self.period < self.test.steps:
+            with engine_input():
+                found = self._ahead.leaving(reading, self.horizon)
+            self._leaving = 0 if found is None else self._leaving + 1
+            if found is not None and (self._leaving >= CERTAIN or found[0] < CERTAIN):
+                seconds = found[0] * self.signals.dt
+                return self._trip(f"{states[found[1]].name} would leave its envelope in {seconds:.3g} s")
+        return None
+
+    def _trip(self, why: str) -> None:
+        self.tripped, self.tripped_at = True, self.period
+        self.reason = f"guard, {self.period * self.signals.dt:.3g} s after the start: {why}"
+
+    def _late(self) -> float | None:
+        """How long the last period took, where that is too long."""
+        if self.clock is None:
+            return None
+        now, before = self.clock(), self._time
+        self._time = now
+        if before is None or now - before <= (1.0 + self.overrun) * self.signals.dt:
+            return None
+        return now - before
+
+    def _believed(self, reading: Floats) -> Floats:
+        """The reading, with what the twin makes of the one before where a sensor cannot be believed."""
+        wrong = self._broken | ~np.isfinite(reading)
+        if not wrong.any():
+            return reading
+        before = self.test.initial_state if self._estimate is None else self._estimate
+        return np.where(wrong, before, reading)
+
+
+def _look_ahead(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> _core.LookAhead:
+    members = twin.members or (twin.model,)
+    try:
+        return _core.LookAhead(
+            list(members),
+            twin.limits.setting(test.family),
+            test.genes,
+            test.target_state,
+            test.steps,
+            np.array(bounds),
+            excitation=test.excitation,
+        )
+    except ValueError as reason:
+        if "expected a law of the engine" not in str(reason):
+            raise InvalidInput(str(reason)) from reason
+        raise NotAvailable(
+            "Guard: expected a law of the engine, found one in Python, in whose memory nobody can look ahead; pass"
+            " horizon=0, and readings, band and clock are watched."
+        ) from reason

@@ -1,0 +1,83 @@
+"""A system whose every run is guarded: what `campaign.run` flies where a guard shall watch."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from twinloop import _core
+from twinloop.controllers import Family
+from twinloop.controllers.custom import Law
+from twinloop.errors import engine_input
+from twinloop.guard.guard import Guard
+from twinloop.signals import Signals
+from twinloop.systems.base import System
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+
+class Guarded(System):
+    """Runs tests with a guard in the loop; a run that the guard ended is returned until then, as aborted.
+
+    The system flies on under the fallback to the end of the test; `flown` keeps that run, `guard` the guard.
+
+    Args:
+        system: anything with `signals` and `run(test)` that closes the loop with the test's controller.
+        guard: makes the guard of a test.
+    """
+
+    def __init__(self, system: System, guard: Callable[[Test], Guard]) -> None:
+        self.system = system
+        self.make = guard
+        self.guard: Guard | None = None
+        self.flown: Trajectory | None = None
+        gains = getattr(system, "default_gains", None)
+        if gains is not None:
+            self.default_gains = gains
+
+    @property
+    def signals(self) -> Signals:
+        """Of the system."""
+        return self.system.signals
+
+    def run(self, test: Test) -> Trajectory:
+        """Runs one experiment.
+
+        Args:
+            test: what to fly.
+
+        Returns:
+            What was measured until the guard tripped, if it did.
+        """
+        guard = self.make(test)
+        run = self.system.run(led_by(guard, test))
+        self.guard, self.flown = guard, run
+        if guard.tripped_at is None or guard.tripped_at > run.steps:
+            return run
+        steps = guard.tripped_at
+        return dataclasses.replace(
+            run,
+            t=run.t[: steps + 1],
+            states=run.states[: steps + 1],
+            commands=run.commands[:steps],
+            ended="aborted",
+            reason=guard.reason,
+            true_states=None if run.true_states is None else run.true_states[: steps + 1],
+        )
+
+
+def led_by(law: Law, test: Test) -> Test:
+    """The same test with somebody else in the loop, who adds the excitation himself, or does not.
+
+    Args:
+        law: with `reset()` and `command(state, target)`.
+        test: that a system shall run.
+
+    Returns:
+        A test that no campaign knows.
+    """
+    family = test.family
+    gains = [gain.engine for gain in family.law_gains]
+    with engine_input():
+        engine = _core.Family.python(family.signals.engine, lambda values: law, gains)
+    return dataclasses.replace(test, family=Family(family.signals, family.law_gains, engine), excitation=None)

@@ -1,0 +1,53 @@
+"""Readings that cannot be: not a number, or the same to the last bit for longer than the sensor ever gave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.trajectory import Trajectory
+
+LONGER = 2
+"""How many times the longest repetition in recorded flights a repetition must be exceeded by."""
+FEWEST = 5
+"""Equal readings in a row, at least, that are taken for a frozen sensor."""
+
+
+class SensorWatch:
+    """Says which states cannot be believed.
+
+    Args:
+        n_x: number of states.
+        flights: recorded before, which say how long each sensor repeats itself; none: no sensor is taken for frozen.
+    """
+
+    def __init__(self, n_x: int, flights: Sequence[Trajectory]) -> None:
+        longest = np.zeros(n_x, np.int64)
+        for flight in flights:
+            longest = np.maximum(longest, _longest(flight.states))
+        self.limit = np.maximum(LONGER * longest + 1, FEWEST) if flights else None
+        self.last = np.full(n_x, np.nan)
+        self.repeated = np.zeros(n_x, np.int64)
+
+    def reset(self) -> None:
+        """Back to the start of a flight."""
+        self.last[:] = np.nan
+        self.repeated[:] = 0
+
+    def wrong(self, reading: Floats) -> tuple[np.ndarray, np.ndarray]:
+        """States (n_x,) that are no finite number, and those whose sensor is frozen."""
+        self.repeated[:] = np.where(reading == self.last, self.repeated + 1, 0)
+        self.last[:] = reading
+        frozen = np.zeros(len(reading), bool) if self.limit is None else self.repeated >= self.limit
+        return ~np.isfinite(reading), frozen
+
+
+def _longest(states: Floats) -> np.ndarray:
+    """The most readings in a row that were equal to the one before, for each state."""
+    longest = now = np.zeros(states.shape[1], np.int64)
+    for equal in states[1:] == states[:-1]:
+        now = np.where(equal, now + 1, 0)
+        longest = np.maximum(longest, now)
+    return longest

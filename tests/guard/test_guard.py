@@ -1,0 +1,411 @@
+"""The guard: ahead as slow NumPy has it, false alarms as stated, sensors and clock, and what is told of a flight."""
+
+import dataclasses
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import twinloop as tl
+from conftest import pendulum_step
+from oracles import same_bits
+from twinloop import _core
+from twinloop.guard import Guard, Guarded
+from twinloop.guard.band import DRAWS, BandWatch
+from twinloop.guard.guarded import led_by
+
+SIGNALS = tl.Signals(
+    [
+        tl.State("angle", "rad", scale=np.pi, envelope=(-1.3, 1.3)),
+        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
+    ],
+    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
+    dt=0.05,
+)
+CONTROLLER = tl.controllers.PID(
+    axes=[("angle", "rate")],
+    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
+)
+GOOD = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
+WILD = {"angle.kp": 6.0, "angle.ki": 6.0, "angle.kd": 0.0}
+SMALL = {
+    "moves": 1500, "starts": 1, "generations": 0, "lags": False, "evaluations": 256, "candidates": 32,
+    "committee_size": 4, "tuning_steps": 4, "draws": 2, "tuning_starts": 1,
+}  # fmt: skip
+NOISE = [2e-3, 1e-2]
+
+
+def new_campaign(controller=CONTROLLER, **changes):
+    arguments = {
+        "controller": controller, "initial_state": [0.0, 0.0], "target_state": [0.8, 0.0], "duration": 1.5,
+        "threads": 1, "options": SMALL, **changes,
+    }  # fmt: skip
+    return tl.Campaign(SIGNALS, **arguments)
+
+
+def rig(noise=NOISE):
+    return tl.systems.Simulated(SIGNALS, pendulum_step, default_gains=GOOD, noise=noise, seed=5)
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    """One that knows the pendulum from two flights."""
+    return new_campaign().run(rig(), 2)
+
+
+def fly(guard, test, sensor=lambda k, x: x, loops=None):
+    """By hand: what the guard sent, and the true states."""
+    x, states, commands = np.array(test.initial_state), [], []
+    for k in range(test.steps if loops is None else loops):
+        states.append(x)
+        commands.append(guard.command(sensor(k, x), test.target(min(k, test.steps))))
+        x = np.array(pendulum_step(x, commands[-1]))
+    return np.array([*states, x]), np.array(commands)
+
+
+# Ahead
+
+
+def slow_leaving(members, test, past_readings, past_commands, reading, horizon, envelope):
+    """The soonest leaving: a controller that has seen the flight, and every period a step with the whole past."""
+    soonest = None
+    for m, member in enumerate(members):
+        controller = test.controller()
+        for k, before in enumerate(past_readings):
+            controller.command(before, test.target(k))
+        x, sent = np.array(reading), [np.array(u) for u in past_commands]
+        for step in range(min(horizon, test.steps - len(past_readings))):
+            u = controller.command(x, test.target(len(past_readings) + step))
+            past = np.array(sent).reshape(1, len(sent), 1)
+            x = member.step(x[np.newaxis], u[np.newaxis], past=past)[0]
+            sent.append(u)
+            outside = [not low <= value <= high for value, (low, high) in zip(x, envelope, strict=True)]
+            if any(outside):
+                if soonest is None or step + 1 < soonest[0]:
+                    soonest = (step + 1, outside.index(True), m)
+                break
+            if not np.isfinite(x).all():
+                break
+    return soonest
+
+
+def members_with_memory():
+    """A pendulum with a lag and one with a delay, the second one weaker."""
+    program = "r4 = r2 {gain}\nr0 = r4"
+    made = []
+    for gain, actuator in ((18.0, (0.08, 0, 0.0)), (21.0, (0.0, 2, 0.0))):
+        # Inputs: angle, rate, torque; then the output, the acceleration, and one spare register.
+        pages = [[("*", 3, 2, 2.0 * gain), ("*", 4, 1, 1.1), ("-", 3, 3, 4), ("sin", 4, 0, None), ("*", 4, 4, 24.5),
+                  ("-", 3, 3, 4)]]  # fmt: skip
+        program = _core.Program(3, 1, 5, pages)
+        made.append(_core.Model(program, "acceleration", SIGNALS.engine, [actuator]))
+    return made
+
+
+MEMBERS = members_with_memory()
+FAMILY = CONTROLLER.bind(SIGNALS)
+
+
+@given(
+    seed=st.integers(0, 1000), period=st.integers(0, 32), horizon=st.integers(1, 40), turning=st.booleans(),
+    excited=st.booleans(),
+)  # fmt: skip
+def test_looking_ahead_is_the_flight_that_the_members_would_make_of_it(
+    seed, period, horizon, turning, excited
+):
+    random = np.random.default_rng(seed)
+    steps, envelope = 30, np.array([[-0.9, 0.9], [-4.0, np.inf]])
+    target = random.normal(size=(steps + 1, 2)) * [0.8, 0.0] if turning else np.array([0.8, 0.0])
+    genes = FAMILY.from_unit(random.uniform(size=3))
+    excitation = 0.2 * random.normal(size=(steps, 1)) if excited else None
+    test = tl.Test(FAMILY, genes, np.zeros(2), target, steps, excitation)
+    limits = tl.Twin(MEMBERS[0], SIGNALS).limits
+    ahead = _core.LookAhead(
+        MEMBERS, limits.setting(FAMILY), genes, target, steps, envelope, excitation=excitation
+    )
+    for _ in range(2):
+        ahead.reset()
+        readings, commands = [], []
+        for k in range(period):
+            readings.append(random.normal(size=2) * [0.3, 1.0])
+            commands.append(random.uniform(-2.0, 2.0, 1))
+            ahead.sent(readings[-1], test.target(min(k, steps)), commands[-1])
+        reading = random.normal(size=2) * [0.4, 1.5]
+        if period > steps:
+            assert ahead.leaving(reading, horizon) is None
+            continue
+        expected = slow_leaving(MEMBERS, test, readings, commands, reading, horizon, envelope)
+        assert ahead.leaving(reading, horizon) == expected
+        assert ahead.leaving(reading, horizon) == expected  # looking changes nothing
+    past = np.array(commands).reshape(1, period, 1)
+    one = MEMBERS[0].step([reading], [[0.7]], past=past)[0]
+    assert same_bits(ahead.following(reading, [0.7]), one)
+
+
+def test_a_member_that_blows_up_leaves_any_envelope():
+    program = _core.Program(3, 1, 4, [[("*", 3, 1, 1000.0)]])
+    wild = _core.Model(program, "acceleration", SIGNALS.engine)
+    setting, nowhere = tl.Twin(wild, SIGNALS).limits.setting(FAMILY), np.array([[-np.inf, np.inf]] * 2)
+    ahead = _core.LookAhead([wild], setting, [0.0] * 3, [0.0, 0.0], 30, nowhere)
+    assert ahead.leaving([0.0, 0.0], 30) is None
+    periods, _, member = ahead.leaving([0.0, 1.0], 30)
+    assert 1 <= periods < 5 and member == 0
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"parameters": [0.0]},
+        {"target": [0.0]},
+        {"envelope": [[0.0, 1.0]]},
+        {"steps": 0},
+        {"target": [np.nan, 0.0]},
+    ],
+)
+def test_a_look_ahead_that_fits_no_flight_is_refused(changes):
+    arguments = {
+        "members": MEMBERS, "setting": tl.Twin(MEMBERS[0], SIGNALS).limits.setting(FAMILY), "parameters": [0.0] * 3,
+        "target": [0.0, 0.0], "steps": 30, "envelope": [[-1.0, 1.0]] * 2, **changes,
+    }  # fmt: skip
+    with pytest.raises(ValueError, match="expected"):
+        _core.LookAhead(**arguments)
+
+
+def test_a_flight_that_would_leave_is_ended_before_it_does_and_the_fallback_keeps_it_inside(campaign):
+    test = campaign.test(WILD, excitation=None)
+    alone, _ = fly(test.controller(), test)
+    leaving = int(np.argmax(np.abs(alone[:, 0]) > 1.3))
+    assert leaving > 0
+    guard = campaign.guard(test, horizon=0.3, clock=None)
+    states, commands = fly(guard, test)
+    assert guard.tripped and guard.tripped_at < leaving and "angle would leave its envelope" in guard.reason
+    assert np.abs(states[:, 0]).max() <= 1.3
+    # From there on it is the first controller, from rest.
+    fallback = campaign.family.controller(campaign.tests[0].genes)
+    at = guard.tripped_at
+    expected = [fallback.command(x, test.target(0)) for x in states[at:-1]]
+    assert same_bits(commands[at:], np.array(expected))
+    told = guard.trajectory()
+    assert (told.ended, told.reason, told.steps) == ("aborted", guard.reason, at)
+    assert same_bits(told.states, states[: at + 1]) and same_bits(told.commands, commands[:at])
+
+
+def test_nothing_changes_where_nothing_is_wrong_and_a_guard_can_fly_again(campaign):
+    test = campaign.test(GOOD)
+    guard = campaign.guard(test, clock=None)
+    expected = fly(test.controller(), test)
+    for _ in range(2):
+        states, commands = fly(guard, test)
+        assert not guard.tripped and same_bits(commands, expected[1])
+        flown = guard.trajectory(states[-1])
+        assert flown.ended == "completed" and same_bits(flown.states, states)
+        guard.reset()
+    states, _ = fly(guard, test, loops=7)
+    flown = guard.trajectory(states[-1])
+    assert (flown.ended, flown.steps) == ("aborted", 7) and "7 of 30" in flown.reason
+    with pytest.raises(tl.InvalidInput, match="reading after the last command"):
+        guard.trajectory()
+
+
+def test_a_command_or_other_gains_may_be_the_fallback(campaign):
+    test = campaign.test(WILD, excitation=None)
+    guard = campaign.guard(test, [0.25], horizon=0.3, clock=None)
+    _, commands = fly(guard, test)
+    assert (commands[guard.tripped_at :] == 0.25).all() and guard.tripped_at < 30
+    soft = {"angle.kp": 1.0, "angle.ki": 0.0, "angle.kd": 0.5}
+    guard = campaign.guard(test, soft, horizon=0.3, clock=None)
+    states, commands = fly(guard, test)
+    at = guard.tripped_at
+    assert same_bits(
+        commands[at], campaign.family.controller(campaign.family.genes(soft)).command(states[at], [0.8, 0.0])
+    )
+    for wrong in ([0.0, 1.0], {"kp": 1.0}):
+        with pytest.raises(tl.InvalidInput):
+            campaign.guard(test, wrong)
+
+
+# Band
+
+
+def test_the_band_ends_as_many_flights_of_the_committee_as_is_said_and_no_more(campaign):
+    twin, test = campaign.twin, campaign.tests[0]
+    watch = BandWatch(twin, test, 0.05)
+    other = tl.Twin(
+        twin.model, twin.signals, members=twin.members, noise=twin.noise, seed=991, inflation=twin.inflation
+    )
+    states, noise = other.drawn(test, DRAWS)
+    middle = states.mean(axis=0)
+    alarms = 0
+    for readings in middle + twin.inflation * (states - middle) + noise:
+        watch.reset()
+        alarms += any([watch.alarms(reading) for reading in readings])
+    share = alarms / len(states)
+    assert 0.0 < share < 0.15
+    # One that is off by three widths of the band is ended, after some periods in a row.
+    watch.reset()
+    late = [watch.alarms(x + 3.0 * watch.half[k] * (k >= 5)) for k, x in enumerate(watch.mean)]
+    assert any(late) and np.argmax(late) >= 5 + 2
+    # One from elsewhere says nothing.
+    watch.reset()
+    assert not any([watch.alarms(x + 0.3) for x in watch.mean])
+
+
+def test_a_plant_that_is_not_what_the_twin_knows_ends_the_flight(campaign):
+    test = campaign.test(GOOD, excitation=None)
+    guard = campaign.guard(test, horizon=0.0, clock=None)
+    x = np.zeros(2)
+    for k in range(test.steps):
+        u = guard.command(x, test.target(k))
+        x = np.array(pendulum_step(x, 0.4 * u))
+    assert guard.tripped and "twin's band" in guard.reason
+    assert guard.trajectory().ended == "aborted"
+
+
+# Sensors and clock
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_reading_that_is_none_ends_the_flight_and_the_fallback_flies_on_what_the_twin_knows(campaign, bad):
+    test = campaign.test(GOOD, excitation=None)
+    guard = campaign.guard(test, clock=None)
+    states, commands = fly(guard, test, lambda k, x: np.where(k >= 10, [bad, x[1]], x))
+    assert guard.tripped_at == 10 and "angle is not a finite number" in guard.reason
+    assert np.isfinite(commands).all() and np.abs(states[-1, 0] - 0.8) < 0.3
+    told = guard.trajectory()
+    assert told.steps == 9 and same_bits(told.states, states[:10])
+
+
+def test_a_sensor_that_repeats_itself_for_longer_than_it_ever_did_ends_the_flight(campaign):
+    test = campaign.test(GOOD, excitation=None)
+    guard = campaign.guard(test, horizon=0.0, clock=None)
+    random = np.random.default_rng(0)
+
+    stuck = []
+
+    def sensor(k, x):
+        reading = x + random.normal(size=2) * NOISE
+        stuck.append(reading[1])
+        return np.array([reading[0], stuck[20]]) if k >= 20 else reading
+
+    fly(guard, test, sensor)
+    # The first of them is a reading like others.
+    assert guard.tripped_at == 25 and "rate has not changed" in guard.reason
+
+
+def test_a_sensor_whose_flights_repeat_readings_is_not_taken_for_frozen():
+    from twinloop.guard.sensors import SensorWatch
+
+    still = tl.Trajectory(0.05 * np.arange(31), np.zeros((31, 2)), np.zeros((30, 1)))
+    watch = SensorWatch(2, [still])
+    assert not any([watch.wrong(np.zeros(2))[1].any() for _ in range(50)])
+    assert watch.wrong(np.zeros(2))[1].any() or any([watch.wrong(np.zeros(2))[1].any() for _ in range(20)])
+    without = SensorWatch(2, [])
+    assert not any([without.wrong(np.zeros(2))[1].any() for _ in range(500)])
+
+
+def test_a_late_period_ends_the_flight():
+    campaign = new_campaign()
+    test = campaign.test(GOOD, excitation=None)
+    times = iter(np.cumsum([0.0, 0.05, 0.07, 0.05, 0.08, 0.05, 0.05]))
+    guard = campaign.guard(test, [0.0], overrun=0.5, clock=lambda: float(next(times)))
+    for _ in range(6):
+        guard.command(np.zeros(2), test.target(0))
+    assert guard.tripped_at == 4 and "0.08 s instead of 0.05 s" in guard.reason
+
+
+def test_before_anything_is_known_readings_and_envelope_are_watched():
+    campaign = new_campaign()
+    test = campaign.test(GOOD)
+    guard = campaign.guard(test, clock=None)
+    for angle in (0.1, 0.1, 1.31):
+        guard.command([angle, 0.0], test.target(0))
+    assert guard.tripped_at == 2 and "angle has left its envelope: 1.31 rad" in guard.reason
+    assert not new_campaign().guard(test, clock=None).tripped
+
+
+def test_wrong_arguments_are_refused(campaign):
+    test = campaign.tests[0]
+    for wrong in ({"horizon": -1.0}, {"false_alarms": 0.0}, {"false_alarms": 1.0}, {"overrun": np.nan}):
+        with pytest.raises(tl.InvalidInput):
+            campaign.guard(test, **wrong)
+    guard = campaign.guard(test, clock=None)
+    for state, target in (([0.0], [0.0, 0.0]), ([0.0, 0.0], [np.nan, 0.0])):
+        with pytest.raises(tl.InvalidInput):
+            guard.command(state, target)
+    assert guard.period == 0
+
+
+# Systems
+
+
+def test_a_guarded_system_gives_the_same_bits_until_it_is_ended(campaign):
+    good, wild = campaign.test(GOOD), campaign.test(WILD, excitation=None)
+    guarded = campaign.guarded(rig(), horizon=0.3)
+    alone, watched = rig().run(good), guarded.run(good)
+    assert same_bits(alone.states, watched.states) and same_bits(alone.commands, watched.commands)
+    run = guarded.run(wild)
+    assert run.ended == "aborted" and run.reason == guarded.guard.reason
+    assert run.steps == guarded.guard.tripped_at < wild.steps == guarded.flown.steps
+    assert np.abs(guarded.flown.true_states[:, 0]).max() <= 1.3
+    assert same_bits(run.states, guarded.flown.states[: run.steps + 1])
+
+
+def test_a_campaign_flies_a_guarded_system_and_learns_from_what_was_ended():
+    campaign = new_campaign()
+    campaign.test(WILD, excitation=None)
+    campaign.run(Guarded(rig(), lambda test: campaign.guard(test, [0.0], clock=None)), 1)
+    (run,) = campaign.experiments
+    assert run.trajectory.ended == "aborted" and campaign.status(campaign.tests[0]) == "aborted"
+    assert "left its envelope" in run.trajectory.reason
+
+
+def test_a_flight_that_is_ended_at_once_is_told_as_failed():
+    class Outside(tl.System):
+        signals = SIGNALS
+
+        def run(self, test):
+            led = led_by(Guard(test, [0.0], clock=None), test)
+            led.controller().command([1.4, 0.0], test.target(0))
+            return tl.Trajectory([0.0], [[1.4, 0.0]], np.empty((0, 1)), "aborted", "left")
+
+    campaign = new_campaign()
+    campaign.test(GOOD)
+    campaign.run(Outside(), 1)
+    assert [failure.reason for failure in campaign.failures] == ["left"] and not campaign.experiments
+
+
+def test_a_law_in_python_is_watched_but_not_ahead(campaign):
+    class Law:
+        def __init__(self, kp):
+            self.kp = kp
+
+        def reset(self):
+            pass
+
+        def command(self, state, target):
+            return [self.kp * (target[0] - state[0])]
+
+    family = tl.controllers.Custom(Law, {"kp": (0.0, 6.0)}).bind(SIGNALS)
+    test = tl.Test(family, [1.0], [0.0, 0.0], [0.8, 0.0], 30)
+    with pytest.raises(tl.NotAvailable, match="horizon=0"):
+        Guard(test, [0.0], twin=campaign.twin)
+    guard = Guard(test, [0.0], twin=campaign.twin, horizon=0.0, clock=None)
+    assert guard.command([0.1, 0.0], [0.8, 0.0])[0] == pytest.approx(0.7)
+
+
+def test_a_guard_takes_no_more_memory_with_every_period(campaign):
+    test = dataclasses.replace(campaign.tests[0], steps=3000, excitation=None)
+    guard = campaign.guard(test, clock=None)
+    reading = np.array([0.1, 0.0])
+    tracemalloc.start()
+    try:
+        for _ in range(200):
+            guard.command(reading + 1e-9 * guard.period, test.target(0))
+        before = tracemalloc.get_traced_memory()[0]
+        for _ in range(1000):
+            guard.command(reading + 1e-9 * guard.period, test.target(0))
+        assert tracemalloc.get_traced_memory()[0] - before < 10_000
+    finally:
+        tracemalloc.stop()
