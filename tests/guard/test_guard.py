@@ -278,7 +278,8 @@ def test_a_reading_that_is_none_ends_the_flight_and_the_fallback_flies_on_what_t
 
 
 def test_a_sensor_that_repeats_itself_for_longer_than_it_ever_did_ends_the_flight(campaign):
-    test = campaign.test(GOOD, excitation=None)
+    # Where it is long at its target: before that the band would be the first to notice.
+    test = dataclasses.replace(campaign.test(GOOD, excitation=None), steps=80)
     guard = campaign.guard(test, horizon=0.0, clock=None)
     random = np.random.default_rng(0)
 
@@ -287,11 +288,11 @@ def test_a_sensor_that_repeats_itself_for_longer_than_it_ever_did_ends_the_fligh
     def sensor(k, x):
         reading = x + random.normal(size=2) * NOISE
         stuck.append(reading[1])
-        return np.array([reading[0], stuck[20]]) if k >= 20 else reading
+        return np.array([reading[0], stuck[60]]) if k >= 60 else reading
 
     fly(guard, test, sensor)
     # The first of them is a reading like others.
-    assert guard.tripped_at == 25 and "rate has not changed" in guard.reason
+    assert guard.tripped_at == 65 and "rate has not changed" in guard.reason
 
 
 def test_a_sensor_whose_flights_repeat_readings_is_not_taken_for_frozen():
