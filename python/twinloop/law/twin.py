@@ -297,8 +297,8 @@ class Twin(Shown, Recorded, kind="twin"):
             draws: for each member.
 
         Returns:
-            What is read but for the sensors' noise (members × draws, n + 1, n_x), NaN after a run has diverged, and that
-            noise; None where no committee stands behind the twin.
+            What is read but for the sensors' noise (members × draws, n + 1, n_x), NaN after a run has diverged, and
+            that noise; None where no committee stands behind the twin.
         """
         if not self.members or self.noise is None:
             return None
