@@ -27,7 +27,6 @@ impl PyLookAhead {
     #[pyo3(signature = (
         members, setting, parameters, target, steps, envelope, *, excitation = None
     ))]
-    #[expect(clippy::too_many_arguments, reason = "what a flight is, named in Python")]
     fn new(
         members: Vec<PyRef<'_, PyModel>>,
         setting: &PySetting,
