@@ -10,6 +10,7 @@ NEEDS = {
     "gymnasium_pendulum": ("gymnasium", "pip install 'twinloop[gymnasium]'"),
     "gymnasium_mujoco": ("mujoco", "pip install 'twinloop[mujoco]'"),
     "rotorpy_vehicle": ("rotorpy", 'pip install --no-deps "rotorpy>=3,<4"'),
+    "three_days": ("jinja2", "pip install 'twinloop[store,report]'"),
     "fmu": ("fmpy", "pip install 'twinloop[fmu]'"),
 }
 """Packages of others that an example needs; the test set-up brings them."""

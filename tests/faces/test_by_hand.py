@@ -73,7 +73,7 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     flown(look().tests[0])
     run("tell", "rig.db", "0", "flight.csv")
     sheet = run("ask", "rig.db").stdout
-    assert "Predicted quality" in sheet and "Risk" in sheet
+    assert "Predicted quality, integrated absolute error (rad s): " in sheet and "Risk" in sheet
     test = look().tests[1]
     with open("rig-test-1.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -149,7 +149,7 @@ def test_a_log_that_was_told_is_not_told_twice_and_what_was_expected_stands_besi
         assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == number + 1
     assert "add to torque, N m" in sheet and "rate, rad/s" in sheet
     test, flight = look().tests[1], look().experiments[1]
-    assert f"quality {flight.quality:.4g}, predicted {test.predicted:.4g} ± {test.spread:.3g};" in told
+    assert f"quality {flight.quality:.4g}, predicted {test.predicted:.4g} ± {test.spread:.3g} rad s;" in told
     last = next(line for line in sheet.splitlines() if line.startswith("1 "))
     predicted = look().twin.simulate(test)  # of now; the sheet's was of before, near it
     assert float(last.split()[1].strip("(")) == pytest.approx(predicted.states[-1, 0], abs=0.2)
@@ -174,7 +174,10 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     campaign = look()
     assert [campaign.status(t) for t in campaign.tests] == ["aborted", "failed", "abandoned"]
     shown = run("show", "rig.db")
-    assert "Tests failed: 1." in shown.stdout
+    assert "Test failed: 1.\nTest abandoned: 2.\n" in shown.stdout
+    assert (
+        "learnt from" in shown.stdout and "interrupted" not in shown.stdout and "finished" not in shown.stdout
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.files import check_writable, write_text
-from twinloop.faces.result import to_json
+from twinloop.faces.result import quality_unit, to_json
 from twinloop.faces.sheet import columns, facts, sheet
 from twinloop.logs import load, write_columns
 from twinloop.test import Test
@@ -87,7 +87,7 @@ def _shown(store: Path, campaign: Campaign, test: Test) -> tuple[str, dict[str, 
     predicted = campaign.twin.simulate(test) if campaign.experiments else None
     file = store.with_name(f"{store.stem}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
-    return sheet(str(store), test, predicted, str(file)), facts(test, file)
+    return sheet(str(store), test, predicted, str(file), campaign.setup.quality), facts(test, file)
 
 
 @click.command()
@@ -182,7 +182,8 @@ def _as_expected(campaign: Campaign, test: Test) -> str:
         return ""
     expected = "" if test.predicted is None else f", predicted {test.predicted:.4g}"
     spread = "" if test.predicted is None or test.spread is None else f" ± {test.spread:.3g}"
-    return f", quality {runs[-1]:.4g}{expected}{spread}"
+    unit = quality_unit(campaign.setup.quality)
+    return f", quality {runs[-1]:.4g}{expected}{spread}{f' {unit}' if unit else ''}"
 
 
 def _campaign(store: Path, threads: int | None = None) -> Campaign:

@@ -70,7 +70,7 @@ def certify(
     if found.granted:
         click.echo(f"Granted: {output / 'certificate.html'}" + (f"; {files}" if files else "") + ".")
         return
-    click.echo(f"Refused: {output / 'certificate.html'}. {' '.join(found.refusals)}")
+    click.echo(f"Refused. {' '.join(found.refusals)} In full: {output / 'certificate.html'}")
     context.exit(1)
 
 

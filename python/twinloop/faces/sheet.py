@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from twinloop.faces.text import table
+from twinloop.faces.result import quality_unit
+from twinloop.faces.text import quality_words, table
 from twinloop.logs import TIME
+from twinloop.planning.quality import Quality
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -81,7 +83,7 @@ def facts(test: Test, file: Path) -> dict[str, object]:
     }
 
 
-def sheet(store: str, test: Test, predicted: Trajectory | None, file: str) -> str:
+def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quality: Quality) -> str:
     """The test sheet, to be printed.
 
     Args:
@@ -89,6 +91,7 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str) -> st
         test: to be flown.
         predicted: its run on the twin; None where nothing is known yet.
         file: where its columns are.
+        quality: what is minimised.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.gains}
     gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
@@ -106,8 +109,9 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str) -> st
     ]
     if test.predicted is not None and predicted is not None:
         spread = "" if test.spread is None else f" ± {test.spread:.3g}"
+        measure = quality_words(quality.kind, quality_unit(quality))
         lines.append(
-            f"Predicted quality: {test.predicted:.4g}{spread}; the predicted run with its band: {file}."
+            f"Predicted quality, {measure}: {test.predicted:.4g}{spread}; the predicted run with its band: {file}."
         )
     if test.excitation is not None or predicted is not None:
         lines += ["", _expected(test, predicted), ""]

@@ -82,7 +82,11 @@ def show(store: str, name: str | None, as_json: bool) -> None:
     campaign.interrupted = True  # what was learnt so far is enough
     known = bool(campaign.experiments) and held.memory is not None and not knows_nothing(campaign)
     result = _result(campaign, held) if known else None
-    text = _sentences(store, facts) + ("" if result is None else f"\n{render(result)}")
+    text = _sentences(store, facts)
+    if result is not None:
+        # Looking took no time that anyone asks for.
+        shown = {**result, "run_info": {**result["run_info"], "seconds": None}}
+        text += f"\n{render(shown, _learnt(campaign, held))}"
     _print({"store": facts, "result": result}, text, as_json)
 
 
@@ -93,6 +97,14 @@ def _result(campaign: Campaign, held: Kept) -> dict[str, Any]:
     running = isinstance(last, Iteration) and last.generations < held.setup["options"]["model_generations"]
     result["interrupted"] = running or len(last.tests) < len(campaign.experiments)
     return result
+
+
+def _learnt(campaign: Campaign, held: Kept) -> str | None:
+    """How far learning is, where a person flies or not every flight is learnt; None: as the result says it."""
+    learnt, told = len(campaign.history[-1].tests), len(campaign.experiments)
+    if learnt < told:
+        return f"learnt from {learnt} of"
+    return "learnt from" if held.experiments is None else None
 
 
 def _campaigns(store: str) -> list[dict[str, Any]]:
@@ -134,6 +146,7 @@ def _facts(held: Kept, campaign: Campaign) -> dict[str, object]:
         "experiments": held.experiments,
         "waiting": [test.number for test in campaign.waiting],
         "failed": [failure.test.number for failure in campaign.failures],
+        "abandoned": [test.number for test in campaign.tests if campaign.status(test) == "abandoned"],
         "sessions": list(held.sessions),
     }
 
@@ -143,12 +156,12 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
     lines = [
         f"{store}: campaign {facts['name']!r}, begun {facts['created']}.",
         f"Preset {facts['preset']}, seed {facts['seed']}.",
-        f"{facts['told']}{of} experiments told, {facts['tests']} tests made.",
+        f"Experiments told: {facts['told']}{of}. Tests made: {facts['tests']}.",
     ]
-    for key, words in (("waiting", "waiting to be flown"), ("failed", "failed")):
+    for key, words in (("waiting", "waiting to be flown"), ("failed", "failed"), ("abandoned", "abandoned")):
         if facts[key]:
             numbers = ", ".join(str(number) for number in facts[key])
-            lines.append(f"Tests {words}: {numbers}.")
+            lines.append(f"Test{'s' if len(facts[key]) > 1 else ''} {words}: {numbers}.")
     return "\n".join(lines) + "\n"
 
 

@@ -41,18 +41,19 @@ def cell(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def render(result: Mapping[str, Any]) -> str:
+def render(result: Mapping[str, Any], state: str | None = None) -> str:
     """The result of a campaign, for a person.
 
     Args:
         result: a `twinloop.faces.result.summary`.
+        state: words before the number of its experiments; None: that it was interrupted, or has finished.
 
     Returns:
         Text.
     """
     if "advice" in result:
         parts = [
-            _title(result),
+            _title(result, state),
             verdict(result),
             _twin(result),
             _states(result),
@@ -64,7 +65,7 @@ def render(result: Mapping[str, Any]) -> str:
         ]
     else:
         parts = [
-            _title(result),
+            _title(result, state),
             verdict(result),
             _twin(result),
             _errors(result),
@@ -74,13 +75,12 @@ def render(result: Mapping[str, Any]) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _title(result: Mapping[str, Any]) -> str:
+def _title(result: Mapping[str, Any], state: str | None) -> str:
     runs = len(result["experiments"])
-    state = "interrupted, best so far" if result["interrupted"] else "finished"
+    if state is None:
+        state = "interrupted, best so far after" if result["interrupted"] else "finished after"
     flown = f"{runs} experiment{'s' if runs != 1 else ''}"
-    return (
-        f"{result['system']['name']}, preset {result['preset']}, seed {result['seed']}: {state} after {flown}"
-    )
+    return f"{result['system']['name']}, preset {result['preset']}, seed {result['seed']}: {state} {flown}"
 
 
 def verdict(result: Mapping[str, Any]) -> str:

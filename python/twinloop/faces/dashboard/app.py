@@ -206,7 +206,9 @@ class Pages:
         campaign = self.desk.look(name)
         test = _of(campaign.tests, number)
         predicted = campaign.twin.simulate(test) if campaign.experiments else None
-        return sheet(Path(self.desk.store).name, test, predicted, f"test-{number}.csv")
+        return sheet(
+            Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup.quality
+        )
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
