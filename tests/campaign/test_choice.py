@@ -1,0 +1,163 @@
+"""Which controller to fly: the gate of confidence, doubt about qualities, envelopes, and starts by LQR."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from conftest import pendulum_step
+from lives import CONTROLLER, SIGNALS, SMALL
+from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed
+from twinloop.controllers import StateFeedback, lqr_gains
+from twinloop.planning.judging import Committee, Judged
+from twinloop.planning.planner import Planner
+
+FAMILY = CONTROLLER.bind(SIGNALS)
+FLOWN = tl.Test(FAMILY, np.array([2.0, 2.0, 0.3]), np.zeros(2), np.array([1.0, 0.0]), 20, number=0)
+TUNED = np.array([4.0, 1.0, 0.5])
+
+
+def experiment(predicted=None, quality=1.0, spread=0.01):
+    test = SimpleNamespace(predicted=predicted, spread=spread, initial_state=np.zeros(2))
+    trajectory = SimpleNamespace(states=np.zeros((21, 2)))
+    return SimpleNamespace(test=test, quality=quality, trajectory=trajectory)
+
+
+def chosen(
+    new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
+    experiments=(), unfit=(), best=FLOWN,
+):  # fmt: skip
+    """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
+    new = np.broadcast_to(np.asarray(new, dtype=float), 4)
+
+    def judge(members, genes, sds, draws, excitation=None, ends=None, measured=False, off=None):
+        if ends is not None:
+            return Judged(np.full((1, 4, 1), again), np.zeros((1, 4, 1)))
+        values = np.full((1, 4, len(genes)), old)
+        values[0, :, 0] = new if recorded is None or not measured else recorded
+        usages = np.full((1, 4, len(genes)), 0.5)
+        usages[0, 0, 0] = usage
+        return Judged(values, usages)
+
+    runs = [experiment(), *experiments]
+    book = SimpleNamespace(
+        experiments=runs, tests=[FLOWN], setup=SimpleNamespace(signals=SIGNALS), finishes=lambda test: True,
+        flies=lambda test: flies, unfit=lambda: list(unfit), on_task=lambda test: True,
+        measured=lambda test: measured if test == 0 else None,
+        of_task=lambda genes, number: tl.Test(FAMILY, genes, np.zeros(2), np.array([1.0, 0.0]), 20, number=number),
+    )  # fmt: skip
+    planner = SimpleNamespace(family=FAMILY, judge=judge, lasting=lambda members, genes: members)
+    choice = Choice(planner, Committee([None], np.zeros(2), trusted), book, 4, confidence)
+    found = choice.between(TUNED, best)
+    return ("tuned" if (found.genes == TUNED).all() else "flown"), found.reason
+
+
+@pytest.mark.parametrize(
+    ("new", "confidence", "answer"),
+    [
+        ([0.9, 0.9, 0.9, 1.1], 0.75, "tuned"),
+        ([0.9, 0.9, 0.9, 1.1], 0.76, "flown"),
+        ([0.9, 0.9, 0.9, 0.9], 1.0, "tuned"),
+        ([1.0, 1.0, 1.0, 1.0], 0.01, "flown"),
+        ([1.1, 1.1, 1.1, 1.1], 0.0, "tuned"),
+    ],
+)
+def test_gains_are_preferred_where_so_large_a_share_of_the_predictions_prefers_them(new, confidence, answer):
+    assert chosen(new, confidence=confidence)[0] == answer
+
+
+def test_a_twin_that_expects_worse_of_its_own_gains_and_of_those_measured_is_not_believed():
+    assert chosen(0.9, recorded=1.1, again=1.2)[0] == "flown"
+    assert "is not believed here" in chosen(0.9, recorded=1.1, again=1.2)[1]
+    # It sees the flight that was measured as it was, or expects no worse of its own.
+    assert chosen(0.9, recorded=1.1, again=1.0)[0] == "tuned"
+    assert chosen(0.9, recorded=0.9, again=1.2)[0] == "tuned"
+
+
+def test_where_the_last_flight_was_not_as_predicted_others_must_be_better_by_two_spreads():
+    missed = [experiment(predicted=0.8, quality=1.0, spread=0.01)]
+    # What was missed last widens the spread: 2 · √(0.02 · 0.2) of the prediction.
+    widened = 2.0 * np.sqrt(0.02 * 0.2)
+    enough = 1.0 / (1.0 + SURE * widened)
+    assert chosen(0.99 * enough, experiments=missed)[0] == "tuned"
+    assert chosen(1.01 * enough, experiments=missed)[0] == "flown"
+    assert "not what had been predicted" in chosen(1.01 * enough, experiments=missed)[1]
+    assert chosen(1.01 * enough)[0] == "tuned"
+
+
+@pytest.mark.parametrize(
+    ("runs", "answer"),
+    [
+        ([], True),
+        ([experiment(None)], True),
+        ([experiment(np.nan)], True),
+        ([experiment(0.981, 1.0, 0.01)], True),
+        ([experiment(0.979, 1.0, 0.01)], False),
+        ([experiment(0.98, None, 0.01)], False),
+        ([experiment(0.98, 1.0, None)], False),
+        ([experiment(0.5), experiment(1.0)], True),
+        ([experiment(1.0), experiment(0.5), experiment(None)], False),
+    ],
+)
+def test_the_last_flight_that_was_predicted_confirms_within_two_spreads(runs, answer):
+    assert confirmed(runs) is answer
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"usage": 1.01}, "leave the envelope"),
+        ({"trusted": False}, "does not follow"),
+        ({"unfit": [TUNED]}, "failed or was cut"),
+    ],
+)
+def test_gains_that_cannot_be_answered_for_are_not_flown(changes, words):
+    answer, reason = chosen(0.5, **changes)
+    assert answer == "flown" and words in reason
+    with pytest.raises(tl.NotAvailable, match=words):
+        chosen(0.5, best=None, **changes)
+    assert chosen(0.5, usage=1.0)[0] == "tuned"
+
+
+def test_gains_that_left_the_envelope_give_way_to_any_that_keep_it():
+    answer, reason = chosen(1.5, flies=False)
+    assert answer == "tuned" and "as the best gains flown did" in reason
+
+
+# Starts of the tuning
+
+
+@pytest.mark.parametrize("trusted", [True, False])
+def test_a_full_state_feedback_is_tuned_from_the_gains_of_lqr_on_the_twin_too(monkeypatch, trusted):
+    seen, tune = [], Planner.tune
+
+    def spy(self, committee, starts, number):
+        seen.append((committee, list(starts)))
+        return tune(self, committee, starts, number)
+
+    monkeypatch.setattr(Planner, "tune", spy)
+    controller = StateFeedback(None, (-6.0, 6.0))
+    campaign = tl.Campaign(
+        SIGNALS, controller=controller, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
+        options=SMALL,
+    )  # fmt: skip
+    plant = tl.systems.Simulated(SIGNALS, pendulum_step)
+    first = campaign.test(dict.fromkeys((gain.name for gain in campaign.family.gains), 0.5))
+    campaign.tell(first, plant.run(first))
+    method = campaign._method
+    _ = campaign.best_test
+    committee, starts = seen[-1]
+    assert committee.trusted
+    gains = campaign.family.genes(lqr_gains(committee.members[0], campaign.family, [1.0, 0.0]))
+    assert any(start.tobytes() == gains.tobytes() for start in starts)
+    doubted = Committee(committee.members, committee.sds, trusted)
+    assert len(method._linear_gains(doubted)) == trusted
+
+
+def test_no_other_family_has_starts_by_lqr():
+    campaign = tl.Campaign(
+        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
+        options=SMALL,
+    )  # fmt: skip
+    assert campaign._method._linear_gains(Committee([None], np.zeros(2), True)) == []
