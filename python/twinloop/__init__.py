@@ -16,6 +16,7 @@ from twinloop.errors import (
 from twinloop.law.twin import Twin, load_twin
 from twinloop.logs import load
 from twinloop.remarks import Remark
+from twinloop.replay import Replay
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems import System
 from twinloop.test import Test
@@ -29,6 +30,7 @@ __all__ = [
     "NotAvailable",
     "Remark",
     "RemarkWarning",
+    "Replay",
     "RigidBody",
     "Signals",
     "State",

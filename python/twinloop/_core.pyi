@@ -432,8 +432,15 @@ def replay(
     limits: Limits,
     initial: ArrayLike,
     commands: ArrayLike,
+    *,
+    noise: ArrayLike | None = None,
+    disturbance: ArrayLike | None = None,
+    workers: Workers | None = None,
 ) -> Runs:
-    """A free run from a state (n_x,) under commands (n, n_u), without a controller."""
+    """Free runs from a state (n_x,) under commands (n, n_u), without a controller: m of them.
+
+    noise (m, n + 1, n_x) is added to what is read, disturbance (m, n, n_x) to the true state after each step.
+    """
 
 def rollout(
     dynamics: Model | Quadrotor | Callable[[_Floats, _Floats], ArrayLike],
@@ -479,6 +486,8 @@ class SelectedTests:
         excitation: ArrayLike | None = None,
     ) -> SelectedTests:
         """These and one more: states (n + 1, n_x) as measured, commands (n, n_u), excitation (≥ n, n_u)."""
+    def with_record(self, states: ArrayLike, commands: ArrayLike) -> SelectedTests:
+        """These and a run that nobody asked for, judged under its commands: states (n + 1, n_x), commands (n, n_u)."""
     def __len__(self) -> int: ...
 
 def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:

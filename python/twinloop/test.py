@@ -14,6 +14,7 @@ from twinloop.arrays import Floats, floats, whole
 from twinloop.controllers.family import Controller, Family
 from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
+from twinloop.replay import Replay
 from twinloop.showing import Shown
 from twinloop.signals import Signals
 
@@ -70,6 +71,11 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
         if self.excitation is not None:
             shape = (self.steps, self.family.signals.n_u)
             object.__setattr__(self, "excitation", floats("Test.excitation", self.excitation, shape))
+
+    @property
+    def signals(self) -> Signals:
+        """Of the system that it is for."""
+        return self.family.signals
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -177,20 +183,20 @@ def _bits(values: Floats | None) -> bytes | None:
 
 
 def check_signals(test: object, signals: Signals) -> None:
-    """Refuses a test that was made for other signals.
+    """Refuses a test, or a replay, that was made for other signals.
 
     Args:
-        test: the test.
+        test: the one.
         signals: those of the system or twin that is to run it.
 
     Raises:
         InvalidInput: not a test, or other states, commands or period.
     """
-    if not isinstance(test, Test):
+    if not isinstance(test, (Test, Replay)):
         raise InvalidInput(
             f"Expected a twinloop.Test, found {type(test).__name__}; get one from campaign.ask()."
         )
-    found = test.family.signals
+    found = test.signals
     for what, expected, other in (
         ("states", signals.state_names, found.state_names),
         ("commands", signals.command_names, found.command_names),

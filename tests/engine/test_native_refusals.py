@@ -231,6 +231,10 @@ def calls(world):
         "Limits": (_core.Limits, {"signals": w.signals, "divergence_factor": 10.0}),
         "Setting": (_core.Setting, {"limits": w.limits, "family": w.family}),
         "SelectedTests": (_core.SelectedTests, {"setting": w.setting}),
+        "SelectedTests.with_record": (
+            w.selected.with_record,
+            {"states": w.states, "commands": w.commands},
+        ),
         "SelectedTests.with_test": (
             w.selected.with_test,
             {
@@ -428,7 +432,15 @@ def restored(world):
         **drawn(w),
         "replay": (
             _core.replay,
-            {"dynamics": w.model, "limits": w.limits, "initial": w.start, "commands": w.commands},
+            {
+                "dynamics": w.model,
+                "limits": w.limits,
+                "initial": w.start,
+                "commands": w.commands,
+                "noise": w.noise,
+                "disturbance": w.disturbance,
+                "workers": w.workers,
+            },
         ),
         "Quality.recorded": (
             w.quality.recorded,

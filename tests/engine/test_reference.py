@@ -11,7 +11,7 @@ from oracles import same_bits
 from twinloop import _core, flights
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
-from twinloop.law.flight import fly, fly_commands
+from twinloop.law.flight import fly
 from twinloop.limits import Limits
 from twinloop.objectives import closed_loop, selected_tests
 from twinloop.planning.quality import quality_of
@@ -170,7 +170,7 @@ def test_a_run_under_recorded_commands_is_that_of_the_controller_that_gave_them(
     family, model, pendulum_signals
 ):
     run = fly(model, led(family, ROWS))
-    again = fly_commands(model, run.states[0], run.commands, Limits(pendulum_signals))
+    again = fly(model, tl.Replay(pendulum_signals, run.states[0], run.commands))
     assert same_bits(again.states, run.states) and same_bits(again.commands, run.commands)
 
 
@@ -199,5 +199,5 @@ def test_commands_of_another_shape_are_refused(model, pendulum_signals):
     for state, commands in (([0.1], [[0.0]]), ([0.1, 0.2], [[0.0, 1.0]])):
         with pytest.raises(tl.InvalidInput):
             twin.simulate_commands(state, commands)
-    with pytest.raises(tl.InvalidInput, match="at least one row of commands"):
-        fly_commands(model, np.zeros(2), np.empty((0, 1)), Limits(pendulum_signals))
+    with pytest.raises(tl.InvalidInput, match="at least one row"):
+        tl.Replay(pendulum_signals, np.zeros(2), np.empty((0, 1)))

@@ -13,7 +13,8 @@ use crate::signals::Signals;
 pub struct Experiment {
     /// Parameters of the controller (size).
     pub parameters: Vec<f64>,
-    /// Target state η_d: constant (n_x), or a row for each state of the test, as many as were recorded or more.
+    /// Target state η_d: constant (n_x), or a row for each state of the test, as many as were recorded or more. Empty for a
+    /// run that no test asked for: its commands are those of the record, and it has no parameters and no excitation.
     pub target: Vec<f64>,
     /// Measured states, (n + 1) × n_x.
     pub states: Vec<f64>,
@@ -22,6 +23,13 @@ pub struct Experiment {
     /// What the test added to its controller's commands, a row of n_u for each step, as many as were recorded or
     /// more; empty for nothing.
     pub excitation: Vec<f64>,
+}
+
+impl Experiment {
+    /// Whether its commands are those of the record, and not of a controller.
+    pub fn is_recorded(&self) -> bool {
+        self.target.is_empty()
+    }
 }
 
 /// Transitions (η_t, ω_t, η_{t+1}) of neighbouring rows, one a lane.
@@ -50,6 +58,8 @@ pub(crate) struct Loops {
     pub target: Vec<f64>,
     /// n × n_u × lanes, n that of the longest; empty if no test of the group has any.
     pub excitation: Vec<f64>,
+    /// Commands to send, n × n_u × lanes, n that of the longest; empty where controllers give them.
+    pub commands: Vec<f64>,
     /// Recorded states, (n + 1) × n_x × lanes, n that of the longest.
     pub recorded: Vec<f64>,
     /// Steps that were recorded of each test.
@@ -83,8 +93,14 @@ impl SelectedTests {
         let mut experiments = self.experiments.clone();
         experiments.push(Arc::new(Experiment { states, ..experiment }));
         let (blocks, rows) = transitions(&experiments, signals.states(), signals.commands());
-        let of_group = |group: Range<usize>| loops(&experiments[group], signals.states(), signals.commands());
-        let loops = groups(experiments.len()).into_iter().map(of_group).collect();
+        let (n_x, n_u) = (signals.states(), signals.commands());
+        // Neighbours whose commands come from the same source fly side by side.
+        let alike = experiments.chunk_by(|a, b| a.is_recorded() == b.is_recorded());
+        let of_alike = |alike: &[Arc<Experiment>]| {
+            let of_group = |group: Range<usize>| loops(&alike[group], n_x, n_u);
+            groups(alike.len()).into_iter().map(of_group).collect::<Vec<_>>()
+        };
+        let loops = alike.flat_map(of_alike).collect();
         Ok(Self { setting: self.setting.clone(), experiments, blocks, rows, loops })
     }
 
@@ -144,7 +160,10 @@ impl SelectedTests {
         }
         let rows = target.len() / n_x;
         let follows = rows == 1 || rows > steps;
-        if parameters.len() != parameters_of_family || !target.len().is_multiple_of(n_x) || !follows {
+        let alone = experiment.is_recorded() && parameters.is_empty() && excitation.is_empty();
+        if alone {
+            // A record speaks for itself.
+        } else if parameters.len() != parameters_of_family || !target.len().is_multiple_of(n_x) || !follows {
             return invalid(format!(
                 "test: expected {} parameters and a target of {n_x} states, or a row of it for each recorded state, \
                  found {} and {}",
@@ -203,7 +222,9 @@ fn loops(group: &[Arc<Experiment>], n_x: usize, n_u: usize) -> Loops {
     let recorded = group.iter().map(|experiment| resized(&experiment.states, (longest + 1) * n_x, 0.0));
     // Minus zero is the one number that leaves every command as it is to the bit, a zero of either sign too.
     let excitation = group.iter().map(|experiment| resized(&experiment.excitation, longest * n_u, -0.0));
-    let target = targets(group, n_x, longest);
+    let sent = group.iter().filter(|experiment| experiment.is_recorded());
+    let sent: Vec<_> = sent.map(|experiment| resized(&experiment.commands, longest * n_u, 0.0)).collect();
+    let target = if sent.is_empty() { targets(group, n_x, longest) } else { vec![vec![]; group.len()] };
     let excited = group.iter().any(|experiment| !experiment.excitation.is_empty());
     let initial: Vec<&[f64]> = group.iter().map(|experiment| &experiment.states[..n_x]).collect();
     Loops {
@@ -212,6 +233,7 @@ fn loops(group: &[Arc<Experiment>], n_x: usize, n_u: usize) -> Loops {
         initial: interleave(&initial, lanes),
         target: interleave(&target, lanes),
         excitation: if excited { interleave(&excitation.collect::<Vec<_>>(), lanes) } else { vec![] },
+        commands: if sent.is_empty() { vec![] } else { interleave(&sent, lanes) },
         recorded: interleave(&recorded.collect::<Vec<_>>(), lanes),
         steps,
     }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::any_dynamics::AnyDynamics;
+use crate::controller::Family;
 use crate::dynamics::Dynamics;
 use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, scalars, with_test_lanes};
 use crate::rollout::{Commands, Seen, Start, Watch, closed, rollout};
@@ -59,7 +60,7 @@ pub fn record(
     let runs = groups(parameters.len()).into_iter().flat_map(|group| {
         let influences = influences.of(&group);
         let parameters = &parameters[group];
-        dispatch(width, OfGroup { dynamics, runs: Runs { setting, parameters, task, influences } })
+        dispatch(width, OfGroup { dynamics, runs: Runs::of(setting, parameters, task, influences) })
     });
     runs.collect()
 }
@@ -73,41 +74,50 @@ pub fn record_one<D: Dynamics>(
     influences: Influences<'_>,
 ) -> Option<Trajectory> {
     let parameters = &[parameters];
-    let runs = Runs { setting, parameters, task, influences };
+    let runs = Runs::of(setting, parameters, task, influences);
     runs.recorded::<Scalar>(first_read(dynamics, &task.initial), |start, recorder| {
         closed(dynamics, start, recorder)
     })
     .pop()
 }
 
-/// A free run from a state (n_x) under recorded commands (n × n_u, n at least 1), without a controller.
+/// Free runs from a state (n_x) under recorded commands (n × n_u, n at least 1), without a controller: as many as there
+/// are rows of noise or of disturbance, or one.
 pub fn replay(
     dynamics: AnyDynamics<'_>,
     limits: &Limits,
     initial: &[f64],
     commands: &[f64],
-    steps: usize,
-) -> Trajectory {
-    let rows: Vec<Scalar> = pack(&[commands]);
-    let start = Start {
-        commands: Commands::Record(&rows),
-        initial: &pack::<Scalar, _>(&[initial]),
-        steps,
-        limits: limits.magnitudes(),
-        noise: &[],
-        disturbance: &[],
-    };
-    recorded(&start, initial, first_read(&dynamics, initial), 1, |start, recorder| {
-        rollout(dynamics, start, recorder)
-    })
-    .remove(0)
+    influences: Influences<'_>,
+    width: Width,
+) -> Vec<Trajectory> {
+    let count = influences.noise.len().max(influences.disturbance.len()).max(1);
+    let steps = commands.len() / limits.signals().commands();
+    let (source, limits) = (Source::Record(commands), limits.magnitudes());
+    let runs = groups(count).into_iter().flat_map(|group| {
+        let (count, influences) = (group.len(), influences.of(&group));
+        let runs = Runs { source, initial, steps, limits, count, influences };
+        dispatch(width, OfGroup { dynamics, runs })
+    });
+    runs.collect()
+}
+
+/// Where the commands of runs that are recorded come from.
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    /// Controllers of a family, one a run, and the target that they lead to.
+    Law { family: &'a Family, parameters: &'a [&'a [f64]], target: &'a [f64] },
+    /// The same commands for all (n × n_u).
+    Record(&'a [f64]),
 }
 
 /// Runs side by side, as many as lanes.
 struct Runs<'a> {
-    setting: &'a Setting,
-    parameters: &'a [&'a [f64]],
-    task: &'a Task,
+    source: Source<'a>,
+    initial: &'a [f64],
+    steps: usize,
+    limits: &'a [f64],
+    count: usize,
     influences: Influences<'a>,
 }
 
@@ -121,19 +131,31 @@ impl Kernel for OfGroup<'_> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Trajectory> {
-        with_test_lanes!(W, self.runs.parameters.len(), self.lanes())
+        with_test_lanes!(W, self.runs.count, self.lanes())
     }
 }
 
 impl OfGroup<'_> {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> Vec<Trajectory> {
-        let read = first_read(&self.dynamics, &self.runs.task.initial);
+        let read = first_read(&self.dynamics, self.runs.initial);
         self.runs.recorded::<V>(read, |start, recorder| rollout(self.dynamics, start, recorder))
     }
 }
 
-impl Runs<'_> {
+impl<'a> Runs<'a> {
+    fn of(
+        setting: &'a Setting,
+        parameters: &'a [&'a [f64]],
+        task: &'a Task,
+        influences: Influences<'a>,
+    ) -> Self {
+        let Task { initial, target, steps } = task;
+        let source = Source::Law { family: setting.family(), parameters, target };
+        let (limits, count) = (setting.limits(), parameters.len());
+        Self { source, initial, steps: *steps, limits, count, influences }
+    }
+
     /// Every step of the runs, which `fly` flies; `read` of the first state.
     #[inline(always)]
     fn recorded<V: Vector>(
@@ -141,21 +163,27 @@ impl Runs<'_> {
         read: Vec<f64>,
         fly: impl FnOnce(&Start<'_, V>, &mut Recorder<'_>) -> Vec<usize>,
     ) -> Vec<Trajectory> {
-        let Task { initial, target, steps } = self.task;
+        let (parameters, shared): (&[&[f64]], _) = match self.source {
+            Source::Law { parameters, target, .. } => (parameters, target),
+            Source::Record(commands) => (&[], commands),
+        };
+        let (parameters, shared) = (pack::<V, _>(parameters), pack::<V, _>(&[shared]));
+        let excitation = pack::<V, _>(self.influences.excitation);
+        let commands = match self.source {
+            Source::Law { family, .. } => {
+                Commands::Law { family, parameters: &parameters, target: &shared, excitation: &excitation }
+            }
+            Source::Record(_) => Commands::Record(&shared),
+        };
         let start = Start {
-            commands: Commands::Law {
-                family: self.setting.family(),
-                parameters: &pack::<V, _>(self.parameters),
-                target: &pack::<V, _>(&[target]),
-                excitation: &pack::<V, _>(self.influences.excitation),
-            },
-            initial: &pack::<V, _>(&[initial]),
-            steps: *steps,
-            limits: self.setting.limits(),
+            commands,
+            initial: &pack::<V, _>(&[self.initial]),
+            steps: self.steps,
+            limits: self.limits,
             noise: &pack::<V, _>(self.influences.noise),
             disturbance: &pack::<V, _>(self.influences.disturbance),
         };
-        recorded(&start, initial, read, self.parameters.len(), fly)
+        recorded(&start, self.initial, read, self.count, fly)
     }
 }
 

@@ -139,21 +139,31 @@ pub fn rollout(
     Ok(PyRuns { runs, steps, states, commands })
 }
 
-/// A free run from a state under commands, each held for one period, without a controller.
+/// Free runs from a state under commands, each held for one period, without a controller.
 #[pyfunction]
+#[pyo3(signature = (dynamics, limits, initial, commands, *, noise = None, disturbance = None, workers = None))]
 pub fn replay(
     py: Python<'_>,
     dynamics: &Bound<'_, PyAny>,
     limits: &PyLimits,
     initial: Vector<'_>,
     commands: Matrix<'_>,
+    noise: Option<Cube<'_>>,
+    disturbance: Option<Cube<'_>>,
+    workers: Option<&PyWorkers>,
 ) -> Result<PyRuns> {
+    let width_of_lanes = or_default(workers)?.width();
     let (limits, signals) = (&limits.0, limits.0.signals());
     let (states, width) = (signals.states(), signals.commands());
     let (initial, commands) = (vector(&initial), rows("commands", &commands, width)?);
     let steps = commands.len();
     let known = known(dynamics, signals)?;
-    let numbers = initial.iter().chain(commands.iter().flatten());
+    let runs = [&noise, &disturbance].into_iter().flatten().map(|draws| draws.as_array().shape()[0]).max();
+    let count = runs.unwrap_or(1);
+    let noise = optional_blocks("noise", noise, [count, steps + 1, states])?;
+    let disturbance = optional_blocks("disturbance", disturbance, [count, steps, states])?;
+    let drawn = noise.iter().chain(&disturbance).flatten();
+    let numbers = initial.iter().chain(commands.iter().flatten()).chain(drawn);
     let fits = initial.len() == states && steps > 0 && numbers.copied().all(f64::is_finite);
     let Some(dynamics) = known.filter(|_| fits) else {
         return Err(misuse(format!(
@@ -163,8 +173,10 @@ pub fn replay(
         )));
     };
     let commands = commands.concat();
-    let run = py.detach(|| twinloop_core::replay(dynamics, limits, &initial, &commands, steps));
-    Ok(PyRuns { runs: vec![run], steps, states, commands: width })
+    let (noise, disturbance) = (views(&noise), views(&disturbance));
+    let influences = Influences { noise: &noise, excitation: &[], disturbance: &disturbance };
+    let fly = || twinloop_core::replay(dynamics, limits, &initial, &commands, influences, width_of_lanes);
+    Ok(PyRuns { runs: py.detach(fly), steps, states, commands: width })
 }
 
 /// Dynamics that the engine has, for these signals; none for a function.

@@ -40,6 +40,20 @@ impl PySelectedTests {
         Ok(Self(Arc::new(self.0.with_test(experiment)?)))
     }
 
+    /// These and a run that no test asked for.
+    fn with_record(&self, states: Matrix<'_>, commands: Matrix<'_>) -> Result<Self> {
+        let signals = self.0.signals();
+        let (parameters, target, excitation) = Default::default();
+        let experiment = Experiment {
+            parameters,
+            target,
+            states: rows("states", &states, signals.states())?.concat(),
+            commands: rows("commands", &commands, signals.commands())?.concat(),
+            excitation,
+        };
+        Ok(Self(Arc::new(self.0.with_test(experiment)?)))
+    }
+
     fn __len__(&self) -> usize {
         self.0.len()
     }

@@ -108,7 +108,7 @@ def certificate(campaign: Campaign) -> Certificate:
 
 
 def _uses(experiments: tuple[Experiment, ...], step: Trajectory) -> tuple[Use, ...]:
-    signals = experiments[0].replayed.family.signals
+    signals = experiments[0].replayed.signals
     low, high = (step.states, step.states) if step.band is None else step.band
     uses = []
     for i, state in enumerate(signals.states):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.logbook import Logbook
@@ -50,10 +48,4 @@ def free_runs(models: Sequence[_core.Model], book: Logbook, workers: _core.Worke
 def _of_all(
     objective: Objective, models: Sequence[_core.Model], book: Logbook, workers: _core.Workers
 ) -> Floats:
-    asked = np.array([run.test is not None for run in book.experiments])
-    found = np.empty((len(models), len(asked)))
-    if asked.any():
-        found[:, asked] = objective(models, book.selected, workers)
-    if book.attached is not None:
-        found[:, ~asked] = objective(models, book.attached, workers)
-    return found
+    return objective(models, book.selected, workers)

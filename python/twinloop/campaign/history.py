@@ -10,6 +10,7 @@ from twinloop.envelope import readings_leave
 from twinloop.errors import engine_input
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
+from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -28,7 +29,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
         attached: whether nobody asked for it.
     """
 
-    replayed: Test
+    replayed: Test | Replay
     trajectory: Trajectory
     before: float | None
     frozen: float
@@ -39,7 +40,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     @property
     def test(self) -> Test | None:
         """What was asked for; None for a run that nobody asked for."""
-        return None if self.attached else self.replayed
+        return self.replayed if isinstance(self.replayed, Test) else None
 
     @property
     def number(self) -> int | None:
@@ -68,7 +69,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""
-        signals = self.replayed.family.signals
+        signals = self.replayed.signals
         with engine_input():
             return _core.usages(
                 signals.engine, [state.envelope for state in signals.states], self.trajectory.states

@@ -15,9 +15,9 @@ from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, TestLoop
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, engine_input
-from twinloop.law.flight import driven
 from twinloop.objectives import frozen_error
 from twinloop.records import Record, Recorded, checked_record, plain, read
+from twinloop.replay import Replay
 from twinloop.test import Test, check_signals, final_distance
 from twinloop.trajectory import Trajectory, check_recorded, continued
 
@@ -45,7 +45,6 @@ class Logbook(Recorded, kind="logbook"):
         self.failures: list[Failure] = []
         self.abandoned: list[int] = []
         self.selected = setup.none_selected()
-        self.attached: _core.SelectedTests | None = None
         self.identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
 
     @classmethod
@@ -120,7 +119,7 @@ class Logbook(Recorded, kind="logbook"):
                 " another campaign."
             )
         book = self.copied()
-        book.experiments, book.selected, book.attached = [], self.setup.none_selected(), None
+        book.experiments, book.selected = [], self.setup.none_selected()
         for run in self.experiments[:told]:
             book._enter(run)
         return book
@@ -130,7 +129,7 @@ class Logbook(Recorded, kind="logbook"):
         book = Logbook(self.setup)
         book.tests, book.experiments, book.asked = list(self.tests), list(self.experiments), list(self.asked)
         book.failures, book.abandoned = list(self.failures), list(self.abandoned)
-        book.selected, book.attached, book.identity = self.selected, self.attached, self.identity
+        book.selected, book.identity = self.selected, self.identity
         return book
 
     @property
@@ -239,7 +238,7 @@ class Logbook(Recorded, kind="logbook"):
         recorded = check_recorded(trajectory, self.setup.limits, known.steps, least)
         recorded = continued(recorded, signals, known.initial_state)
         _check_first_reading(recorded, known)
-        before = judge(_with_run(self._none(known), known, recorded))
+        before = judge(_with_run(self.setup.none_selected(), known, recorded))
         distance = quality = None
         if recorded.ended == "completed" and recorded.steps == known.steps:
             distance = quality = final_distance(recorded.states[-1], known.target(known.steps), signals)
@@ -260,8 +259,8 @@ class Logbook(Recorded, kind="logbook"):
         signals = self.setup.signals
         recorded = check_recorded(trajectory, self.setup.limits, None)
         recorded = continued(recorded, signals, recorded.states[0])
-        replayed = driven(signals, recorded.states[0], recorded.commands)
-        before = judge(_with_run(self._none(replayed), replayed, recorded))
+        replayed = Replay(signals, recorded.states[0], recorded.commands)
+        before = judge(_with_run(self.setup.none_selected(), replayed, recorded))
         self._enter(
             Experiment(replayed, recorded, before, frozen_error(recorded, signals), None, None, attached=True)
         )
@@ -456,21 +455,13 @@ class Logbook(Recorded, kind="logbook"):
 
     def _enter(self, run: Experiment) -> None:
         check_recorded(run.trajectory, self.setup.limits, run.replayed.steps, least=1)
-        if run.attached:
-            self.attached = _with_run(self.attached or self._none(run.replayed), run.replayed, run.trajectory)
-        else:
-            self.selected = _with_run(self.selected, run.replayed, run.trajectory)
+        self.selected = _with_run(self.selected, run.replayed, run.trajectory)
         self.experiments.append(run)
 
     def _numbered(self, number: int, where: str) -> Test:
         if not 0 <= number < len(self.tests):
             raise InvalidInput(f"Record {where}: expected the number of a test, found {number}.")
         return self.tests[number]
-
-    def _none(self, test: Test) -> _core.SelectedTests:
-        """No selected tests yet, of the family of a test."""
-        with engine_input():
-            return _core.SelectedTests(self.setup.limits.setting(test.family))
 
     def known(self, test: object) -> Test:
         """A test of this campaign.
@@ -492,15 +483,17 @@ class Logbook(Recorded, kind="logbook"):
         return self.tests[test.number]
 
 
-def _attached(record: object, setup: Setup) -> Test:
+def _attached(record: object, setup: Setup) -> Replay:
     """What a twin flies to be compared with a recorded run that nobody asked for."""
     found = record.get("trajectory") if isinstance(record, Mapping) else None
     trajectory = Trajectory.from_record(found)
-    return driven(setup.signals, trajectory.states[0], trajectory.commands)
+    return Replay(setup.signals, trajectory.states[0], trajectory.commands)
 
 
-def _with_run(selected: _core.SelectedTests, test: Test, run: Trajectory) -> _core.SelectedTests:
+def _with_run(selected: _core.SelectedTests, test: Test | Replay, run: Trajectory) -> _core.SelectedTests:
     with engine_input():
+        if isinstance(test, Replay):
+            return selected.with_record(run.states, run.commands)
         return selected.with_test(test.genes, test.target_state, run.states, run.commands, test.excitation)
 
 

@@ -8,10 +8,9 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.controllers import PID, Mixer
-from twinloop.errors import engine_input
+from twinloop.errors import InvalidInput, engine_input
 from twinloop.limits import Limits
-from twinloop.signals import Signals
+from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -20,18 +19,18 @@ Dynamics = _core.Model | _core.Quadrotor | Callable[[Floats, Floats], Floats]
 
 def fly(
     dynamics: Dynamics,
-    test: Test,
+    test: Test | Replay,
     *,
     noise: Floats | None = None,
     disturbance: Floats | None = None,
     limits: Limits | None = None,
 ) -> Trajectory:
-    """Closes the loop of the test's controller around dynamics, with the test's excitation.
+    """Flies a test: its controller closes the loop around dynamics, with its excitation; or recorded commands.
 
     Args:
-        dynamics: an engine's model or plant, or a function (state (n_x,), command (n_u,)) -> next state.
+        dynamics: an engine's model or plant, or, for a test, a function (state (n_x,), command (n_u,)) -> next state.
         test: what to fly.
-        noise: what the sensors add to each state (n + 1, n_x), in the units of the states; None: nothing.
+        noise: what the sensors add to each reading (n + 1, n_x), in the units of the states; None: nothing.
         disturbance: what is added to the true state after each step (n, n_x), such as process noise or gusts,
             in the units of the states; None: nothing.
         limits: where the run counts as diverged and is cut; None: at ten times a state's scale.
@@ -42,43 +41,52 @@ def fly(
     Raises:
         InvalidInput: the engine refused the arguments.
     """
-    within = limits or Limits(test.family.signals)
-    with engine_input():
-        runs = _core.rollout(
-            dynamics,
-            within.setting(test.family),
-            test.genes[np.newaxis],
-            test.task,
-            noise=_one(noise),
-            excitation=_one(test.excitation),
-            disturbance=_one(disturbance),
-        )
+    within = limits or Limits(test.signals)
+    runs = drawn_runs(dynamics, test, within, noise=_one(noise), disturbance=_one(disturbance))
     return _trajectory(runs, test.steps, within)
 
 
-def fly_commands(
-    dynamics: _core.Model | _core.Quadrotor,
-    initial_state: Floats,
-    commands: Floats,
+def drawn_runs(
+    dynamics: Dynamics,
+    test: Test | Replay,
     limits: Limits,
-) -> Trajectory:
-    """A free run under given commands, without a controller.
+    *,
+    noise: Floats | None = None,
+    disturbance: Floats | None = None,
+    workers: _core.Workers | None = None,
+) -> _core.Runs:
+    """The same test, flown once for each draw of noise and disturbance.
 
     Args:
-        dynamics: an engine's model or plant.
-        initial_state: where it starts (n_x,), in the units of the states.
-        commands: each held for a period (n, n_u), n at least 1, in their units, sent as they are.
-        limits: where the run counts as diverged and is cut, with the signals of the dynamics.
+        dynamics: as for `fly`.
+        test: what to fly.
+        limits: where a run counts as diverged and is cut.
+        noise: draws of what the sensors add (m, n + 1, n_x); None: nothing.
+        disturbance: draws of what is added to the true state after each step (m, n, n_x); None: nothing.
+        workers: how the work is carried out.
 
     Returns:
-        The run; cut before the step that diverged.
+        m runs; a single one without draws.
 
     Raises:
         InvalidInput: the engine refused the arguments.
     """
     with engine_input():
-        runs = _core.replay(dynamics, limits.engine, initial_state, commands)
-    return _trajectory(runs, len(commands), limits)
+        if isinstance(test, Replay):
+            if not isinstance(dynamics, (_core.Model, _core.Quadrotor)):
+                raise InvalidInput(
+                    "Replay: expected a model or plant of the engine, found a function; fly a test."
+                )
+            return _core.replay(
+                dynamics, limits.engine, test.initial_state, test.commands,
+                noise=noise, disturbance=disturbance, workers=workers,
+            )  # fmt: skip
+        count = next((len(draws) for draws in (noise, disturbance) if draws is not None), 1)
+        excitation = None if test.excitation is None else np.tile(test.excitation, (count, 1, 1))
+        return _core.rollout(
+            dynamics, limits.setting(test.family), np.tile(test.genes, (count, 1)), test.task,
+            noise=noise, excitation=excitation, disturbance=disturbance, workers=workers,
+        )  # fmt: skip
 
 
 def _trajectory(runs: _core.Runs, steps: int, limits: Limits) -> Trajectory:
@@ -93,28 +101,6 @@ def _trajectory(runs: _core.Runs, steps: int, limits: Limits) -> Trajectory:
         ended="completed" if completed else "diverged",
         reason=reason,
         true_states=runs.states[0, : lasted + 1],
-    )
-
-
-def driven(signals: Signals, initial_state: Floats, commands: Floats) -> Test:
-    """A test that sends given commands, whatever the states do.
-
-    Its controller asks for nothing, so that there is no second loop: the commands are its excitation.
-
-    Args:
-        signals: of the system.
-        initial_state: where it starts (n_x,), SI units, radians.
-        commands: at least one row (n, n_u), in their units; what lies beyond a bound is clipped.
-
-    Returns:
-        The test.
-    """
-    name = signals.state_names[0]
-    gains = {f"{name}.{term}": (0.0, 1.0) for term in ("kp", "ki", "kd")}
-    nothing = PID(axes=[(name, None)], gains=gains, output=Mixer(np.zeros((signals.n_u, 1))))
-    family = nothing.bind(signals)
-    return Test(
-        family, np.zeros(family.size), initial_state, initial_state, len(commands), excitation=commands
     )
 
 

@@ -19,7 +19,7 @@ from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
 from twinloop.law.equations import equations
 from twinloop.law.exports.environment import Reward, environment
 from twinloop.law.exports.export import Source, asked, delivered, exported
-from twinloop.law.flight import fly, fly_commands
+from twinloop.law.flight import drawn_runs, fly
 from twinloop.law.law import Law
 from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.linear.state_space import Linear
@@ -27,6 +27,7 @@ from twinloop.law.noise import Noise
 from twinloop.limits import Limits
 from twinloop.records import Recorded, checked_record, from_text, read, to_text
 from twinloop.remarks import Remark
+from twinloop.replay import Replay
 from twinloop.showing import Shown
 from twinloop.signals import Signals
 from twinloop.streams import Unit
@@ -217,7 +218,7 @@ class Twin(Shown, Recorded, kind="twin"):
         members = [Law.of(member, self.signals) for member in self.members]
         return equations(self.law, members, digits)
 
-    def simulate(self, test: Test, initial_state: ArrayLike | None = None) -> Trajectory:
+    def simulate(self, test: Test | Replay, initial_state: ArrayLike | None = None) -> Trajectory:
         """Flies a test on the twin instead of the system.
 
         Args:
@@ -243,18 +244,20 @@ class Twin(Shown, Recorded, kind="twin"):
         half = NINE_OF_TEN * np.sqrt(self.inflation * self.inflation * variance + self.noise.sensors**2)
         return dataclasses.replace(run, band=np.stack([mean - half, mean + half]))
 
-    def as_flown(self, test: Test, flown: Trajectory) -> Test:
+    def as_flown(self, test: Test | Replay, flown: Trajectory) -> Test | Replay:
         """A test from where its flight began, to be compared with the flight.
 
         Args:
-            test: that was flown.
+            test: that was flown, or the commands of a flight that nobody asked for.
             flown: the flight.
 
         Returns:
-            The test; states that were read further from where they were asked to begin than their sensors explain begin
+            The same; states that were read further from where they were asked to begin than their sensors explain begin
             as they were read.
         """
         begun = self._began(flown)
+        if isinstance(test, Replay):
+            return dataclasses.replace(test, initial_state=begun)
         explained = np.zeros_like(begun) if self.noise is None else STARTS * self.noise.sensors
         off = np.abs(self.signals.difference(begun, test.initial_state)) > explained
         return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
@@ -266,7 +269,7 @@ class Twin(Shown, Recorded, kind="twin"):
         began: Floats = states[0]
         return began
 
-    def spread(self, test: Test) -> tuple[Floats, Floats] | None:
+    def spread(self, test: Test | Replay) -> tuple[Floats, Floats] | None:
         """What members and disturbances, drawn together, make of a test.
 
         Args:
@@ -289,7 +292,7 @@ class Twin(Shown, Recorded, kind="twin"):
         variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
         return origin + middle, variance
 
-    def drawn(self, test: Test, draws: int) -> tuple[Floats, Floats] | None:
+    def drawn(self, test: Test | Replay, draws: int) -> tuple[Floats, Floats] | None:
         """Runs of a test by each member, under drawn disturbances and sensor noise.
 
         Args:
@@ -303,21 +306,9 @@ class Twin(Shown, Recorded, kind="twin"):
         if not self.members or self.noise is None:
             return None
         noise, moves = self.noise.drawn(draws, test.steps, Unit(self.seed).part(0).stream("band"))
-        excitation = None if test.excitation is None else np.tile(test.excitation, (draws, 1, 1))
-        setting = self.limits.setting(test.family)
-        runs = []
-        for member in self.members:
-            with engine_input():
-                drawn = _core.rollout(
-                    member,
-                    setting,
-                    np.tile(test.genes, (draws, 1)),
-                    test.task,
-                    noise=noise,
-                    disturbance=moves,
-                    excitation=excitation,
-                )
-            runs.append(drawn.read)
+        runs = [
+            drawn_runs(member, test, self.limits, noise=noise, disturbance=moves).read for member in self.members
+        ]
         return np.concatenate(runs), np.tile(noise, (len(runs), 1, 1))
 
     def predict(self, states: ArrayLike, commands: ArrayLike, past: ArrayLike | None = None) -> Floats:
@@ -424,7 +415,7 @@ class Twin(Shown, Recorded, kind="twin"):
         u = floats("Commands", commands, (None, self.signals.n_u))
         low, high = np.array([command.bounds for command in self.signals.commands]).T
         sent = np.clip(u if len(u) else [low], low, high)
-        run = fly_commands(self.model, state, sent, self.limits)
+        run = fly(self.model, Replay(self.signals, state, sent), limits=self.limits)
         return run if len(u) else Trajectory(np.zeros(1), run.states[:1], u, true_states=state[np.newaxis])
 
     def fit(self, trajectory: Trajectory) -> FitTable:

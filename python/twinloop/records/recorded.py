@@ -245,8 +245,9 @@ def _given(hint: Any, given: tuple[object, ...], where: str) -> object:
     for value in given:
         if isinstance(value, hint):
             return value
+    wanted = getattr(hint, "__name__", hint)
     raise InvalidInput(
-        f"Record {where}: expected a {hint.__name__} beside the record, found none; pass it to from_record."
+        f"Record {where}: expected a {wanted} beside the record, found none; pass it to from_record."
     )
 
 

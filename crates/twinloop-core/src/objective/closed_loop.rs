@@ -1,4 +1,5 @@
-//! Closed loop: the free-run simulation error with the controller in the loop (paper, section IV.B).
+//! Closed loop: the free-run simulation error with the controller in the loop (paper, section IV.B); of a run that no
+//! test asked for, under its recorded commands.
 
 use super::Outcome;
 use crate::difference::Periods;
@@ -31,13 +32,17 @@ impl ClosedLoop<'_> {
     #[inline(always)]
     fn of_group<V: Vector>(&self, loops: &Loops, outcomes: &mut Vec<Outcome>) {
         let states = self.selected.signals().states();
+        let [parameters, target, excitation, sent] =
+            [&loops.parameters, &loops.target, &loops.excitation, &loops.commands]
+                .map(|part| vectors::<V>(part));
+        let law = Commands::Law {
+            family: self.selected.setting().family(),
+            parameters: &parameters,
+            target: &target,
+            excitation: &excitation,
+        };
         let start = Start {
-            commands: Commands::Law {
-                family: self.selected.setting().family(),
-                parameters: &vectors::<V>(&loops.parameters),
-                target: &vectors::<V>(&loops.target),
-                excitation: &vectors::<V>(&loops.excitation),
-            },
+            commands: if sent.is_empty() { law } else { Commands::Record(&sent) },
             initial: &self.model.state_of(&vectors::<V>(&loops.initial)),
             steps: loops.steps.iter().copied().max().unwrap_or(0),
             limits: self.selected.setting().limits(),

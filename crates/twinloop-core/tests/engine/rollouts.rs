@@ -147,7 +147,8 @@ proptest! {
         let run = scene.record(&[gains], &[]).remove(0);
         let model = Model { code: &scene.code, frame: &scene.frame };
         let sent = run.commands.len() / 2;
-        let again = replay(model.into(), &scene.world.limits(10.0), &scene.task.initial, &run.commands, sent);
+        let (limits, quiet) = (scene.world.limits(10.0), Influences::default());
+        let again = replay(model.into(), &limits, &scene.task.initial, &run.commands, quiet, Width::default()).remove(0);
         prop_assert_eq!(again.lasted, run.lasted.min(sent));
         prop_assert!(all_same(&again.states, &run.states));
     }

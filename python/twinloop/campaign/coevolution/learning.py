@@ -38,7 +38,7 @@ class Learning:
     @property
     def tests(self) -> tuple[int, ...]:
         """Numbers of the tests that are learnt, or being learnt."""
-        return tuple(run.replayed.number for run in self.experiments)
+        return tuple(run.test.number for run in self.experiments if run.test is not None)
 
     def records(self, generations: int) -> tuple[Iteration, ...]:
         """One record for each iteration, the one that was interrupted too.

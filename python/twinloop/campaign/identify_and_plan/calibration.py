@@ -14,6 +14,7 @@ from twinloop.campaign.history import Experiment
 from twinloop.law.flight import fly
 from twinloop.law.twin import NINE_OF_TEN, Twin
 from twinloop.limits import Limits
+from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -30,7 +31,7 @@ OF_A_MISS = 2.0
 """Standard deviations to be told in units of such a miss: of normal misses 87 % are then within two of them."""
 
 
-def needed_factor(twin: Twin, test: Test, flown: Trajectory) -> float | None:
+def needed_factor(twin: Twin, test: Test | Replay, flown: Trajectory) -> float | None:
     """Factor on the members' spread with which nine of ten readings would have been inside the band.
 
     Args:
@@ -113,6 +114,6 @@ def left_of_flights(model: _core.Model, flights: Iterable[Experiment], limits: L
         test = dataclasses.replace(flight.replayed, initial_state=model.states_of(states[:1])[0])
         free = fly(model, test, limits=limits).states
         rows = min(len(states), len(free))
-        errors = test.family.signals.difference(states[:rows], free[:rows])
+        errors = test.signals.difference(states[:rows], free[:rows])
         left.append(np.quantile(np.abs(errors), 0.9, axis=0))
     return np.asarray(np.median(left, axis=0) / NINE_OF_TEN, dtype=np.float64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,9 +12,12 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.errors import engine_input
+from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
 from twinloop.limits import Limits
+from twinloop.replay import Replay
 from twinloop.streams import Unit
+from twinloop.test import Test
 
 DRAWS = 8
 """Of noise and disturbances, by which it is said how far these take a flight."""
@@ -67,21 +71,13 @@ def following(
     free, lasted = np.empty((2, len(models), len(flights)))
     frozen = np.empty(len(flights))
     for j, flight in enumerate(flights):
-        test, states, steps = flight.replayed, flight.trajectory.states, flight.trajectory.steps
-        signals, setting = limits.signals, limits.setting(test.family)
+        states, steps, signals = flight.trajectory.states, flight.trajectory.steps, limits.signals
         scales = np.array([state.scale for state in signals.states])
         frozen[j] = np.square(signals.difference(states[1:], states[0]) / scales).mean()
-        excitation = None if test.excitation is None else test.excitation[np.newaxis, :steps]
         for i, model in enumerate(models):
             with engine_input():
-                runs = _core.rollout(
-                    model,
-                    setting,
-                    test.genes[np.newaxis],
-                    _core.Task(model.states_of(states[:1])[0], test.target_state, steps),
-                    excitation=excitation,
-                    workers=workers,
-                )
+                start = model.states_of(states[:1])[0]
+            runs = drawn_runs(model, _cut(flight.replayed, start, steps), limits, workers=workers)
             lasted[i, j] = runs.lasted[0] / steps
             misses = np.square(signals.difference(runs.read[0, 1:], states[1:]) / scales)
             free[i, j] = misses.mean() if lasted[i, j] == 1.0 else np.inf
@@ -113,21 +109,18 @@ def foretold(
     scales = np.array([state.scale for state in limits.signals.states])
     found = np.empty(len(flights))
     for j, flight in enumerate(flights):
-        test, steps = flight.replayed, flight.trajectory.steps
+        steps = flight.trajectory.steps
         seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
-        excitation = None if test.excitation is None else np.tile(test.excitation[:steps], (DRAWS + 1, 1, 1))
-        start = model.states_of(flight.trajectory.states[:1])[0]
         with engine_input():
-            runs = _core.rollout(
-                model,
-                limits.setting(test.family),
-                np.tile(test.genes, (DRAWS + 1, 1)),
-                _core.Task(start, test.target_state, steps),
-                noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
-                disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
-                excitation=excitation,
-                workers=workers,
-            )
+            start = model.states_of(flight.trajectory.states[:1])[0]
+        runs = drawn_runs(
+            model,
+            _cut(flight.replayed, start, steps),
+            limits,
+            noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
+            disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
+            workers=workers,
+        )
         lasted = bool((runs.lasted == steps).all())
         with np.errstate(invalid="ignore"):
             off = np.square(limits.signals.difference(runs.measured[1:], runs.read[0]) / scales).mean()
@@ -149,3 +142,14 @@ def unexplained(free: Floats, frozen: Floats, expected: Floats) -> Floats:
     matters = (free > RELEVANT * RELEVANT * frozen) & (free > TIMES * TIMES * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(matters, np.sqrt(free / expected), 0.0)
+
+
+def _cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:
+    """What was flown, from a state and for so many steps."""
+    if isinstance(test, Replay):
+        return dataclasses.replace(test, initial_state=start, commands=test.commands[:steps])
+    target = test.target_state if test.target_state.ndim == 1 else test.target_state[: steps + 1]
+    excitation = None if test.excitation is None else test.excitation[:steps]
+    return dataclasses.replace(
+        test, initial_state=start, target_state=target, steps=steps, excitation=excitation
+    )

@@ -1,0 +1,40 @@
+"""Commands as they were recorded: what a twin flies to be compared with a run that nobody asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twinloop.arrays import Floats, floats
+from twinloop.errors import InvalidInput
+from twinloop.signals import Signals
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Commands that are sent whatever the states do, without a controller.
+
+    Args:
+        signals: of the system.
+        initial_state: where the run starts (n_x,), SI units, radians.
+        commands: at least one row (n, n_u), in their units, each held for a period and sent as it is.
+
+    Raises:
+        InvalidInput: shapes that do not fit the signals, or numbers that are not finite.
+    """
+
+    signals: Signals
+    initial_state: Floats
+    commands: Floats
+
+    def __post_init__(self) -> None:
+        state = floats("Replay.initial_state", self.initial_state, (self.signals.n_x,))
+        commands = floats("Replay.commands", self.commands, (None, self.signals.n_u))
+        if len(commands) == 0:
+            raise InvalidInput("Replay.commands: expected at least one row, found none; give one a period.")
+        object.__setattr__(self, "initial_state", state)
+        object.__setattr__(self, "commands", commands)
+
+    @property
+    def steps(self) -> int:
+        """Number of commands, n."""
+        return len(self.commands)
