@@ -142,6 +142,7 @@ pub fn rollout(
 /// Free runs from a state under commands, each held for one period, without a controller.
 #[pyfunction]
 #[pyo3(signature = (dynamics, limits, initial, commands, *, noise = None, disturbance = None, workers = None))]
+#[expect(clippy::too_many_arguments, reason = "what a run needs, named by keyword in Python")]
 pub fn replay(
     py: Python<'_>,
     dynamics: &Bound<'_, PyAny>,
