@@ -55,7 +55,7 @@ def data_quality(
         innovations: of it (n + 1, n_x), the first row aside; None where there are none.
         saturated: share of the periods with a command at a bound.
     """
-    flown, signals = run.trajectory, run.replayed.family.signals
+    flown, signals = run.trajectory, run.replayed.signals
     states = continued(flown, signals, flown.states[0]).states
     moved, least = None, ""
     if sensors is not None and (sensors > 0.0).any():
