@@ -37,6 +37,25 @@ def test_an_attached_flight_is_learnt_from_and_judged_under_its_recorded_command
     assert row.normalised < 0.05
 
 
+def test_commands_beyond_a_bound_are_flown_as_they_were_sent():
+    record = by_hand(55)
+    beyond = replace(record, commands=record.commands * np.where(np.abs(record.commands) > 1.0, 2.0, 1.0))
+    assert np.abs(beyond.commands).max() > 2.0
+    campaign = made()
+    campaign.attach(beyond)
+    (run,), twin = campaign.experiments, campaign.twin
+    assert same_bits(run.replayed.commands, beyond.commands)
+    free = twin.simulate(twin.as_flown(run.replayed, beyond))
+    assert same_bits(free.commands, beyond.commands)
+    (row,) = twin.errors
+    assert row.closed_loop == pytest.approx(np.mean((free.states[1:] - beyond.states[1:]) ** 2), rel=1e-9)
+    assert [state.rmse for state in twin.fit(beyond)] == pytest.approx(
+        np.sqrt(np.mean((free.states[1:] - beyond.states[1:]) ** 2, axis=0)), rel=1e-9
+    )
+    clipped = twin.simulate_commands(twin.as_flown(run.replayed, beyond).initial_state, beyond.commands)
+    assert not same_bits(clipped.states, free.states)
+
+
 def test_attached_flights_and_tests_are_learnt_together_in_the_order_they_came():
     campaign = begun()
     campaign.attach(by_hand(31))

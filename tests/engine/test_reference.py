@@ -11,7 +11,7 @@ from oracles import same_bits
 from twinloop import _core, flights
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
-from twinloop.law.flight import fly
+from twinloop.law.flight import drawn_runs, fly
 from twinloop.limits import Limits
 from twinloop.objectives import closed_loop, selected_tests
 from twinloop.planning.quality import quality_of
@@ -201,3 +201,55 @@ def test_commands_of_another_shape_are_refused(model, pendulum_signals):
             twin.simulate_commands(state, commands)
     with pytest.raises(tl.InvalidInput, match="at least one row"):
         tl.Replay(pendulum_signals, np.zeros(2), np.empty((0, 1)))
+
+
+# Records beside tests
+
+
+@given(
+    st.lists(st.tuples(st.booleans(), st.integers(1, 40)), min_size=1, max_size=20), st.integers(0, 2**32 - 1)
+)
+def test_records_and_tests_are_judged_side_by_side_as_one_by_one(kinds, seed):
+    signals, draw = PLANT.signals, np.random.default_rng(seed)
+    model, family = pendulum_of(signals), CONTROLLER.bind(signals)
+    none = _core.SelectedTests(Limits(signals).setting(family))
+    selected, alone, oracle = none, [], []
+    for recorded, steps in kinds:
+        states, commands = draw.normal(size=(steps + 1, 2)), draw.uniform(-4.0, 4.0, (steps, 1))
+        test = tl.Test(family, [2.0, 2.0, 0.3], states[0], [1.0, 0.0], steps)
+
+        def entered(into, recorded=recorded, test=test, states=states, commands=commands):
+            if recorded:
+                return into.with_record(states, commands)
+            return into.with_test(test.genes, test.target_state, states, commands)
+
+        selected = entered(selected)
+        alone.append(closed_loop([model], entered(none), WORKERS)[0, 0])
+        free = fly(model, tl.Replay(signals, states[0], commands) if recorded else test)
+        whole = len(free.states) == steps + 1
+        oracle.append(np.square(free.states - states)[1:].mean() if whole else np.inf)
+    found = closed_loop([model], selected, WORKERS)[0]
+    assert same_bits(found, np.array(alone))
+    np.testing.assert_allclose(found, oracle, rtol=1e-12)
+
+
+@given(st.integers(1, 12), st.integers(0, 2**32 - 1))
+def test_runs_under_the_same_commands_in_several_draws_are_those_of_each_draw(count, seed):
+    signals, draw = PLANT.signals, np.random.default_rng(seed)
+    model, replay = pendulum_of(signals), tl.Replay(signals, [0.3, 0.0], draw.uniform(-4.0, 4.0, (15, 1)))
+    noise, moved = draw.normal(scale=0.1, size=(count, 16, 2)), draw.normal(scale=0.1, size=(count, 15, 2))
+    runs = drawn_runs(model, replay, Limits(signals), noise=noise, disturbance=moved)
+    for k in range(count):
+        one = fly(model, replay, noise=noise[k], disturbance=moved[k])
+        assert same_bits(runs.measured[k][: len(one.states)], one.states)
+    state = np.array([0.3, 0.0])
+    for command, gust in zip(replay.commands, moved[0], strict=True):
+        state = model.step(state[np.newaxis], command[np.newaxis])[0] + gust
+    if runs.lasted[0] == 15:
+        assert same_bits(runs.states[0, -1], state) and same_bits(runs.commands[0], replay.commands)
+
+
+def test_only_what_the_engine_has_flies_a_replay(pendulum_signals):
+    replay = tl.Replay(pendulum_signals, np.zeros(2), np.ones((3, 1)))
+    with pytest.raises(tl.InvalidInput, match="found a function"):
+        fly(lambda state, command: state, replay)

@@ -431,7 +431,8 @@ class Twin(Shown, Recorded, kind="twin"):
             InvalidInput: other columns, or no step.
         """
         recorded = check_recorded(trajectory, self.limits, None, least=1)
-        free = self.simulate_commands(self._began(recorded), recorded.commands).states
+        sent = Replay(self.signals, self._began(recorded), recorded.commands)
+        free = fly(self.model, sent, limits=self.limits).states
         read = continued(recorded, self.signals, recorded.states[0]).states[1:]
         lasted = len(free) > len(read)
         rows = []

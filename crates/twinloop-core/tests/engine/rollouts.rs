@@ -148,7 +148,7 @@ proptest! {
         let model = Model { code: &scene.code, frame: &scene.frame };
         let sent = run.commands.len() / 2;
         let (limits, quiet) = (scene.world.limits(10.0), Influences::default());
-        let again = replay(model.into(), &limits, &scene.task.initial, &run.commands, quiet, Width::default()).remove(0);
+        let again = replay(model.into(), &limits, &scene.task.initial, &run.commands, quiet, Width::widest()).remove(0);
         prop_assert_eq!(again.lasted, run.lasted.min(sent));
         prop_assert!(all_same(&again.states, &run.states));
     }
