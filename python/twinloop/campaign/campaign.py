@@ -442,7 +442,7 @@ class Campaign(Shown, Lasting, kind="campaign"):
             test,
             instead,
             twin=None if twin is None or not twin.follows else twin,
-            flown=[(run.replayed, run.trajectory) for run in self._book.experiments if not run.attached],
+            flown=[(run.test, run.trajectory) for run in self._book.experiments if run.test is not None],
             horizon=horizon,
             false_alarms=false_alarms,
             overrun=overrun,

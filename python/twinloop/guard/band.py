@@ -8,6 +8,7 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.law.twin import NINE_OF_TEN, Twin
+from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -36,7 +37,11 @@ class BandWatch:
     """
 
     def __init__(
-        self, twin: Twin, test: Test, false_alarms: float, flown: Sequence[tuple[Test, Trajectory]] = ()
+        self,
+        twin: Twin,
+        test: Test | Replay,
+        false_alarms: float,
+        flown: Sequence[tuple[Test, Trajectory]] = (),
     ) -> None:
         self.signals = twin.signals
         drawn = twin.drawn(test, DRAWS)

@@ -307,7 +307,8 @@ class Twin(Shown, Recorded, kind="twin"):
             return None
         noise, moves = self.noise.drawn(draws, test.steps, Unit(self.seed).part(0).stream("band"))
         runs = [
-            drawn_runs(member, test, self.limits, noise=noise, disturbance=moves).read for member in self.members
+            drawn_runs(member, test, self.limits, noise=noise, disturbance=moves).read
+            for member in self.members
         ]
         return np.concatenate(runs), np.tile(noise, (len(runs), 1, 1))
 
