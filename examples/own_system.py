@@ -17,15 +17,15 @@ signals = tl.Signals(
 
 
 def step(x, u):
-    """One period of a pendulum of 0.3 kg and 0.4 m, in ten small steps."""
+    """One period of a pendulum of 0.3 kg and 0.4 m, in a thousand small steps."""
     angle, rate = x
-    for _ in range(10):
-        rate += 0.005 * (u[0] - 0.3 * 9.81 * 0.4 * math.sin(angle) - 0.05 * rate) / (0.3 * 0.4**2)
-        angle += 0.005 * rate
+    for _ in range(1000):
+        rate += 0.00005 * (u[0] - 0.3 * 9.81 * 0.4 * math.sin(angle) - 0.05 * rate) / (0.3 * 0.4**2)
+        angle += 0.00005 * rate
     return angle, rate
 
 
-rig = tl.systems.Simulated(signals, step)
+rig = tl.systems.Simulated(signals, step, noise=0.001)
 campaign = tl.Campaign(
     signals,
     controller=tl.controllers.PID(
