@@ -2,7 +2,7 @@
 
 from twinloop import autopilots, contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
-from twinloop.campaign import Campaign
+from twinloop.campaign import Campaign, identify
 from twinloop.errors import (
     InvalidInput,
     NoAnswer,
@@ -47,6 +47,7 @@ __all__ = [
     "contracts",
     "controllers",
     "errors",
+    "identify",
     "load",
     "load_twin",
     "objectives",

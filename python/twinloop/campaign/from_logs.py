@@ -1,0 +1,64 @@
+"""A twin from logs alone: nobody asks for a flight, and no controller is tuned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from twinloop.campaign.campaign import Campaign
+from twinloop.campaign.history import Progress
+from twinloop.controllers import StateFeedback
+from twinloop.errors import InvalidInput
+from twinloop.law.twin import Twin
+from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
+
+
+def identify(
+    runs: Sequence[Trajectory],
+    signals: Signals,
+    *,
+    seed: int = 0,
+    options: Mapping[str, object] | None = None,
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Twin:
+    """Learns a twin from recorded runs, each of its own length, under whatever commands.
+
+    It is what a campaign of the preset `default` learns from runs that were attached to it.
+
+    Args:
+        runs: at least one, at the signals' period; SI units, radians.
+        signals: of the system.
+        seed: of all random numbers; equal seeds give equal bits.
+        options: other values for some of the preset's options, by name.
+        threads: how many the engine may use, by default all that there are; no result depends on it.
+        progress: called with a `Progress` a few times a second.
+
+    Returns:
+        The twin, with its errors on each run, its committee and its remarks.
+
+    Raises:
+        InvalidInput: no runs, or one that cannot be learnt from.
+    """
+    found = list(runs)
+    if not found or not all(isinstance(run, Trajectory) for run in found):
+        raise InvalidInput(
+            "identify: expected at least one Trajectory, such as twinloop.load gives, found something else; pass a"
+            " list."
+        )
+    # A campaign has a task and a controller; neither is used here, so both are what any system has.
+    rest = [0.0 if state.envelope is None else sum(state.envelope) / 2.0 for state in signals.states]
+    campaign = Campaign(
+        signals,
+        controller=StateFeedback(None, (-1.0, 1.0)),
+        initial_state=rest,
+        target_state=rest,
+        duration=max(run.steps for run in found) * signals.dt,
+        seed=seed,
+        options=options,
+        threads=threads,
+        progress=progress,
+    )
+    for run in found:
+        campaign.attach(run)
+    return campaign.twin
