@@ -12,7 +12,9 @@ import lives
 import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.checking import _damping
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
+from twinloop.law.linear.margins import LoopMargins
 
 STREAM = np.random.default_rng(7)
 
@@ -148,3 +150,9 @@ def test_only_what_binds_decides():
     assert str(Checks([good, bad])).splitlines()[1].startswith("failed")
     with pytest.raises(tl.InvalidInput, match="subject"):
         dataclasses.replace(good, subject="weather")
+
+
+@pytest.mark.parametrize(("sensitivity", "verdict"), [(1.5, "passed"), (3.0, "look"), (5.0, "failed")])
+def test_a_loop_near_the_edge_is_not_to_be_flown(sensitivity, verdict):
+    loop = LoopMargins("roll", True, 2.0, 0.0, 0.5, 0.01, 10.0, sensitivity, 1.0)
+    assert _damping(loop).verdict == verdict

@@ -388,7 +388,7 @@ class Campaign(Shown, Lasting, kind="campaign"):
             if again or not self._book.experiments:
                 raise
             return True
-        if trajectory.ended == "aborted" and trajectory.steps < 2:
+        if isinstance(trajectory, Trajectory) and trajectory.ended == "aborted" and trajectory.steps < 2:
             # Ended before there was anything to learn from: that it was is the result.
             self.tell_failed(test, trajectory.reason or "ended at once")
         else:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
+from twinloop.law.linear.margins import LoopMargins
 
 LEFT = 0.1
 """Error on a flight that was not learnt, over that of a model that never moves, above which a twin is not believed."""
@@ -18,6 +19,8 @@ COLOURED = 0.1
 """Share of correlation coefficients that may lie beyond their 99 % limits."""
 SENSITIVITY = 2.0
 """Ms up to which a loop is taken for well damped (Åström and Murray 2008, section 12.2)."""
+FRAGILE = 4.0
+"""Ms above which a controller is not to be flown: a gain margin of 2.5 dB and 14° of phase are all that it promises."""
 RISK = 0.05
 """Probability of leaving the envelope up to which a controller is flown."""
 
@@ -102,6 +105,15 @@ def _of_innovations(found: Examination) -> Iterator[Check]:
         )  # fmt: skip
 
 
+def _damping(worst: LoopMargins) -> Check:
+    return Check(
+        "sensitivity", "controller", worst.sensitivity, SENSITIVITY, worst.sensitivity <= SENSITIVITY,
+        worst.sensitivity > FRAGILE,
+        f"The largest sensitivity over loops and committee is {worst.sensitivity:.2f}, of {worst.loop}; up to"
+        f" {SENSITIVITY:g} is usual, and with more than {FRAGILE:g} nothing is to be flown.",
+    )  # fmt: skip
+
+
 def _of_controller(found: Examination) -> Iterator[Check]:
     best = found.best
     why = found.no_controller if best is None else f"There is a controller to fly. {best.reason}".strip()
@@ -118,13 +130,8 @@ def _of_controller(found: Examination) -> Iterator[Check]:
             f"Around the target all loops are {'stable on each' if stable else 'unstable on at least one'} of the"
             f" {margins.members} models of the committee.",
         )  # fmt: skip
-        worst = max(margins.worst, key=lambda loop: loop.sensitivity)
-        damped = worst.sensitivity <= SENSITIVITY
-        yield Check(
-            "sensitivity", "controller", worst.sensitivity, SENSITIVITY, damped, False,
-            f"The largest sensitivity over loops and committee is {worst.sensitivity:.2f}, of {worst.loop}; up to"
-            f" {SENSITIVITY:g} is usual.",
-        )  # fmt: skip
+        if stable:  # of a loop that is not, a sensitivity says nothing
+            yield _damping(max(margins.worst, key=lambda loop: loop.sensitivity))
     if best.risk is not None:
         safe = best.risk <= RISK
         yield Check(
