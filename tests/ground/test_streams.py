@@ -30,7 +30,7 @@ def drawn(monkeypatch):
 
 
 def test_no_two_units_of_work_of_a_campaign_share_a_stream(drawn):
-    system = tl.systems.Quadrotor.harsh(noise=1e-3, seed=1)
+    system = tl.systems.Quadrotor(noise=1e-3, seed=1)
     options = {
         "moves": 400, "starts": 1, "generations": 2, "population": 40, "passes": 2, "restarts": 2, "draws": 4,
         "committee_size": 6, "candidates": 32, "evaluations": 512, "target_range": (0.1,) * 6,
