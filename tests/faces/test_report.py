@@ -200,3 +200,9 @@ def test_what_is_no_campaign_is_refused_in_a_sentence(tmp_path):
         assert answer.exit_code == 2 and words in answer.stderr, answer.output
     assert run("report", other, "-o", tmp_path / "x.pdf").exit_code == 2
     assert not (tmp_path / "x.html").exists()
+
+
+def test_a_campaign_of_the_preset_paper_has_a_report():
+    campaign = lives.new("paper").run(lives.PLANT, 2)
+    page = report_page(campaign, "paper", {"name": "a pendulum"}, {})
+    assert "preset paper" in page and "You decide" in page

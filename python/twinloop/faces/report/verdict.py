@@ -123,7 +123,10 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
         return Sentence("Controller", "None to fly", False, found.no_controller, (("checks", "all checks"),))
     measure = result["quality"]
     quality = quality_words(measure["kind"], measure["unit"])
-    told = f"{quality} {_number(best['predicted'])} ± {_spread(best['spread'])} predicted"
+    told = f"{quality} {_number(best['predicted'])}"
+    if best.get("spread") is not None:  # the preset paper gives none
+        told += f" ± {_spread(best['spread'])}"
+    told += " predicted"
     told += f", {_number(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
     if first is not None and first["measured"] is not None:
         told += f"; the first gains had {_number(first['measured'])}"
