@@ -21,7 +21,14 @@ MOST_BYTES = 200_000_000
 """Of a log, unpacked: an hour of twenty signals at a kilohertz, as text."""
 
 
-def load(path: str | Path, signals: Signals, *, ended: str = "completed", reason: str = "") -> Trajectory:
+def load(
+    path: str | Path,
+    signals: Signals,
+    *,
+    ended: str = "completed",
+    reason: str = "",
+    name: str | None = None,
+) -> Trajectory:
     """A recorded flight from a file.
 
     A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order; other columns
@@ -33,6 +40,7 @@ def load(path: str | Path, signals: Signals, *, ended: str = "completed", reason
         signals: names of the columns, and the order of states and commands.
         ended: "completed", "aborted" or "diverged".
         reason: why it did not complete.
+        name: what messages call it; None: its path.
 
     Returns:
         The flight.
@@ -41,12 +49,15 @@ def load(path: str | Path, signals: Signals, *, ended: str = "completed", reason
         InvalidInput: no such file, a column that is missing, or something that is no number.
     """
     path = Path(path)
+    called = str(path) if name is None else name
     try:
-        _check_size(path, path.stat().st_size)
-        t, states, commands = _arrays(path) if path.suffix == ".npz" else _columns(path, signals)
+        _check_size(called, path.stat().st_size)
+        t, states, commands = (
+            _arrays(path, called) if path.suffix == ".npz" else _columns(path, called, signals)
+        )
     except OSError as reason_:
         raise InvalidInput(
-            f"Log {path}: expected a file, found {reason_.strerror}; check its name."
+            f"Log {called}: expected a file, found {reason_.strerror}; check its name."
         ) from reason_
     if len(commands) == len(t):
         commands = commands[:-1]
@@ -73,22 +84,22 @@ def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
             )
 
 
-def _check_size(path: Path, size: int) -> None:
+def _check_size(called: str, size: int) -> None:
     if size > MOST_BYTES:
         raise InvalidInput(
-            f"Log {path}: expected at most {MOST_BYTES} bytes, found {size}; cut it to the flight, or thin it out."
+            f"Log {called}: expected at most {MOST_BYTES} bytes, found {size}; cut it to the flight, or thin it out."
         )
 
 
-def _arrays(path: Path) -> tuple[Floats, Floats, Floats]:
+def _arrays(path: Path, called: str) -> tuple[Floats, Floats, Floats]:
     try:
         with zipfile.ZipFile(path) as archive:
-            _check_size(path, sum(member.file_size for member in archive.infolist()))
+            _check_size(called, sum(member.file_size for member in archive.infolist()))
         with np.load(path, allow_pickle=False) as arrays:
             missing = [name for name in (TIME, "states", "commands") if name not in arrays]
             if missing:
                 raise InvalidInput(
-                    f"Log {path}: expected arrays t, states and commands, found no {', '.join(missing)}; add them."
+                    f"Log {called}: expected arrays t, states and commands, found no {', '.join(missing)}; add them."
                 )
             return arrays[TIME], arrays["states"], arrays["commands"]
     except OSError:
@@ -97,16 +108,16 @@ def _arrays(path: Path) -> tuple[Floats, Floats, Floats]:
         raise
     except Exception as reason:
         raise InvalidInput(
-            f"Log {path}: expected a file of NumPy with arrays of numbers, found another one: {reason}."
+            f"Log {called}: expected a file of NumPy with arrays of numbers, found another one: {reason}."
         ) from reason
 
 
-def _columns(path: Path, signals: Signals) -> tuple[Floats, Floats, Floats]:
+def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats, Floats]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as reason:
         raise InvalidInput(
-            f"Log {path}: expected text in UTF-8, found other bytes; save it as CSV."
+            f"Log {called}: expected text in UTF-8, found other bytes; save it as CSV."
         ) from reason
     head = text.partition("\n")[0]
     delimiter = max(DELIMITERS, key=head.count)
@@ -114,18 +125,18 @@ def _columns(path: Path, signals: Signals) -> tuple[Floats, Floats, Floats]:
         lines = list(csv.reader(text.splitlines(), delimiter=delimiter))
     except csv.Error as reason:
         raise InvalidInput(
-            f"Log {path}: expected columns of numbers, found: {reason}; save it as CSV."
+            f"Log {called}: expected columns of numbers, found: {reason}; save it as CSV."
         ) from reason
     rows = [row for row in lines if any(cell.strip() for cell in row)]
     names = [name.strip() for name in rows[0]] if rows else []
     for name in (TIME, *signals.state_names, *signals.command_names):
         if name not in names:
-            raise unknown(f"column, which the log {path} should have:", name, names)
+            raise unknown(f"column, which the log {called} should have:", name, names)
     body = rows[1:]
 
     def column(name: str, count: int) -> list[float]:
         place = names.index(name)
-        return [_number(row, place, name, i + 2, path) for i, row in enumerate(body[:count])]
+        return [_number(row, place, name, i + 2, called) for i, row in enumerate(body[:count])]
 
     def matrix(wanted: Sequence[str], count: int) -> Floats:
         return np.array([column(name, count) for name in wanted]).reshape(len(wanted), -1).T
@@ -134,11 +145,11 @@ def _columns(path: Path, signals: Signals) -> tuple[Floats, Floats, Floats]:
     return np.array(column(TIME, n)), matrix(signals.state_names, n), matrix(signals.command_names, n - 1)
 
 
-def _number(row: Sequence[str], place: int, name: str, line: int, path: Path) -> float:
+def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -> float:
     text = row[place].strip() if place < len(row) else ""
     try:
         return float(text)
     except ValueError as reason:
         raise InvalidInput(
-            f"Log {path}, line {line}: expected a number for {name}, found {text!r}; mend or remove the line."
+            f"Log {called}, line {line}: expected a number for {name}, found {text!r}; mend or remove the line."
         ) from reason

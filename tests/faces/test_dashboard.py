@@ -125,6 +125,26 @@ def test_what_went_wrong_is_told(store, tmp_path):
     assert [failure.reason for failure in look(store).failures] == ["the motor cut out"]
 
 
+def test_a_log_that_was_told_is_not_told_twice(store, tmp_path):
+    """The second test asks for other gains than the first: the same digits can only be the same file."""
+    told = flight(tmp_path / "flight.csv", look(store).tests[0])
+    with served(store) as address:
+        status, _, said = call(address, "POST", "/c/1/tests/1/log?file=flight.csv", told)
+    assert (
+        status == 422
+        and "Log flight.csv: expected a flight that was not told yet" in json.loads(said)["failed"]
+    )
+    assert len(look(store).experiments) == 1
+
+
+@pytest.mark.parametrize("path", ["/c/1/tests/1/log", "/c/1/log"])
+@pytest.mark.parametrize("body", [b"no columns", b"t,angle,rate,torque\n0,0,0,0\n.05,x,0,0\n", b"\xff"])
+def test_messages_call_a_log_as_it_was_called_where_it_came_from(store, path, body):
+    with served(store) as address:
+        said = call(address, "POST", f"{path}?file=C:%5Clogs%5Cgust%0A7.csv", body)[2]
+    assert "gust7.csv" in said and "/" not in json.loads(said)["failed"] and "C:" not in said
+
+
 @pytest.mark.parametrize(
     ("path", "body", "word"),
     [

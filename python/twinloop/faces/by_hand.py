@@ -6,7 +6,6 @@ from contextlib import closing
 from pathlib import Path
 
 import click
-import numpy as np
 
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file, template
@@ -14,9 +13,10 @@ from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.result import quality_unit, to_json
 from twinloop.faces.sheet import columns, facts, sheet
+from twinloop.faces.telling import numbered, tell_failed
+from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import load, write_columns
 from twinloop.test import Test
-from twinloop.trajectory import Trajectory
 
 
 @click.command()
@@ -107,30 +107,17 @@ def tell(store: Path, test: int, flight: Path | None, failed: str | None, aborte
             "twinloop tell: expected a flight, found none; name its file, or say --failed REASON."
         )
     with closing(_campaign(store)) as campaign:
-        known = numbered(campaign, test)
-        ended = "completed" if aborted is None and failed is None else "aborted"
-        run = (
-            None
-            if flight is None
-            else load(flight, campaign.signals, ended=ended, reason=aborted or failed or "")
-        )
         if failed is not None:
-            campaign.tell_failed(known, failed, run)
+            known = tell_failed(campaign, test, failed, flight)
         else:
-            assert run is not None  # refused above
-            if aborted is None and run.steps < known.steps:
-                raise InvalidInput(
-                    f"Log {flight}: expected the {known.steps} steps of test {test}, found {run.steps}; record it"
-                    " whole, or say why it was stopped: --aborted REASON."
-                )
-            if any(
-                _same(run, told.trajectory) and not _again(told.test, known) for told in campaign.experiments
-            ):
-                raise InvalidInput(
-                    f"Log {flight}: expected a flight that was not told yet, found one that was, to the last digit;"
-                    " nothing has changed. Name the log of this flight."
-                )
-            campaign.tell(known, run)
+            assert flight is not None  # refused above
+            known = tell_flight(
+                campaign,
+                test,
+                flight,
+                aborted=aborted or "",
+                otherwise="say why it was stopped: --aborted REASON",
+            )
         click.echo(
             f"Kept: test {test} {campaign.status(known)}{_as_expected(campaign, known)}; {_count(campaign)} in {store}."
         )
@@ -159,20 +146,6 @@ def abandon(store: Path, test: int) -> None:
 def _count(campaign: Campaign) -> str:
     told = len(campaign.experiments)
     return f"{told} experiment{'' if told == 1 else 's'}"
-
-
-def _again(earlier: Test | None, test: Test) -> bool:
-    """Whether a test asks for what another one did: an exact simulator then flies the same."""
-    if earlier is None or earlier.number == test.number or not np.array_equal(earlier.genes, test.genes):
-        return False
-    if earlier.excitation is None or test.excitation is None:
-        return earlier.excitation is test.excitation
-    return bool(np.array_equal(earlier.excitation, test.excitation))
-
-
-def _same(one: Trajectory, other: Trajectory) -> bool:
-    pairs = (one.states, other.states), (one.commands, other.commands)
-    return all(a.shape == b.shape and np.array_equal(a, b) for a, b in pairs)
 
 
 def _as_expected(campaign: Campaign, test: Test) -> str:
@@ -206,19 +179,3 @@ def _first(store: Path) -> dict[str, float]:
             f"twinloop ask: expected the gains of the first test in {file}, found no such file; add it."
         )
     return dict(read_file(file).first)
-
-
-def numbered(campaign: Campaign, number: int) -> Test:
-    """A test of a campaign.
-
-    Args:
-        campaign: that it was made in.
-        number: of the test.
-
-    Raises:
-        InvalidInput: no such test.
-    """
-    if not 0 <= number < len(campaign.tests):
-        last = len(campaign.tests) - 1
-        raise InvalidInput(f"Test: expected a number from 0 to {last}, found {number}; ask for one first.")
-    return campaign.tests[number]

@@ -12,9 +12,9 @@ from twinloop.autopilots.files import FORMATS
 from twinloop.autopilots.sweep import AXES
 from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput, NotAvailable
-from twinloop.faces.by_hand import numbered
 from twinloop.faces.certifying import declared_for
 from twinloop.faces.files import write_text
+from twinloop.faces.telling import numbered
 from twinloop.logs import TIME, write_columns
 from twinloop.test import Test
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tempfile
 from collections.abc import Awaitable, Callable
 from importlib import resources
@@ -21,11 +22,14 @@ from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.report.page import report_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import columns, sheet
+from twinloop.faces.telling import numbered
 from twinloop.logs import MOST_BYTES, write_columns
 
 MOST_WORDS = 10_000
 """Bytes of what a form says."""
 LOGS = (".csv", ".npz")
+LONGEST_NAME = 100
+"""Characters of a log's name in a message."""
 Handler = Callable[[Request], Awaitable[Response]]
 
 
@@ -143,14 +147,14 @@ class Pages:
         name, number = await self._named(request), request.path_params["number"]
         reason = _reason(dict(request.query_params), needed=False)
         with tempfile.TemporaryDirectory() as folder:
-            log = await _received(request, Path(folder))
-            return await self._done(self.desk.tell, name, number, log, reason)
+            log, called = await _received(request, Path(folder))
+            return await self._done(self.desk.tell, name, number, log, called, reason)
 
     async def attach(self, request: Request) -> Response:
         """Adds a log that nobody asked for."""
         name = await self._named(request)
         with tempfile.TemporaryDirectory() as folder:
-            return await self._done(self.desk.attach, name, await _received(request, Path(folder)))
+            return await self._done(self.desk.attach, name, *(await _received(request, Path(folder))))
 
     async def _named(self, request: Request) -> str:
         """Campaigns go by their place in the store: a name may hold anything."""
@@ -204,7 +208,7 @@ class Pages:
 
     def _sheet(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
-        test = _of(campaign.tests, number)
+        test = numbered(campaign, number)
         predicted = campaign.twin.simulate(test) if campaign.experiments else None
         return sheet(
             Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup.quality
@@ -212,18 +216,12 @@ class Pages:
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
-        test = _of(campaign.tests, number)
+        test = numbered(campaign, number)
         predicted = campaign.twin.simulate(test) if campaign.experiments else None
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "columns.csv"
             write_columns(path, columns(test, predicted))
             return path.read_text("utf-8")
-
-
-def _of(tests: Any, number: int) -> Any:
-    if not 0 <= number < len(tests):
-        raise InvalidInput(f"Test: expected a number from 0 to {len(tests) - 1}, found {number}.")
-    return tests[number]
 
 
 async def _body(request: Request, most: int) -> bytes:
@@ -263,14 +261,15 @@ def _reason(said: dict[str, Any], needed: bool) -> str:
     return reason.strip()
 
 
-async def _received(request: Request, folder: Path) -> Path:
-    """The body as a file; of the name that it had elsewhere only the ending counts."""
-    suffix = Path(request.query_params.get("file", "")).suffix.lower()
+async def _received(request: Request, folder: Path) -> tuple[Path, str]:
+    """The body as a file, and the name that it had elsewhere, for people to read: only its ending decides anything."""
+    name = re.split(r"[/\\]", request.query_params.get("file", ""))[-1]
+    suffix = Path(name).suffix.lower()
     if suffix not in LOGS:
         raise InvalidInput(f"Log: expected a file that ends with {' or '.join(LOGS)}, found another one.")
     path = folder / f"log{suffix}"
     path.write_bytes(await _body(request, MOST_BYTES))
-    return path
+    return path, "".join(letter for letter in name if letter.isprintable())[-LONGEST_NAME:]
 
 
 async def _refused(request: Request, failure: Exception) -> Response:

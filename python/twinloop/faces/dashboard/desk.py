@@ -13,9 +13,9 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.history import Progress
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
 from twinloop.faces.console import STEPS
+from twinloop.faces.telling import numbered, tell, tell_failed
 from twinloop.logs import load
 from twinloop.store import approve, approved, kept, opened, state
-from twinloop.test import Test
 
 
 @dataclass(frozen=True)
@@ -111,43 +111,39 @@ class Desk:
             approve(base, name, number)
         return f"Test {number} may be flown."
 
-    def tell(self, name: str, number: int, log: Path, aborted: str) -> str:
+    def tell(self, name: str, number: int, log: Path, called: str, aborted: str) -> str:
         """Tells the flight of a test.
 
         Args:
             name: of the campaign.
             number: of the test.
             log: CSV or .npz.
+            called: what the log was called where it came from.
             aborted: why the test was stopped before its end; empty where it was not.
 
         Raises:
-            InvalidInput: no such test, a log that cannot be used, or one that ends early without a reason.
+            InvalidInput: no such test, or a log that cannot be used, that was told before, or that ends early without a
+                reason.
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            test = _numbered(campaign, number)
-            run = load(log, campaign.signals, ended="aborted" if aborted else "completed", reason=aborted)
-            if not aborted and run.steps < test.steps:
-                raise InvalidInput(
-                    f"Log: expected the {test.steps} steps of test {number}, found {run.steps}; record it whole, or say"
-                    " why it was stopped."
-                )
-            campaign.tell(test, run)
+            tell(campaign, number, log, aborted=aborted, name=called)
             return f"Test {number} told: {len(campaign.experiments)} experiments are kept."
 
-    def attach(self, name: str, log: Path) -> str:
+    def attach(self, name: str, log: Path, called: str) -> str:
         """Adds a flight that nobody asked for.
 
         Args:
             name: of the campaign.
             log: CSV or .npz.
+            called: what the log was called where it came from.
 
         Raises:
             InvalidInput: a log that cannot be used.
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            campaign.attach(load(log, campaign.signals))
+            campaign.attach(load(log, campaign.signals, name=called))
             return f"Attached: {len(campaign.experiments)} experiments are kept."
 
     def fail(self, name: str, number: int, reason: str) -> str:
@@ -163,7 +159,7 @@ class Desk:
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            campaign.tell_failed(_numbered(campaign, number), reason)
+            tell_failed(campaign, number, reason)
             return f"Test {number} failed: {reason}"
 
     def abandon(self, name: str, number: int) -> str:
@@ -178,7 +174,7 @@ class Desk:
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            campaign.abandon(_numbered(campaign, number))
+            campaign.abandon(numbered(campaign, number))
             return f"Test {number} will not be flown."
 
     def ask(self, name: str, last: bool) -> str:
@@ -249,9 +245,3 @@ class Desk:
         finally:
             if progress is None:
                 self._turn.release()
-
-
-def _numbered(campaign: Campaign, number: int) -> Test:
-    if not 0 <= number < len(campaign.tests):
-        raise InvalidInput(f"Test: expected a number from 0 to {len(campaign.tests) - 1}, found {number}.")
-    return campaign.tests[number]

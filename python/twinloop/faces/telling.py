@@ -1,0 +1,110 @@
+"""Telling a campaign what was flown: the test by its number, and the log that was recorded of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from twinloop.campaign import Campaign
+from twinloop.errors import InvalidInput
+from twinloop.logs import load
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+
+def numbered(campaign: Campaign, number: int) -> Test:
+    """A test of a campaign.
+
+    Args:
+        campaign: that it was made in.
+        number: of the test.
+
+    Raises:
+        InvalidInput: no such test.
+    """
+    if not 0 <= number < len(campaign.tests):
+        last = len(campaign.tests) - 1
+        raise InvalidInput(f"Test: expected a number from 0 to {last}, found {number}; ask for one first.")
+    return campaign.tests[number]
+
+
+def tell(
+    campaign: Campaign,
+    number: int,
+    log: Path,
+    *,
+    aborted: str = "",
+    name: str | None = None,
+    otherwise: str = "say why it was stopped",
+) -> Test:
+    """Tells the flight of a test.
+
+    Args:
+        campaign: that the test was made in.
+        number: of the test.
+        log: CSV or .npz.
+        aborted: why the test was stopped before its end; empty where it was not.
+        name: what messages call the log; None: its path.
+        otherwise: what to do with a log that ends early, if it cannot be had whole.
+
+    Returns:
+        The test.
+
+    Raises:
+        InvalidInput: no such test, or a log that cannot be used, that was told before, or that ends early without a
+            reason.
+        StoreFailure: the store cannot be written.
+    """
+    test = numbered(campaign, number)
+    called = str(log) if name is None else name
+    ended = "aborted" if aborted else "completed"
+    run = load(log, campaign.signals, ended=ended, reason=aborted, name=called)
+    if not aborted and run.steps < test.steps:
+        raise InvalidInput(
+            f"Log {called}: expected the {test.steps} steps of test {number}, found {run.steps}; record it whole, or"
+            f" {otherwise}."
+        )
+    if any(_same(run, told.trajectory) and not _again(told.test, test) for told in campaign.experiments):
+        raise InvalidInput(
+            f"Log {called}: expected a flight that was not told yet, found one that was, to the last digit; nothing has"
+            " changed. Name the log of this flight."
+        )
+    campaign.tell(test, run)
+    return test
+
+
+def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None = None) -> Test:
+    """Tells that a test failed.
+
+    Args:
+        campaign: that the test was made in.
+        number: of the test.
+        reason: in a few words.
+        log: CSV or .npz with what was recorded; None: nothing.
+
+    Returns:
+        The test.
+
+    Raises:
+        InvalidInput: no such test, no reason, or a log that cannot be used.
+        StoreFailure: the store cannot be written.
+    """
+    test = numbered(campaign, number)
+    run = None if log is None else load(log, campaign.signals, ended="aborted", reason=reason)
+    campaign.tell_failed(test, reason, run)
+    return test
+
+
+def _again(earlier: Test | None, test: Test) -> bool:
+    """Whether a test asks for what another one did: an exact simulator then flies the same."""
+    if earlier is None or earlier.number == test.number or not np.array_equal(earlier.genes, test.genes):
+        return False
+    if earlier.excitation is None or test.excitation is None:
+        return earlier.excitation is test.excitation
+    return bool(np.array_equal(earlier.excitation, test.excitation))
+
+
+def _same(one: Trajectory, other: Trajectory) -> bool:
+    pairs = (one.states, other.states), (one.commands, other.commands)
+    return all(a.shape == b.shape and np.array_equal(a, b) for a, b in pairs)
