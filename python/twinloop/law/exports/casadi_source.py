@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from twinloop._core import __version__
 from twinloop.law.exports.python_source import layout, outputs_source
+from twinloop.law.exports.step_source import step_source
 from twinloop.law.law import Law
 from twinloop.law.writing import Dialect
 
@@ -33,10 +34,6 @@ def _wrapped(a, period):
 def _upright(a):
     """A cosine of the pitch, kept from 0."""
     return ca.if_else(ca.fabs(a) >= 1e-3, a, ca.copysign(1e-3, a))
-
-
-def _along(a, b, share):
-    return [first + share * second for first, second in zip(a, b)]
 '''
 
 _EFFECTS = '''
@@ -88,47 +85,7 @@ def _effects(memory, u):
     return (starts, middles, ends), [*queues, *ends_, *hidden_, *rests]
 '''
 
-_STEPS = {
-    "absolute": '''
-def _step(x, start, middle, end):
-    """The next state."""
-    return _outputs(x, middle)
-''',
-    "increment": '''
-def _step(x, start, middle, end):
-    """The state and what is added to it."""
-    return _along(x, _outputs(x, middle), 1.0)
-''',
-    "acceleration": '''
-def _step(x, start, middle, end):
-    """One Runge-Kutta step of order four."""
-    return _integrated(_outputs, x, start, middle, end)
-''',
-}
-
-_INTEGRATED = """
-def _integrated(slope, x, start, middle, end):
-    first = slope(x, start)
-    second = slope(_along(x, first, 0.5 * DT), middle)
-    third = slope(_along(x, second, 0.5 * DT), middle)
-    fourth = slope(_along(x, third, DT), end)
-    return [
-        value + DT / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-        for value, a, b, c, d in zip(x, first, second, third, fourth)
-    ]
-"""
-
-_TURNED = '''
-def _quaternion(roll, pitch, yaw):
-    (sr, sp, sy), (cr, cp, cy) = ([f(0.5 * angle) for angle in (roll, pitch, yaw)] for f in (ca.sin, ca.cos))
-    return [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ]
-
-
+_ANGLES = '''
 def _angles(a, b, c, d, before):
     """Roll, pitch and yaw, by whole turns the nearest to what they were."""
     across, up = 2.0 * (c * d + a * b), a * a - b * b - c * c + d * d
@@ -139,25 +96,6 @@ def _angles(a, b, c, d, before):
     turned = (roll + math.pi, math.pi - pitch, yaw + math.pi)
     chosen = [ca.if_else(over, other, angle) for angle, other in zip((roll, pitch, yaw), turned)]
     return [old - ca.remainder(old - new, math.tau) for old, new in zip(before, chosen)]
-
-
-def _step(x, start, middle, end):
-    """One Runge-Kutta step of order four; the attitude goes on as a quaternion, for which no pitch is singular."""
-    before = [x[i] for i in ANGLES]
-
-    def seen(y):
-        states = list(y[:-4])
-        for i, angle in zip(ANGLES, _angles(*y[-4:], before)):
-            states[i] = angle
-        return states
-
-    def slope(y, u):
-        states, (a, b, c, d) = seen(y), y[-4:]
-        p, q, r = (0.5 * states[i] for i in RATES)
-        turning = [-(b * p + c * q + d * r), a * p + c * r - d * q, a * q - b * r + d * p, a * r + b * q - c * p]
-        return [*_outputs(states, u), *turning]
-
-    return seen(_integrated(slope, [*x, *_quaternion(*before)], start, middle, end))
 '''
 
 _FUNCTIONS = '''
@@ -211,8 +149,6 @@ def casadi_source(law: Law) -> str:
         "",
         *layout(law, actuated=True),
     ]
-    steps = [_STEPS[law.form]]
-    if law.form == "acceleration":
-        steps = [_INTEGRATED, _STEPS[law.form] if law.signals.kinematics is None else _TURNED]
+    steps = step_source(law, "ca.sin, ca.cos", _ANGLES)
     outputs = outputs_source(law, CASADI, ("ca", "math"))
-    return "\n".join(["\n".join(head) + "\n", _HELPERS, outputs, *steps, _EFFECTS, _FUNCTIONS])
+    return "\n".join(["\n".join(head) + "\n", _HELPERS, outputs, steps, _EFFECTS, _FUNCTIONS])

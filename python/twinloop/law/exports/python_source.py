@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from twinloop._core import __version__
+from twinloop.law.exports.step_source import step_source
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Term, Writer
 
@@ -135,50 +136,7 @@ def simulate(initial_state, commands):
     return states
 '''
 
-_STEPS = {
-    "absolute": '''
-def _step(x, start, middle, end):
-    """The next state."""
-    return _outputs(x, middle)
-''',
-    "increment": '''
-def _step(x, start, middle, end):
-    """The state and what is added to it."""
-    return [value + added for value, added in zip(x, _outputs(x, middle))]
-''',
-    "acceleration": '''
-def _step(x, start, middle, end):
-    """One Runge-Kutta step of order four."""
-    return _integrated(_outputs, x, start, middle, end)
-''',
-}
-
-_INTEGRATED = """
-def _integrated(slope, x, start, middle, end):
-    def along(rates, time):
-        return [value + time * rate for value, rate in zip(x, rates)]
-
-    first = slope(x, start)
-    second = slope(along(first, 0.5 * DT), middle)
-    third = slope(along(second, 0.5 * DT), middle)
-    fourth = slope(along(third, DT), end)
-    return [
-        value + DT / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-        for value, a, b, c, d in zip(x, first, second, third, fourth)
-    ]
-"""
-
-_TURNED = '''
-def _quaternion(roll, pitch, yaw):
-    (sr, sp, sy), (cr, cp, cy) = ([f(0.5 * angle) for angle in (roll, pitch, yaw)] for f in (_sin, _cos))
-    return [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ]
-
-
+_ANGLES = '''
 def _angles(a, b, c, d, before):
     """Roll, pitch and yaw, by whole turns the nearest to what they were."""
     across, up = 2.0 * (c * d + a * b), a * a - b * b - c * c + d * d
@@ -192,25 +150,6 @@ def _angles(a, b, c, d, before):
         angle + math.tau * (round(turn) if math.isfinite(turn) else turn)
         for angle, turn in zip((roll, pitch, yaw), turns)
     ]
-
-
-def _step(x, start, middle, end):
-    """One Runge-Kutta step of order four; the attitude goes on as a quaternion, for which no pitch is singular."""
-    before = [x[i] for i in ANGLES]
-
-    def seen(y):
-        states = list(y[:-4])
-        for i, angle in zip(ANGLES, _angles(*y[-4:], before)):
-            states[i] = angle
-        return states
-
-    def slope(y, u):
-        states, (a, b, c, d) = seen(y), y[-4:]
-        p, q, r = (0.5 * states[i] for i in RATES)
-        turning = [-(b * p + c * q + d * r), a * p + c * r - d * q, a * q - b * r + d * p, a * r + b * q - c * p]
-        return [*_outputs(states, u), *turning]
-
-    return seen(_integrated(slope, [*x, *_quaternion(*before)], start, middle, end))
 '''
 
 
@@ -237,10 +176,8 @@ def python_source(law: Law) -> str:
         "",
         *layout(law, actuated=not direct),
     ]
-    steps = [_STEPS[law.form]]
-    if law.form == "acceleration":
-        steps = [_INTEGRATED, _STEPS[law.form] if law.signals.kinematics is None else _TURNED]
-    parts = ["\n".join(head) + "\n", _HELPERS, outputs_source(law, PYTHON, ("math",)), *steps]
+    steps = step_source(law, "_sin, _cos", _ANGLES)
+    parts = ["\n".join(head) + "\n", _HELPERS, outputs_source(law, PYTHON, ("math",)), steps]
     return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE])
 
 
