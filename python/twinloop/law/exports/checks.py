@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import math
-import shutil
-import subprocess
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +16,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.errors import NotAvailable
+from twinloop.law.exports.compiling import compiled
 from twinloop.law.exports.python_source import equation_roots
 from twinloop.law.law import Law
 from twinloop.trajectory import Trajectory
@@ -49,16 +48,20 @@ def check_simulation(
         NotAvailable: they differ.
     """
     scales = np.array([state.scale for state in law.signals.states])
-    for number, flight in enumerate(flights):
+
+    def difference(flight: Trajectory) -> Floats:
         expected = twin(flight.states[0], flight.commands)
         given = found(flight.states[0], flight.commands[: len(expected) - 1])
-        off = np.abs(given - expected) / np.maximum(scales, np.abs(expected))
-        if not (off <= CLOSE[precision]).all():
-            raise NotAvailable(
-                f"Export, {what}: expected the twin's own numbers to {CLOSE[precision]:g}, found a difference of"
-                f" {float(np.max(off)):.3g} of a state's scale on flight {number}; the twin multiplies rounding there."
-                " Pass force=True to have it all the same."
-            )
+        off: Floats = np.abs(given - expected) / np.maximum(scales, np.abs(expected))
+        return off
+
+    _check(
+        f"Export, {what}: expected the twin's own numbers",
+        "a state's scale",
+        map(difference, flights),
+        precision,
+        "; the twin multiplies rounding there",
+    )
 
 
 def python_simulation(source: str) -> Simulation:
@@ -240,14 +243,27 @@ def check_controller(
         NotAvailable: they differ.
     """
     sizes = np.array([command.size for command in family.signals.commands])
-    for number, flight in enumerate(flights):
+
+    def difference(flight: Trajectory) -> Floats:
         states = flight.states[: flight.steps]
-        off = np.abs(found(states, target) - own(states, target)) / sizes
+        off: Floats = np.abs(found(states, target) - own(states, target)) / sizes
+        return off
+
+    _check(
+        f"Export, {what}: expected the controller's own commands",
+        "a command's scale",
+        map(difference, flights),
+        precision,
+    )
+
+
+def _check(expected: str, unit: str, differences: Iterable[Floats], precision: str, reason: str = "") -> None:
+    """Refuses an export whose numbers differ on any flight, in shares of their unit; NaN differs."""
+    for number, off in enumerate(differences):
         if not (off <= CLOSE[precision]).all():
             raise NotAvailable(
-                f"Export, {what}: expected the controller's own commands to {CLOSE[precision]:g}, found a difference of"
-                f" {float(np.max(off)):.3g} of a command's scale on flight {number}; pass force=True to have it all the"
-                " same."
+                f"{expected} to {CLOSE[precision]:g}, found a difference of {float(np.max(off)):.3g} of {unit} on"
+                f" flight {number}{reason}. Pass force=True to have it all the same."
             )
 
 
@@ -299,23 +315,7 @@ def c_controller(header: str, source: str, name: str, n_u: int, precision: str) 
 
 
 def _compiled(header: str, source: str, name: str) -> ctypes.CDLL:
-    compiler = shutil.which("cc")
-    if compiler is None:
-        raise NotAvailable(
-            "Export, C: expected a C compiler to check it with, found no cc; install one, or pass force=True."
-        )
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / f"{name}.h").write_text(header, encoding="utf-8")
         (Path(folder) / f"{name}.c").write_text(source, encoding="utf-8")
-        strict = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
-        done = subprocess.run(
-            [compiler, *strict, "-shared", "-fPIC", "-o", "twin.so", f"{name}.c", "-lm"],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode != 0:
-            raise NotAvailable(f"Export, C: expected that it compiles, found {done.stderr[:300]!r}.")
-        library = ctypes.CDLL(str(Path(folder) / "twin.so"))
-    return library
+        return ctypes.CDLL(str(compiled("C", Path(folder), [f"{name}.c"], "twin.so")))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import platform
-import shutil
-import subprocess
 import sys
 import zipfile
 from collections.abc import Mapping
@@ -20,6 +18,7 @@ from twinloop._core import __version__
 from twinloop.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.c_source import c_source
+from twinloop.law.exports.compiling import compiled
 from twinloop.law.exports.fmu.description import (
     build_description,
     model_description,
@@ -37,7 +36,6 @@ BINARIES = {
     ("darwin", "arm64"): ("", "aarch64-darwin", ".dylib"),
 }
 """Folders of FMI 2.0 and 3.0 and the suffix of libraries, by system and processor; FMI 2.0 knows few."""
-FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden")
 
 
 @dataclass(frozen=True)
@@ -102,35 +100,23 @@ def built(unit: Unit, folder: Path) -> tuple[Path, str]:
         NotAvailable: no C compiler, a machine that FMI does not know, or a compiler that refuses.
     """
     machine = BINARIES.get((sys.platform, platform.machine()))
-    compiler = shutil.which("cc")
-    if compiler is None or machine is None:
+    sources_alone = "pass force=True for an FMU of sources alone"
+    if machine is None:
         raise NotAvailable(
-            "Export, FMU: expected a C compiler called cc and Linux or macOS to build the binary, found"
-            f" {'no cc' if compiler is None else f'{sys.platform} on {platform.machine()}'}; change that, or pass"
-            " force=True for an FMU of sources alone."
+            "Export, FMU: expected Linux or macOS to build the binary, found"
+            f" {sys.platform} on {platform.machine()}; change that, or {sources_alone}."
         )
     for path, content in unit.files.items():
         if path.startswith("sources/"):
             (folder / path.removeprefix("sources/")).write_bytes(content)
-    library = folder / f"{unit.name}{machine[2]}"
-    done = subprocess.run(
-        [
-            compiler,
-            *FLAGS,
-            "-shared",
-            "-fPIC",
-            "-o",
-            library.name,
-            *source_files(unit.version, unit.name),
-            "-lm",
-        ],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
+    library = compiled(
+        "FMU",
+        folder,
+        source_files(unit.version, unit.name),
+        f"{unit.name}{machine[2]}",
+        ["-fvisibility=hidden"],
+        sources_alone,
     )
-    if done.returncode != 0:
-        raise NotAvailable(f"Export, FMU: expected that it compiles, found {done.stderr[:300]!r}.")
     place = machine[unit.version - 2]
     return library, f"binaries/{place}/{library.name}" if place else ""
 
