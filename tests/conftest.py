@@ -26,6 +26,18 @@ TINY = {
 """Options of a campaign of the preset `paper` that takes a fraction of a second."""
 
 PENDULUM_GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
+PENDULUM_SIGNALS = tl.Signals(
+    states=[
+        tl.State("angle", "rad", scale=np.pi),
+        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
+    ],
+    commands=[tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
+    dt=0.05,
+)
+PENDULUM_CONTROLLER = tl.controllers.PID(
+    axes=[("angle", "rate")],
+    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
+)
 
 
 @pytest.fixture
@@ -58,22 +70,12 @@ def first_test(quadrotor, quadrotor_family):
 
 @pytest.fixture(scope="session")
 def pendulum_signals():
-    return tl.Signals(
-        states=[
-            tl.State("angle", "rad", scale=np.pi),
-            tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
-        ],
-        commands=[tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
-        dt=0.05,
-    )
+    return PENDULUM_SIGNALS
 
 
 @pytest.fixture(scope="session")
 def pendulum_controller():
-    return tl.controllers.PID(
-        axes=[("angle", "rate")],
-        gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
-    )
+    return PENDULUM_CONTROLLER
 
 
 def pendulum_step(x, u):

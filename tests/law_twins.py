@@ -36,10 +36,15 @@ def flown(twin, steps=60, seed=0):
     return twin.simulate_commands(start, commands)
 
 
-def twin_of(lines, form="acceleration", signals=SIGNALS, inputs=4, offsets=(), errors=(), **actuation):
+def model_of(lines, form="acceleration", signals=SIGNALS, inputs=4, actuators=None, hidden=()):
+    """What the engine flies."""
     outputs = len(signals.driven) if form == "acceleration" else signals.n_x
     program = _core.Program.parse(program_text(inputs, outputs, inputs + outputs + 6, [lines]))
-    model = _core.Model(program, form, signals.engine, *actuation.values())
+    return _core.Model(program, form, signals.engine, actuators, hidden)
+
+
+def twin_of(lines, form="acceleration", signals=SIGNALS, inputs=4, offsets=(), errors=(), **actuation):
+    model = model_of(lines, form, signals, inputs, **actuation)
     if offsets:
         model = model.with_offsets(offsets)
     bare = tl.Twin(model, signals)

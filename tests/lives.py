@@ -3,25 +3,16 @@
 import numpy as np
 
 import twinloop as tl
-from conftest import PENDULUM_GAINS, TINY, pendulum_step
+from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, TINY, pendulum_step
 from twinloop.records import to_text
 
-SIGNALS = tl.Signals(
-    [
-        tl.State("angle", "rad", scale=np.pi),
-        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
-    ],
-    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
-    dt=0.05,
-)
-CONTROLLER = tl.controllers.PID(
-    axes=[("angle", "rate")],
-    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
-)
+SIGNALS, CONTROLLER = PENDULUM_SIGNALS, PENDULUM_CONTROLLER
 SMALL = {
     "moves": 800, "starts": 1, "generations": 0, "lags": False, "evaluations": 128, "candidates": 24,
     "committee_size": 4, "tuning_steps": 3, "draws": 2, "tuning_starts": 1,
 }  # fmt: skip
+THOROUGH = {**SMALL, "moves": 1500, "evaluations": 256, "candidates": 32, "tuning_steps": 4}
+"""Where it matters that the twin is right."""
 OTHER_GAINS = {**PENDULUM_GAINS, "angle.kp": 1.2}
 
 LIFE = ("tell", "tell", "ask", "ask", "tell", "tell", "ask", "tell", "own", "own")

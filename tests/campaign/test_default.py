@@ -7,16 +7,12 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
+from lives import CONTROLLER, SIGNALS, THOROUGH
 from oracles import rk4, same_bits
 from twinloop.campaign import controller_to_fly
 from twinloop.campaign.logbook import _check_first_reading
 from twinloop.faces.result import summary
 from twinloop.law.noise import Noise
-
-SMALL = {
-    "moves": 1500, "starts": 1, "generations": 0, "lags": False, "evaluations": 256, "candidates": 32,
-    "committee_size": 4, "tuning_steps": 4, "draws": 2, "tuning_starts": 1,
-}  # fmt: skip
 
 
 @pytest.fixture
@@ -24,7 +20,7 @@ def begin(new_campaign):
     """Makes small campaigns of the preset `default` on the pendulum."""
 
     def make(**changes):
-        campaign_options = {**SMALL, **changes.pop("options", {})}
+        campaign_options = {**THOROUGH, **changes.pop("options", {})}
         arguments = {"target_state": [1.0, 0.0], **changes}
         return default_campaign(options=campaign_options, **arguments)
 
@@ -38,20 +34,6 @@ def default_campaign(options, **changes):
         "options": options, **changes,
     }  # fmt: skip
     return tl.Campaign(signals, **arguments)
-
-
-SIGNALS = tl.Signals(
-    [
-        tl.State("angle", "rad", scale=np.pi),
-        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
-    ],
-    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
-    dt=0.05,
-)
-CONTROLLER = tl.controllers.PID(
-    axes=[("angle", "rate")],
-    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
-)
 
 
 def outcome(campaign):
@@ -118,7 +100,7 @@ def whole():
     from conftest import pendulum_step
 
     system = tl.systems.Simulated(SIGNALS, pendulum_step, default_gains=PENDULUM_GAINS)
-    return outcome(default_campaign(SMALL, target_state=[1.0, 0.0]).run(system, 3))
+    return outcome(default_campaign(THOROUGH, target_state=[1.0, 0.0]).run(system, 3))
 
 
 @pytest.mark.parametrize("call", [1, 2, 3, 5, 7, 9, 12, 16, 20, 24])
@@ -496,7 +478,7 @@ def test_a_pendulum_is_learnt_and_flown_better_than_at_first(begin):
 
 
 BRIEF = {
-    **SMALL, "libraries": ("linear", "quadratic"), "moves": 4000, "passes": 1, "parts": False, "hidden": False,
+    **THOROUGH, "libraries": ("linear", "quadratic"), "moves": 4000, "passes": 1, "parts": False, "hidden": False,
     "offsets": False,
 }  # fmt: skip
 

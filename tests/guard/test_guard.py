@@ -9,38 +9,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import twinloop as tl
-from conftest import pendulum_step
+from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, pendulum_step
+from lives import THOROUGH
 from oracles import same_bits
 from twinloop import _core
 from twinloop.guard import Guard, Guarded
 from twinloop.guard.band import DRAWS, BandWatch
 from twinloop.guard.guarded import led_by
 
-SIGNALS = tl.Signals(
-    [
-        tl.State("angle", "rad", scale=np.pi, envelope=(-1.3, 1.3)),
-        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-12.0, 12.0)),
-    ],
-    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
-    dt=0.05,
+ANGLE, RATE = PENDULUM_SIGNALS.states
+SIGNALS = dataclasses.replace(
+    PENDULUM_SIGNALS, states=(dataclasses.replace(ANGLE, envelope=(-1.3, 1.3)), RATE)
 )
-CONTROLLER = tl.controllers.PID(
-    axes=[("angle", "rate")],
-    gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
-)
-GOOD = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
+GOOD = PENDULUM_GAINS
 WILD = {"angle.kp": 6.0, "angle.ki": 6.0, "angle.kd": 0.0}
-SMALL = {
-    "moves": 1500, "starts": 1, "generations": 0, "lags": False, "evaluations": 256, "candidates": 32,
-    "committee_size": 4, "tuning_steps": 4, "draws": 2, "tuning_starts": 1,
-}  # fmt: skip
 NOISE = [2e-3, 1e-2]
 
 
-def new_campaign(controller=CONTROLLER, **changes):
+def new_campaign(controller=PENDULUM_CONTROLLER, **changes):
     arguments = {
         "controller": controller, "initial_state": [0.0, 0.0], "target_state": [0.8, 0.0], "duration": 1.5,
-        "threads": 1, "options": SMALL, **changes,
+        "threads": 1, "options": THOROUGH, **changes,
     }  # fmt: skip
     return tl.Campaign(SIGNALS, **arguments)
 
@@ -105,7 +94,7 @@ def members_with_memory():
 
 
 MEMBERS = members_with_memory()
-FAMILY = CONTROLLER.bind(SIGNALS)
+FAMILY = PENDULUM_CONTROLLER.bind(SIGNALS)
 
 
 @given(

@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
-from strategies import program_text, programs
-from twinloop import _core
+from law_twins import PENDULUM, SIGNALS, model_of
+from strategies import programs
 from twinloop.errors import NotAvailable
 from twinloop.law.expressions import Expressions
 from twinloop.law.law import Law
@@ -20,20 +20,9 @@ from twinloop.law.linear.jacobian import jacobian
 from twinloop.law.linear.margins import Loops
 from twinloop.law.linear.plant import linearised, trimmed
 
-SIGNALS = tl.Signals(
-    states=[tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 8.0, derivative_of="angle")],
-    commands=[tl.Command("torque", "N m", (-2.0, 2.0)), tl.Command("fan", "V", (0.0, 5.0))],
-    dt=0.05,
-)
-PENDULUM = ["r4 = sin(r0)", "r4 = r4 * -9.0", "r5 = r1 * 0.4", "r4 = r4 - r5", "r5 = r2 * 11.0", "r4 = r4 + r5",
-            "r5 = r3 * r3", "r5 = r5 * r0", "r4 = r4 + r5"]  # fmt: skip
-
 
 def twin(lines, form="acceleration", actuators=None, hidden=(), inputs=4, signals=SIGNALS):
-    outputs = 1 if form == "acceleration" else signals.n_x
-    text = program_text(inputs, outputs, inputs + outputs + 6, [lines])
-    model = _core.Model(_core.Program.parse(text), form, signals.engine, actuators, hidden)
-    return tl.Twin(model, signals)
+    return tl.Twin(model_of(lines, form, signals, inputs, actuators, hidden), signals)
 
 
 def differences(function, point, step=1e-6):
@@ -80,8 +69,7 @@ def test_kinematics_are_among_the_equations():
         dt=0.05,
         kinematics=tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "r")),
     )
-    program = _core.Program.parse(program_text(7, 3, 12, [["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"]]))
-    model = tl.Twin(_core.Model(program, "acceleration", body.engine), body)
+    model = twin(["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], inputs=7, signals=body)
     # Upright, all but vertical, turned over; slow and by a radian a period.
     for pitch in (0.4, -1.1, 1.5, 2.2):
         for fast in (1.0, 20.0):
