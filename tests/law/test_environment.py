@@ -1,10 +1,15 @@
 """A twin as an environment: Gymnasium finds no fault, and it moves as the twin does."""
 
+import json
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import twinloop as tl
 from law_twins import ALL, TWINS, flown
+from twinloop.law.exports.gymnasium_source import Episode
 
 gymnasium = pytest.importorskip("gymnasium", reason="needs pip install 'twinloop[gymnasium]'")
 
@@ -37,6 +42,69 @@ def test_it_moves_as_the_twin_does_with_all_that_it_remembers(which):
             assert not terminated
         assert truncated
         np.testing.assert_allclose(seen, expected, rtol=1e-9, atol=1e-9)
+
+
+@ALL
+def test_the_exported_file_moves_as_the_twin_does_in_a_process_without_the_twin(which, tmp_path):
+    twin = TWINS[which]()
+    twin.export(tmp_path / "taken.py", kind="gymnasium")
+    flight = flown(twin, seed=7)
+    given = json.dumps([flight.states[0].tolist(), (2.0 * flight.commands).tolist()])
+    program = """
+import json, sys
+sys.path.insert(0, ".")
+sys.modules["twinloop"] = None
+import taken
+start, commands = json.loads(sys.stdin.read())
+env = taken.TwinEnv(steps=len(commands))
+for _ in range(2):  # the second episode remembers nothing of the first
+    seen = [env.reset(options={"initial_state": start})[0].tolist()]
+    for command in commands:
+        state, reward, terminated, truncated, _ = env.step(command)
+        seen.append(state.tolist())
+        if terminated: break
+print(json.dumps([seen, reward, truncated]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", program],
+        cwd=tmp_path, input=given, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    found, reward, truncated = json.loads(done.stdout)
+    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).true_states
+    np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9, atol=1e-9)
+    assert truncated and len(expected) == len(found)
+    scales = np.array([state.scale for state in twin.signals.states])
+    off = np.abs(twin.signals.difference(np.array(found[-1]), np.zeros(len(scales))))
+    assert reward == pytest.approx(-twin.signals.dt * float((off / scales).sum()), abs=1e-12)
+
+
+def test_the_exported_file_begins_as_the_campaign_says_and_ends_where_the_twin_diverges():
+    twin, names = TWINS["acceleration"](), {}
+    scales = np.array([state.scale for state in twin.signals.states])
+    episode = Episode(np.array([0.3, 0.0]), np.array([1.0, 0.0]), 7, twin.divergence_factor)
+    exec(twin.export("gymnasium", episode=episode), names)
+    env = names["TwinEnv"]()
+    np.testing.assert_array_equal(env.reset()[0], [0.3, 0.0])
+    steps = [env.step(env.action_space.low) for _ in range(7)]
+    assert [truncated for *_, truncated, _ in steps] == [False] * 6 + [True]
+    assert steps[0][1] == pytest.approx(-0.05 * (np.abs(steps[0][0] - [1.0, 0.0]) / scales).sum())
+    env.reset(options={"initial_state": 0.999 * twin.divergence_factor * scales})
+    lost = [env.step(env.action_space.high) for _ in range(40)]
+    assert any(terminated for _, _, terminated, _, _ in lost)
+    assert all(np.isfinite(state).all() and np.isfinite(earned) for state, earned, *_ in lost)
+
+
+def test_an_exported_environment_with_a_fault_is_refused(monkeypatch):
+    from gymnasium.utils import env_checker
+
+    def found(env, **_):
+        raise AssertionError("a fault")
+
+    twin = TWINS["acceleration"]()
+    monkeypatch.setattr(env_checker, "check_env", found)
+    with pytest.raises(tl.NotAvailable, match="a fault"):
+        twin.export("gymnasium")
+    assert "class TwinEnv" in twin.export("gymnasium", force=True)
 
 
 def test_commands_are_clipped_rewards_are_errors_and_noise_is_that_of_the_sensors():

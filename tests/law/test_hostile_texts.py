@@ -41,7 +41,7 @@ def hostile(unit):
 
 
 @HOSTILE
-@pytest.mark.parametrize("kind", ["python", "casadi", "control", "sympy"])
+@pytest.mark.parametrize("kind", ["python", "casadi", "control", "gymnasium", "sympy"])
 def test_in_python_it_is_a_literal_or_a_comment(unit, kind):
     text = hostile(unit).export(kind, force=True)
     names = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}

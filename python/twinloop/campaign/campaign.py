@@ -30,6 +30,7 @@ from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
 from twinloop.guard import Guard, Guarded
 from twinloop.law.exports.export import asked, delivered, exported_controller
+from twinloop.law.exports.gymnasium_source import Episode
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.objectives import closed_loop
@@ -590,7 +591,11 @@ class Campaign(Shown, Lasting, kind="campaign"):
                 f"Export: expected a twin that holds its checks, found: {' '.join(map(str, failed))} Learn from more"
                 " tests, or pass force=True (--force)."
             )
-        return self.twin.export(to, kind=kind, precision=precision, force=force)
+        setup = self.setup
+        episode = Episode(
+            setup.initial_state, setup.final_target, setup.steps, setup.options.divergence_factor
+        )
+        return self.twin.export(to, kind=kind, precision=precision, force=force, episode=episode)
 
     def export_controller(
         self,

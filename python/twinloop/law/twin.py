@@ -19,6 +19,7 @@ from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
 from twinloop.law.equations import equations
 from twinloop.law.exports.environment import Reward, environment
 from twinloop.law.exports.export import Source, asked, delivered, exported
+from twinloop.law.exports.gymnasium_source import Episode
 from twinloop.law.flight import drawn_runs, fly
 from twinloop.law.law import Law
 from twinloop.law.linear.plant import linearised, resting, trimmed
@@ -149,6 +150,7 @@ class Twin(Shown, Recorded, kind="twin"):
         kind: str | None = None,
         precision: str = "double",
         force: bool = False,
+        episode: Episode | None = None,
     ) -> str | tuple[Path, ...]:
         """The twin for use elsewhere, with its lags, delays, hidden states and all digits.
 
@@ -159,6 +161,7 @@ class Twin(Shown, Recorded, kind="twin"):
         | `fmu3`, `fmu2` | `.fmu` | for co-simulation by FMI 3.0 or 2.0: C sources, and a binary for this machine |
         | `casadi` | `.py` | CasADi functions of one period, `start` and `step` |
         | `control` | `.py` | `system`, a nonlinear system of python-control |
+        | `gymnasium` | `.py` | `TwinEnv`, an environment of Gymnasium |
         | `sympy` | `.py` | a script that makes SymPy expressions; divisions are plain ones |
         | `latex` | `.tex` | equations for a paper, multiplied out, with six digits |
         | `json` | `.json` | the twin itself, with its flights: `twinloop.load_twin` reads it back to the bit |
@@ -169,9 +172,10 @@ class Twin(Shown, Recorded, kind="twin"):
 
         Args:
             to: a kind, or the path of a file with the suffix of one.
-            kind: of the file where its suffix does not say it: "casadi", "control", "fmu2", "sympy".
+            kind: of the file where its suffix does not say it: "casadi", "control", "fmu2", "gymnasium", "sympy".
             precision: of C, "double" or "float".
             force: also a twin that does not follow its own flights, and without the comparison.
+            episode: what an environment begins with; None: as the first flight did, towards 0, for as long.
 
         Returns:
             The text where a kind was asked for (in C the header, then the source), else the paths that were written.
@@ -193,9 +197,18 @@ class Twin(Shown, Recorded, kind="twin"):
             self.flights,
             record,
             not force,
+            self._episode() if episode is None else episode,
         )
         name = "twin" if path is None else path.stem
         return delivered(exported(source, chosen, name, precision), name, path)
+
+    def _episode(self) -> Episode:
+        """What an environment of Gymnasium begins with where nobody says it."""
+        rest = np.zeros(self.signals.n_x)
+        if not self.flights:
+            return Episode(rest, rest, 100, self.divergence_factor)
+        first = self.flights[0]
+        return Episode(self._began(first), rest, max(1, first.steps), self.divergence_factor)
 
     @cached_property
     def law(self) -> Law:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -108,6 +109,38 @@ def control_simulation(source: str) -> Simulation:
         held = np.concatenate([commands, commands[-1:]])
         run = control.input_output_response(system, times, held.T, start)
         return np.asarray(run.outputs, dtype=np.float64).reshape(len(state), -1).T
+
+    return simulate
+
+
+def gymnasium_simulation(source: str) -> Simulation:
+    """How an exported environment moves, after Gymnasium's own checker has found no fault in it.
+
+    Args:
+        source: of the module, written by us.
+
+    Raises:
+        NotAvailable: Gymnasium is missing, or finds a fault.
+    """
+    _needed("gymnasium", "gymnasium")
+    checker = import_module("gymnasium.utils.env_checker")
+    names: dict[str, Any] = {}
+    exec(compile(source, "exported twin", "exec"), names)
+    with warnings.catch_warnings():
+        # Its advice is for those who train: commands in their own units, angles without an end.
+        warnings.simplefilter("ignore")
+        try:
+            checker.check_env(names["TwinEnv"](), skip_render_check=True)
+        except Exception as fault:
+            raise NotAvailable(
+                f"Export, Gymnasium: expected an environment without fault, found: {fault}."
+            ) from fault
+
+    def simulate(state: Floats, commands: Floats) -> Floats:
+        env = names["TwinEnv"](steps=max(1, len(commands)))
+        seen = [env.reset(options={"initial_state": state.tolist()})[0]]
+        seen += [env.step(command)[0] for command in commands]
+        return np.array(seen)
 
     return simulate
 

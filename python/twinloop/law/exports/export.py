@@ -24,6 +24,7 @@ from twinloop.law.exports.checks import (
     check_simulation,
     check_sympy,
     control_simulation,
+    gymnasium_simulation,
     python_controller,
     python_simulation,
 )
@@ -31,6 +32,7 @@ from twinloop.law.exports.control_source import control_source
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.exports.fmu.running import fmu_simulation
 from twinloop.law.exports.fmu.unit import archived, built, unit_of
+from twinloop.law.exports.gymnasium_source import Episode, gymnasium_source
 from twinloop.law.exports.python_source import python_source
 from twinloop.law.exports.symbolic import latex_source, sympy_source
 from twinloop.law.law import Law
@@ -45,17 +47,12 @@ SUFFIXES = {
     "sympy": ".py",
     "casadi": ".py",
     "control": ".py",
+    "gymnasium": ".py",
     "json": ".json",
 }
 """Kinds of exports, with the suffix of their files."""
 Contents = dict[str, str] | dict[str, bytes]
 """Of files, by their suffixes."""
-MODULES: dict[str, tuple[str, Callable[[Law], str], Callable[[str], Simulation]]] = {
-    "python": ("Python", python_source, python_simulation),
-    "casadi": ("CasADi", casadi_source, casadi_simulation),
-    "control": ("python-control", control_source, control_simulation),
-}
-"""Kinds that are modules of Python: what they are called, how they are written, and how they are run."""
 FMUS = {"fmu3": 3, "fmu2": 2}
 """Versions of FMI."""
 UNFIT = frozenset("\"'<>\\")
@@ -73,6 +70,7 @@ class Source:
         flights: that it was learnt from.
         record: the twin as JSON.
         check: whether what is made is compared with the twin on its flights.
+        episode: what an environment begins with.
     """
 
     law: Law
@@ -80,6 +78,20 @@ class Source:
     flights: Sequence[Trajectory]
     record: str
     check: bool
+    episode: Episode
+
+
+MODULES: dict[str, tuple[str, Callable[[Source], str], Callable[[str], Simulation]]] = {
+    "python": ("Python", lambda source: python_source(source.law), python_simulation),
+    "casadi": ("CasADi", lambda source: casadi_source(source.law), casadi_simulation),
+    "control": ("python-control", lambda source: control_source(source.law), control_simulation),
+    "gymnasium": (
+        "Gymnasium",
+        lambda source: gymnasium_source(source.law, source.episode),
+        gymnasium_simulation,
+    ),
+}
+"""Kinds that are modules of Python: what they are called, how they are written, and how they are run."""
 
 
 def asked(to: str | Path, kind: str | None) -> tuple[str, Path | None]:
@@ -151,7 +163,7 @@ def exported(source: Source, kind: str, name: str, precision: str = "double") ->
         return {".py": text}
     if kind in MODULES:
         what, write, simulated = MODULES[kind]
-        text = write(law)
+        text = write(source)
         if source.check:
             check_simulation(what, simulated(text), source.simulate, law, flights, "double")
         return {".py": text}
