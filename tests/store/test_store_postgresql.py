@@ -9,10 +9,12 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import twinloop as tl
-from lives import LIFE, flown, lived, plain, stored
+from lives import LIFE, begun, flown, lived, plain, stored
 from sameness import same
+from twinloop.faces.cli import main
 from twinloop.store import kept, opened
 
 pytest.importorskip("psycopg", reason="the driver psycopg is not installed")
@@ -83,6 +85,54 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(server, pendulum):
     campaign.close()
     other.close()
     tl.Campaign.load(address, "one").close()
+
+
+MAPPING = """
+[autopilot]
+kind = "px4"
+[autopilot.parameters]
+"angle.kp" = "MC_PITCH_P"
+"angle.ki" = "MC_PITCH_I"
+"angle.kd" = "MC_PITCH_D"
+"""
+
+
+def test_what_is_taken_away_comes_from_a_server_as_from_a_file(server, tmp_path, monkeypatch):
+    """Also: a password that stands in the address is printed and written nowhere."""
+    address = fresh(server, "taken").replace("hover@", "hover:secret@")
+    monkeypatch.setattr(sys, "argv", ["twinloop", "run", "--store", address])
+    campaign = begun(name="rig", store=address)
+    campaign.ask()
+    campaign.close()
+    campaign.save(tmp_path / "rig.db", name="rig")
+    (tmp_path / "mapping.toml").write_text(MAPPING, encoding="utf-8")
+    said = []
+    for where, folder in ((address, "server"), (str(tmp_path / "rig.db"), "file")):
+        to = ["-o", str(tmp_path / folder), "--mapping", str(tmp_path / "mapping.toml")]
+        for arguments in (
+            ["certify", where, *to],
+            ["settings", where, "1", *to],
+            ["export", where, "--to", "python", "--force"],
+            ["show", where],
+            ["report", where, "-o", str(tmp_path / f"{folder}.html")],
+        ):
+            done = CliRunner().invoke(main, arguments)
+            assert done.exit_code in (0, arguments[0] == "certify"), done.stderr
+            said.append((arguments[0], done.stdout + done.stderr))
+    half = len(said) // 2
+    assert [words for verb, words in said[:half] if verb == "export"] == [
+        words for verb, words in said[half:] if verb == "export"
+    ]
+    written = sorted(path.name for path in (tmp_path / "file").iterdir())
+    assert written == sorted(path.name for path in (tmp_path / "server").iterdir()) and len(written) >= 5
+    for name in written:
+        texts = [(tmp_path / folder / name).read_text("utf-8") for folder in ("server", "file")]
+        assert name.startswith("certificate") or texts[0] == texts[1]
+        assert "secret" not in texts[0]
+    assert all("secret" not in words for _, words in said)
+    assert "secret" not in (tmp_path / "server.html").read_text("utf-8")
+    refused = CliRunner().invoke(main, ["settings", address, "1", *to[:2], "--autopilot", "px4"])
+    assert refused.exit_code == 2 and "--mapping" in refused.stderr
 
 
 def test_the_death_of_a_writer_lets_the_next_one_in(server):

@@ -18,7 +18,7 @@ from twinloop.campaign.method import Method
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Record, Recorded
-from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened
+from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened, shown_name
 
 Answer = TypeVar("Answer")
 
@@ -211,7 +211,7 @@ def provenance(threads: int) -> Record:
         "processor": _processor(),
         "vectors": _core.vector_widths(),
         "system": platform.platform(),
-        "command": list(sys.argv),
+        "command": [shown_name(word) for word in sys.argv],
         "versions": {
             "twinloop": _core.__version__,
             "python": platform.python_version(),

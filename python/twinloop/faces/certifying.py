@@ -7,34 +7,23 @@ from pathlib import Path
 import click
 
 from twinloop.autopilots import Autopilot
-from twinloop.autopilots.declared import Declared
 from twinloop.autopilots.files import FORMATS
-from twinloop.campaign import Campaign
-from twinloop.campaign.campaign_file import read_autopilot
 from twinloop.campaign.certificate import Certificate
 from twinloop.errors import InvalidInput
 from twinloop.faces.certificate import facts, page
 from twinloop.faces.files import write_text
+from twinloop.faces.for_autopilots import for_an_autopilot, prepared
 from twinloop.faces.result import to_json
+from twinloop.store import shown_name
 
 
 @click.command()
-@click.argument("store", type=Path)
-@click.option(
-    "-o", "--output", type=Path, required=True, metavar="FOLDER", help="Where to write; made if need be."
-)
-@click.option("--autopilot", "kind", help=f"Write parameter files for {', '.join(FORMATS)}.")
-@click.option(
-    "--mapping",
-    type=Path,
-    metavar="FILE.toml",
-    help="What it calls the gains; by default STORE.toml, [autopilot].",
-)
-@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.argument("store")
+@for_an_autopilot
 @click.pass_context
 def certify(
     context: click.Context,
-    store: Path,
+    store: str,
     output: Path,
     kind: str | None,
     mapping: Path | None,
@@ -46,16 +35,12 @@ def certify(
     and then gains.* with the new ones. Exits with 1 where the certificate is refused; then no parameter file is
     written, and gains.* of an earlier time are removed.
     """
-    if not store.exists():
-        raise InvalidInput(
-            f"Store {store}: expected a store with a campaign, found no file; run with --store."
-        )
-    _, autopilot = declared_for(store, kind, mapping)
-    campaign = Campaign.load(store, name, read_only=True)
+    given = prepared(store, name, kind, mapping)
+    campaign, autopilot = given.campaign, given.autopilot
     found = campaign.certificate()
     texts = _parameter_files(found, autopilot)
     names = {key: file for key, (file, _) in texts.items()}
-    known = facts(campaign, found, str(store), name or "campaign", autopilot, names)
+    known = facts(campaign, found, shown_name(store), given.name, autopilot, names)
     signals = campaign.signals
     html = page(known, signals.state_names, [state.unit for state in signals.states])
     output.mkdir(parents=True, exist_ok=True)
@@ -72,32 +57,6 @@ def certify(
         return
     click.echo(f"Refused. {' '.join(found.refusals)} In full: {output / 'certificate.html'}")
     context.exit(1)
-
-
-def declared_for(
-    store: Path, kind: str | None, mapping: Path | None
-) -> tuple[Declared | None, Autopilot | None]:
-    """What is declared of an autopilot for a campaign, and the autopilot if one was chosen.
-
-    Args:
-        store: of the campaign.
-        kind: that was asked for; None: the one that is declared, if any is.
-        mapping: file of the declaration; None: the campaign file beside the store.
-
-    Raises:
-        InvalidInput: a declaration that cannot be used, or none where a kind was asked for.
-    """
-    file = store.with_suffix(".toml") if mapping is None else mapping
-    declared = read_autopilot(file) if file.exists() or mapping is not None else None
-    chosen = kind if kind is not None or declared is None else declared.kind
-    if declared is not None and chosen is not None:
-        return declared, declared.autopilot(chosen)
-    if kind is not None:
-        raise InvalidInput(
-            f"--autopilot: expected a section [autopilot.parameters] in {file}, found none; declare there what it calls"
-            " each gain."
-        )
-    return declared, None
 
 
 def _parameter_files(found: Certificate, autopilot: Autopilot | None) -> dict[str, tuple[str, str]]:

@@ -10,13 +10,14 @@ from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput, unknown
 from twinloop.law.exports.export import PRECISIONS, SUFFIXES
 from twinloop.law.twin import load_twin
+from twinloop.store import is_address
 
 WHAT = ("twin", "controller")
 """What a campaign has to be taken away."""
 
 
 @click.command("export")
-@click.argument("source", type=click.Path(path_type=Path))
+@click.argument("source")
 @click.argument("what", default="twin")
 @click.option("--to", "kind", help=f"Kind: {', '.join(SUFFIXES)}; for a controller python or c.")
 @click.option("--output", type=click.Path(path_type=Path), help="File to write; without it, standard output.")
@@ -26,7 +27,7 @@ WHAT = ("twin", "controller")
     "--force", is_flag=True, help="Also a twin that fails its checks, and without comparing what is made."
 )
 def export(
-    source: Path,
+    source: str,
     what: str,
     kind: str | None,
     output: Path | None,
@@ -44,20 +45,21 @@ def export(
         raise InvalidInput(
             f"Export: expected --to {'|'.join(SUFFIXES)} or --output FILE, found neither; add one."
         )
-    if not source.exists():
+    file = None if is_address(source) else Path(source)
+    if file is not None and not file.exists():
         raise InvalidInput(
-            f"Export: expected a store or a twin as JSON, found no file {str(source)!r}; run with --store."
+            f"Export: expected a store or a twin as JSON, found no file {source!r}; run with --store."
         )
     to: str | Path = output if output is not None else str(kind)
     if what == "twin":
         of_file = kind if output is not None else None
-        if source.suffix == ".json":
-            made = load_twin(source).export(to, kind=of_file, precision=precision, force=force)
+        if file is not None and file.suffix == ".json":
+            made = load_twin(file).export(to, kind=of_file, precision=precision, force=force)
         else:
             held = _campaign(source, name)
             made = held.export_twin(to, kind=of_file, precision=precision, force=force)
     else:
-        if source.suffix == ".json":
+        if file is not None and file.suffix == ".json":
             raise InvalidInput(
                 "Export: expected a store with a campaign, found JSON, which holds a twin alone."
             )
@@ -72,5 +74,5 @@ def export(
         click.echo(f"Wrote {', '.join(str(path) for path in made)}.")
 
 
-def _campaign(store: Path, name: str | None) -> Campaign:
+def _campaign(store: str, name: str | None) -> Campaign:
     return Campaign.load(store, name, read_only=True)

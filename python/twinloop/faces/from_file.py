@@ -8,6 +8,7 @@ from twinloop.campaign.campaign_file import CampaignFile, read_file
 from twinloop.errors import InvalidInput
 from twinloop.faces.console import Watch
 from twinloop.faces.working import check_answer, work
+from twinloop.store import is_address
 
 
 def run_file(
@@ -54,14 +55,23 @@ def run_file(
     return work(campaign, rig, watch, experiments, output, plot, as_json, file.flies.use, file.flies.timeout)
 
 
+def file_beside(store: str) -> Path | None:
+    """The place of the campaign file beside a store, whether one is there or not; None beside a server.
+
+    Args:
+        store: a file, or the address of a server.
+    """
+    return None if is_address(store) else Path(store).with_suffix(".toml")
+
+
 def beside(store: str) -> CampaignFile | None:
     """The campaign file beside a store, if there is one that names a system.
 
     Args:
         store: a file, or the address of a server.
     """
-    path = Path(store).with_suffix(".toml")
-    if "://" in store or not path.is_file():
+    path = file_beside(store)
+    if path is None or not path.is_file():
         return None
     file = read_file(path)
     return None if file.flies is None else file

@@ -8,33 +8,22 @@ import click
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.autopilots.files import FORMATS
 from twinloop.autopilots.sweep import AXES
 from twinloop.campaign import Campaign
-from twinloop.errors import InvalidInput, NotAvailable
-from twinloop.faces.certifying import declared_for
+from twinloop.errors import NotAvailable
 from twinloop.faces.files import write_text
+from twinloop.faces.for_autopilots import for_an_autopilot, prepared
 from twinloop.faces.telling import numbered
 from twinloop.logs import TIME, write_columns
 from twinloop.test import Test
 
 
 @click.command()
-@click.argument("store", type=Path)
+@click.argument("store")
 @click.argument("test", type=int)
-@click.option(
-    "-o", "--output", type=Path, required=True, metavar="FOLDER", help="Where to write; made if need be."
-)
-@click.option("--autopilot", "kind", help=f"Write parameter files for {', '.join(FORMATS)}.")
-@click.option(
-    "--mapping",
-    type=Path,
-    metavar="FILE.toml",
-    help="What it calls the gains, and its sweep; by default STORE.toml, [autopilot].",
-)
-@click.option("--name", help="Of the campaign, where the store holds several.")
+@for_an_autopilot
 def settings(
-    store: Path, test: int, output: Path, kind: str | None, mapping: Path | None, name: str | None
+    store: str, test: int, output: Path, kind: str | None, mapping: Path | None, name: str | None
 ) -> None:
     """Write a TEST of STORE as settings: gains, commands over time and, where it can be, a chirp.
 
@@ -42,12 +31,8 @@ def settings(
     test-N.* with those of this one, and test-N-sweep.* where its excitation is the declared sweep of ArduPilot or
     Betaflight; where it is not, a sentence says why.
     """
-    if not store.exists():
-        raise InvalidInput(
-            f"Store {store}: expected a store with a campaign, found no file; twinloop ask {store}."
-        )
-    declared, autopilot = declared_for(store, kind, mapping)
-    campaign = Campaign.load(store, name, read_only=True)
+    given = prepared(store, name, kind, mapping)
+    campaign, declared, autopilot = given.campaign, given.declared, given.autopilot
     asked = numbered(campaign, test)
     texts: dict[str, str] = {}
     said = ""

@@ -19,7 +19,7 @@ from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
 from twinloop.faces.working import answers, check_answer, described, knows_nothing, work
-from twinloop.store import Kept, kept, opened
+from twinloop.store import Kept, kept, opened, shown_name
 from twinloop.systems import BUILT_IN, Quadrotor
 
 
@@ -154,7 +154,7 @@ def _facts(held: Kept, campaign: Campaign) -> dict[str, object]:
 def _sentences(store: str, facts: dict[str, Any]) -> str:
     of = "" if facts["experiments"] is None else f" of {facts['experiments']}"
     lines = [
-        f"{store}: campaign {facts['name']!r}, begun {facts['created']}.",
+        f"{shown_name(store)}: campaign {facts['name']!r}, begun {facts['created']}.",
         f"Preset {facts['preset']}, seed {facts['seed']}.",
         f"Experiments told: {facts['told']}{of}. Tests made: {facts['tests']}.",
     ]

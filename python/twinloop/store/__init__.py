@@ -1,7 +1,20 @@
 """The durable store: campaigns in a database, so that nothing that was told is ever lost."""
 
 from twinloop.store.approvals import approve, approved, state
-from twinloop.store.database import Store, opened
+from twinloop.store.database import Store, is_address, opened, shown_name
 from twinloop.store.keeper import Keeper, Kept, begun, found, kept
 
-__all__ = ["Keeper", "Kept", "Store", "approve", "approved", "begun", "found", "kept", "opened", "state"]
+__all__ = [
+    "Keeper",
+    "Kept",
+    "Store",
+    "approve",
+    "approved",
+    "begun",
+    "found",
+    "is_address",
+    "kept",
+    "opened",
+    "shown_name",
+    "state",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -94,7 +95,7 @@ def opened(where: str | Path, *, create: bool = False, read_only: bool = False) 
     from sqlalchemy.exc import SQLAlchemyError
 
     text = str(where)
-    path = None if "://" in text else Path(where).expanduser()
+    path = None if is_address(text) else Path(where).expanduser()
     if path is not None:
         _check_file(path, create)
     store = _connected(text, path, read_only)
@@ -109,6 +110,24 @@ def opened(where: str | Path, *, create: bool = False, read_only: bool = False) 
             return _from_still_medium(path, refusal)
         raise
     return store
+
+
+def is_address(where: str | Path) -> bool:
+    """Whether a store is named by the address of a server, and not by a file.
+
+    Args:
+        where: a file, or an address such as "postgresql+psycopg://user@host/database".
+    """
+    return "://" in str(where)
+
+
+def shown_name(where: str | Path) -> str:
+    """What a store may be called where others read it: the file, or the address without its password.
+
+    Args:
+        where: a file, or the address of a server.
+    """
+    return re.sub(r"(://[^/?#:]*):[^/?#]*@", r"\1:***@", str(where)) if is_address(where) else str(where)
 
 
 def require() -> None:

@@ -18,6 +18,7 @@ from rich.progress import (
 
 from twinloop.campaign.presets import PRESETS
 from twinloop.errors import InvalidInput
+from twinloop.store import is_address
 from twinloop.sweep.campaigns import Outcome
 from twinloop.sweep.campaigns import sweep as fly_all
 from twinloop.sweep.jobs import Job, crossed
@@ -86,7 +87,7 @@ def _work(jobs: list[Job], store: str, cluster: str, outcomes: list[Outcome]) ->
     )  # fmt: skip
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("sweep", total=len(jobs), last="")
-        for outcome in fly_all(jobs, Path(store) if "://" not in store else store, cluster):
+        for outcome in fly_all(jobs, store if is_address(store) else Path(store), cluster):
             outcomes.append(outcome)
             name = outcome.job.name
             if outcome.failure is not None:

@@ -12,6 +12,7 @@ from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.working import knows_nothing
 from twinloop.records.reading import from_text
+from twinloop.store import is_address
 
 LARGEST = 1 << 30
 """Bytes of a record that is read."""
@@ -58,7 +59,7 @@ def source(where: str, name: str | None = None) -> Source:
 
 def _is_json(where: str) -> bool:
     path = Path(where)
-    if "://" in where or not path.is_file():
+    if is_address(where) or not path.is_file():
         return False
     with path.open("rb") as file:
         return file.read(64).lstrip()[:1] == b"{"
