@@ -12,9 +12,10 @@ import pytest
 from click.testing import CliRunner
 
 import twinloop as tl
-from lives import LIFE, begun, flown, lived, plain, stored
+from lives import LIFE, PLANT, begun, flown, lived, plain, stored
 from sameness import same
 from twinloop.faces.cli import main
+from twinloop.logs import write_columns
 from twinloop.store import kept, opened
 
 pytest.importorskip("psycopg", reason="the driver psycopg is not installed")
@@ -133,6 +134,22 @@ def test_what_is_taken_away_comes_from_a_server_as_from_a_file(server, tmp_path,
     assert "secret" not in (tmp_path / "server.html").read_text("utf-8")
     refused = CliRunner().invoke(main, ["settings", address, "1", *to[:2], "--autopilot", "px4"])
     assert refused.exit_code == 2 and "--mapping" in refused.stderr
+
+
+def test_a_person_flies_a_campaign_on_a_server(server, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    address = fresh(server, "by_hand").replace("hover@", "hover:secret@")
+    campaign = begun(store=address)
+    campaign.close()
+    asked = CliRunner().invoke(main, ["ask", address])
+    assert asked.exit_code == 0 and "TEST 1" in asked.stdout and "secret" not in asked.stdout
+    assert (tmp_path / "campaign-test-1.csv").is_file()
+    run = PLANT.run(tl.Campaign.load(address, read_only=True).tests[1])
+    columns = {"t": run.t, "angle": run.states[:, 0], "rate": run.states[:, 1], "torque": run.commands[:, 0]}
+    write_columns(tmp_path / "flight.csv", columns)
+    told = CliRunner().invoke(main, ["tell", address, "1", "flight.csv"])
+    assert told.exit_code == 0 and "2 experiments" in told.stdout and "secret" not in told.stdout
+    assert tl.Campaign.load(address, read_only=True).experiments[1].number == 1
 
 
 def test_the_death_of_a_writer_lets_the_next_one_in(server):

@@ -11,11 +11,13 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.files import check_writable, write_text
+from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import quality_unit, to_json
 from twinloop.faces.sheet import columns, facts, sheet
 from twinloop.faces.telling import numbered, tell_failed
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import load, write_columns
+from twinloop.store import shown_name
 from twinloop.test import Test
 
 
@@ -32,7 +34,7 @@ def new(file: Path) -> None:
 
 
 @click.command()
-@click.argument("store", type=Path)
+@click.argument("store")
 @click.option("--last", is_flag=True, help="No other test will follow: fly the best gains that are known.")
 @click.option("--again", is_flag=True, help="Another test, though one is waiting.")
 @click.option(
@@ -40,7 +42,7 @@ def new(file: Path) -> None:
 )
 @click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
 @click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
-def ask(store: Path, last: bool, again: bool, batch: int | None, threads: int | None, as_json: bool) -> None:
+def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | None, as_json: bool) -> None:
     """Say what to fly next: a test sheet, and a file with the excitation and the predicted run.
 
     A campaign that is not in STORE.db yet is begun from STORE.toml beside it. A test that is waiting is shown again.
@@ -59,7 +61,7 @@ def ask(store: Path, last: bool, again: bool, batch: int | None, threads: int | 
         click.echo(to_json(known) if as_json else text, nl=False)
 
 
-def _ask_batch(store: Path, batch: int, other: bool, threads: int | None, as_json: bool) -> None:
+def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json: bool) -> None:
     """Alternatives: those that wait, and as many more as are missing."""
     if other:
         raise InvalidInput(
@@ -69,7 +71,7 @@ def _ask_batch(store: Path, batch: int, other: bool, threads: int | None, as_jso
         if not campaign.experiments:
             raise InvalidInput(
                 "twinloop ask --batch: expected a flight that was told, found none; fly the first test:"
-                f" twinloop ask {store}."
+                f" twinloop ask {shown_name(store)}."
             )
         shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]
         if as_json:
@@ -77,28 +79,30 @@ def _ask_batch(store: Path, batch: int, other: bool, threads: int | None, as_jso
             return
         click.echo(
             f"{len(shown)} alternatives, the one most worth flying first. Fly them in any order, tell each; a test"
-            f" that will not be flown: twinloop abandon {store} TEST\n"
+            f" that will not be flown: twinloop abandon {shown_name(store)} TEST\n"
         )
         click.echo("\n".join(text for text, _ in shown), nl=False)
 
 
-def _shown(store: Path, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
+def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     """The sheet of a test, and the same as facts; its file is written."""
     predicted = campaign.twin.simulate(test) if campaign.experiments else None
-    file = store.with_name(f"{store.stem}-test-{test.number}.csv")
+    beside = file_beside(store)
+    stem = Path("campaign") if beside is None else beside.with_suffix("")
+    file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
-    return sheet(str(store), test, predicted, str(file), campaign.setup.quality), facts(test, file)
+    return sheet(shown_name(store), test, predicted, str(file), campaign.setup.quality), facts(test, file)
 
 
 @click.command()
-@click.argument("store", type=Path)
+@click.argument("store")
 @click.argument("test", type=int)
 @click.argument("flight", type=Path, required=False)
 @click.option(
     "--failed", metavar="REASON", help="The test failed; FLIGHT is what was recorded, if anything was."
 )
 @click.option("--aborted", metavar="REASON", help="The test was stopped before its end.")
-def tell(store: Path, test: int, flight: Path | None, failed: str | None, aborted: str | None) -> None:
+def tell(store: str, test: int, flight: Path | None, failed: str | None, aborted: str | None) -> None:
     """Tell what happened to a TEST: a FLIGHT as CSV or .npz, or why there is none."""
     if failed is not None and aborted is not None:
         raise InvalidInput("twinloop tell: expected --failed or --aborted, found both; leave one out.")
@@ -119,28 +123,29 @@ def tell(store: Path, test: int, flight: Path | None, failed: str | None, aborte
                 otherwise="say why it was stopped: --aborted REASON",
             )
         click.echo(
-            f"Kept: test {test} {campaign.status(known)}{_as_expected(campaign, known)}; {_count(campaign)} in {store}."
+            f"Kept: test {test} {campaign.status(known)}{_as_expected(campaign, known)}; {_count(campaign)} in"
+            f" {shown_name(store)}."
         )
 
 
 @click.command()
-@click.argument("store", type=Path)
+@click.argument("store")
 @click.argument("flight", type=Path)
-def attach(store: Path, flight: Path) -> None:
+def attach(store: str, flight: Path) -> None:
     """Add a FLIGHT that nobody asked for, as CSV or .npz, to what is learnt."""
     with closing(_campaign(store)) as campaign:
         campaign.attach(load(flight, campaign.signals))
-        click.echo(f"Kept: {flight}; {_count(campaign)} in {store}.")
+        click.echo(f"Kept: {flight}; {_count(campaign)} in {shown_name(store)}.")
 
 
 @click.command()
-@click.argument("store", type=Path)
+@click.argument("store")
 @click.argument("test", type=int)
-def abandon(store: Path, test: int) -> None:
+def abandon(store: str, test: int) -> None:
     """Say that a TEST will not be flown."""
     with closing(_campaign(store)) as campaign:
         campaign.abandon(numbered(campaign, test))
-        click.echo(f"Kept: test {test} abandoned in {store}.")
+        click.echo(f"Kept: test {test} abandoned in {shown_name(store)}.")
 
 
 def _count(campaign: Campaign) -> str:
@@ -159,12 +164,12 @@ def _as_expected(campaign: Campaign, test: Test) -> str:
     return f", quality {runs[-1]:.4g}{expected}{spread}{f' {unit}' if unit else ''}"
 
 
-def _campaign(store: Path, threads: int | None = None) -> Campaign:
+def _campaign(store: str, threads: int | None = None) -> Campaign:
     """The campaign of a store; it is begun from the file beside it where there is none."""
-    file = store.with_suffix(".toml")
-    if file.exists():
+    file = file_beside(store)
+    if file is not None and file.exists():
         return read_file(file).campaign(store=store, threads=threads)
-    if store.exists():
+    if file is None or Path(store).exists():
         return Campaign.load(store, threads=threads)
     raise InvalidInput(
         f"Store {store}: expected it, or the campaign file {file} to begin it from, found neither; write one with:"
@@ -172,10 +177,11 @@ def _campaign(store: Path, threads: int | None = None) -> Campaign:
     )
 
 
-def _first(store: Path) -> dict[str, float]:
-    file = store.with_suffix(".toml")
-    if not file.exists():
+def _first(store: str) -> dict[str, float]:
+    file = file_beside(store)
+    if file is None or not file.exists():
+        where = "a campaign file beside the store" if file is None else str(file)
         raise NotAvailable(
-            f"twinloop ask: expected the gains of the first test in {file}, found no such file; add it."
+            f"twinloop ask: expected the gains of the first test in {where}, found no such file; add it."
         )
     return dict(read_file(file).first)
