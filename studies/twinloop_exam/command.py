@@ -14,8 +14,10 @@ import click
 from twinloop.arrays import whole
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.faces.console import duration
+from twinloop.faces.files import write_text
 from twinloop_exam.kinds import Fitter, Tuner
 from twinloop_exam.learners import LEARNERS, for_smoke, learner
+from twinloop_exam.page import as_page
 from twinloop_exam.plan import TUNING_SEEDS, Scope, available, planned
 from twinloop_exam.results import Results
 from twinloop_exam.store import Store
@@ -24,6 +26,7 @@ from twinloop_exam.systems import SUBJECTS
 from twinloop_exam.tables import FORMATS, as_text, render
 from twinloop_exam.tuning import EXPERIMENTS as TUNING_EXPERIMENTS
 from twinloop_exam.tuning import score, tuned, variants
+from twinloop_exam.version import version
 
 ASK_ABOVE = 600.0
 """Seconds of estimated work above which a person at a terminal is asked first."""
@@ -46,6 +49,7 @@ def bench() -> None:
 @click.option("--store", type=Path, metavar="FILE.db", help="Where rows are kept; exam.db by default.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Processes at once.")
 @click.option("--table", "form", help=f"Only print what the store holds: {', '.join(FORMATS)}.")
+@click.option("--page", type=Path, metavar="FILE.md", help="Only write what the store holds as a page.")
 @click.option("--tune", is_flag=True, help="Compare hyper-parameters of the others on seeds 0 to 9.")
 @click.option("--retry", is_flag=True, help="Try again what failed.")
 @click.option("--yes", is_flag=True, help="Do not ask before a long run.")
@@ -61,6 +65,7 @@ def power(
     store: Path | None,
     jobs: int,
     form: str | None,
+    page: Path | None,
     tune: bool,
     retry: bool,
     yes: bool,
@@ -82,21 +87,25 @@ def power(
         chosen, source = [for_smoke(who) for who in chosen], for_smoke(source)
     with tempfile.TemporaryDirectory() as folder:
         path = store or (Path(folder) / "smoke.db" if smoke else Path("exam.db"))
-        if form is not None and not path.exists():
+        shown_only = form is not None or page is not None
+        if shown_only and not path.exists():
             raise NotAvailable(f"Store {str(path)!r}: expected a file, found none; run the exam first.")
         scope = Scope(names, chosen, source, chosen_seeds, experiments, retry)
         if tune:
             click.echo(_tune(scope, path, jobs, yes), nl=False)
             return
         try:
-            failed = 0 if form is not None else _run(scope, path, jobs, yes)
+            failed = 0 if shown_only else _run(scope, path, jobs, yes)
         except KeyboardInterrupt:
             _say(f"Interrupted: what was measured is in {path.name}; the same command goes on from there.")
             context.exit(130)
         kept = Store(path)
         try:
             results = Results(kept, names, chosen, source, chosen_seeds)
-            click.echo(render(results, form or "text"), nl=False)
+            if page is None:
+                click.echo(render(results, form or "text"), nl=False)
+            else:
+                write_text(page, as_page(results, kept.versions))
         finally:
             kept.close()
     if smoke:
@@ -110,6 +119,8 @@ def _run(scope: Scope, path: Path, jobs: int, yes: bool) -> int:
     store = Store(path)
     try:
         todo = planned(scope, store)
+        if todo:
+            store.measured_by(version())
     finally:
         store.close()
     cost = sum(job.seconds for job in todo) / jobs

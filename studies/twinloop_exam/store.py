@@ -19,13 +19,16 @@ from twinloop.trajectory import Trajectory
 from twinloop_exam import held_out
 from twinloop_exam.systems import Subject
 
-SCHEMA = 1
+SCHEMA = 2
+BEFORE = 1
+"""The version before knew no commits; a file of it is gone on with."""
 _KEY = "system TEXT, learner TEXT, seed INTEGER, k INTEGER, settings TEXT"
 _PRIMARY = "PRIMARY KEY (system, learner, seed, k, settings)"
 TABLES = {
     "measured": f"{_KEY}, measures TEXT NOT NULL, seconds REAL NOT NULL, failure TEXT, {_PRIMARY}",
     "flights": f"{_KEY}, flight BLOB NOT NULL, {_PRIMARY}",
     "held_out": "system TEXT PRIMARY KEY, signature TEXT NOT NULL, runs BLOB NOT NULL",
+    "commits": "version TEXT PRIMARY KEY",
 }
 """Columns of each table."""
 
@@ -102,7 +105,7 @@ class Store:
     def _check_whose(self) -> None:
         """Refuses a file of another version, and one that somebody else keeps something in."""
         version = self._base.execute("PRAGMA user_version").fetchone()[0]
-        if version not in (0, SCHEMA):
+        if version not in (0, BEFORE, SCHEMA):
             raise InvalidInput(
                 f"Store {str(self.path)!r}: expected version {SCHEMA}, found {version}; choose another file."
             )
@@ -119,6 +122,20 @@ class Store:
     def close(self) -> None:
         """Closes the file."""
         self._base.close()
+
+    def measured_by(self, version: str) -> None:
+        """Notes which version of the code measures from now on.
+
+        Args:
+            version: of the package, with its commit.
+        """
+        with self._transaction():
+            self._base.execute("INSERT OR IGNORE INTO commits VALUES (?)", (version,))
+
+    @property
+    def versions(self) -> list[str]:
+        """Of the code that has measured what is kept, in order; none is known of files of the version before."""
+        return [version for (version,) in self._base.execute("SELECT version FROM commits ORDER BY rowid")]
 
     def write(self, row: Row, flight: Trajectory | None = None) -> None:
         """Keeps a row and the flight that led to it, both or neither; what was there is replaced.

@@ -13,6 +13,7 @@ from twinloop_exam.results import Results, Spread, spread
 from twinloop_exam.systems import subject
 
 FORMATS = ("text", "markdown", "json")
+BARS_TITLE = "Bars"
 COLUMNS = (0, 1, 2, 3, 4, 6, 9, 10, 15, 19, 20)
 """Experiments after Υ0 that have a column, where they were measured."""
 MEASURES = (
@@ -79,7 +80,7 @@ def tables(results: Results) -> list[Table]:
         if ablated:
             found.append(_ablations(results, system, ["ours", *ablated]))
     found.append(_bars(results))
-    return [each for each in found if each.rows or each.title == "Bars"]
+    return [each for each in found if each.rows or each.title == BARS_TITLE]
 
 
 def _held_out(results: Results, system: str, learners: Sequence[str]) -> Table:
@@ -193,7 +194,7 @@ def _bars(results: Results) -> Table:
             rows.append([bar.system, bar.text, bar.limit, verdict[0], "yes" if verdict[1] else "NO"])
     missing = sum(bar.judge(results) is None for bar in BARS if bar.system in results.systems)
     notes = (f"{missing} bars of these systems are not measured.",) if missing else ()
-    return Table("Bars", ["system", "measure", "bar", "measured", "met"], rows, notes)
+    return Table(BARS_TITLE, ["system", "measure", "bar", "measured", "met"], rows, notes)
 
 
 def _cells(results: Results) -> list[dict[str, object]]:

@@ -20,6 +20,7 @@ from twinloop_exam.integrals import regression
 from twinloop_exam.kinds import Campaigner, Fitter, Flyer, Optimum
 from twinloop_exam.learners import LEARNERS, for_smoke, key
 from twinloop_exam.library import model_inputs, monomials, variables_of
+from twinloop_exam.page import as_page
 from twinloop_exam.plan import Scope, planned
 from twinloop_exam.results import Results, spread
 from twinloop_exam.store import Address, Row, Store
@@ -459,6 +460,18 @@ def test_another_file_is_refused(tmp_path):
         Store(path)
 
 
+def test_a_file_of_the_version_before_is_gone_on_with(tmp_path):
+    path = tmp_path / "exam.db"
+    Store(path).close()
+    with sqlite3.connect(path) as base:
+        base.execute("DROP TABLE commits")
+        base.execute("PRAGMA user_version = 1")
+    base.close()
+    kept = Store(path)
+    assert kept.versions == []
+    kept.close()
+
+
 def test_a_database_of_somebody_else_is_refused_and_left_as_it_is(tmp_path):
     path = tmp_path / "bookmarks.db"
     with sqlite3.connect(path) as base:
@@ -535,6 +548,20 @@ def test_a_table_reads_as_markdown_and_as_json(filled):
     cell = next(cell for cell in cells if cell["learner"] == "ours" and cell["k"] == 1)
     assert cell["failed"] == 1 and cell["error_median"]["seeds"] == 3
     assert cell["error_median"]["median"] == pytest.approx(2e-4)
+
+
+def test_a_page_says_which_versions_have_measured_its_rows(filled, store):
+    assert store.versions == []
+    store.measured_by("0.1.0 at aaaaaaa")
+    store.measured_by("0.1.0 at aaaaaaa")
+    page = as_page(filled, store.versions)
+    assert "All rows are of one version of the code: 0.1.0 at aaaaaaa." in page
+    assert page.index("## Bars") < page.index("## quadrotor") < page.index("### Controller to fly")
+    assert page.count("| ours | 0.2 [0.15, 0.25] (3)") == 1
+    store.measured_by("0.1.0 at bbbbbbb")
+    assert "**Rows are of 2 versions of the code**: 0.1.0 at aaaaaaa, 0.1.0 at b" in as_page(
+        filled, store.versions
+    )
 
 
 def test_bars_say_what_was_measured_and_whether_it_is_enough(filled):
@@ -626,6 +653,9 @@ def test_the_store_prints_its_tables_without_working(tmp_path):
     assert "0 jobs" in again.stderr
     shown = json.loads(bench(*asked, "--table", "json").stdout)
     assert [cell["violated"]["seeds"] for cell in shown["cells"]] == [2, 2]
+    page = tmp_path / "results.md"
+    assert bench(*asked, "--page", str(page)).stdout == ""
+    assert f"one version of the code: {tl.__version__}" in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
