@@ -180,12 +180,7 @@ def read_file(path: str | Path) -> CampaignFile:
     _keys(found, SECTIONS, needed if flies is None else needed[:3] if described else (), str(path))
     signals = made = None
     if described:
-        signals = Signals(
-            states=_members(found, "states", State),
-            commands=_members(found, "commands", Channel),
-            dt=found["dt"],
-            kinematics=_tagged(found["kinematics"], RigidBody) if "kinematics" in found else None,
-        )
+        signals = _signals(found)
     else:
         for key in ("dt", "commands", "kinematics"):
             if key in found:
@@ -211,6 +206,30 @@ def read_file(path: str | Path) -> CampaignFile:
     if made is not None and "first" not in found:
         first = dict(said_by(made, ("default_gains",), path)["default_gains"])
     return CampaignFile(path, arguments, first, flies, made)
+
+
+def read_signals(path: str | Path) -> tuple[Signals, Mapping[str, Any]]:
+    """What a campaign file says of the signals, and its options; other sections need not be there.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        InvalidInput: no such file, no TOML, an unknown key, or a value that cannot be used.
+    """
+    path = Path(path)
+    found = _toml_of(path)
+    _keys(found, SECTIONS, ("dt", "states", "commands"), str(path))
+    return _signals(found), _section(found, "options", None, ())
+
+
+def _signals(found: Mapping[str, Any]) -> Signals:
+    return Signals(
+        states=_members(found, "states", State),
+        commands=_members(found, "commands", Channel),
+        dt=found["dt"],
+        kinematics=_tagged(found["kinematics"], RigidBody) if "kinematics" in found else None,
+    )
 
 
 def read_autopilot(path: str | Path) -> Declared | None:

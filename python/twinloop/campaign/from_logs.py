@@ -40,8 +40,35 @@ def identify(
     Raises:
         InvalidInput: no runs, or one that cannot be learnt from.
     """
-    found = list(runs)
-    if not found or not all(isinstance(run, Trajectory) for run in found):
+    return learnt_from_logs(runs, signals, seed=seed, options=options, threads=threads, progress=progress)[0]
+
+
+def learnt_from_logs(
+    runs: Sequence[Trajectory],
+    signals: Signals,
+    held_out: Sequence[Trajectory] = (),
+    *,
+    seed: int = 0,
+    options: Mapping[str, object] | None = None,
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> tuple[Twin, Campaign]:
+    """The twin of `identify`, and the campaign behind it to be examined; what that says of a controller means nothing.
+
+    Args:
+        runs: at least one, at the signals' period; SI units, radians.
+        signals: of the system.
+        held_out: runs that are not learnt, to judge the twin on.
+        seed: of all random numbers; equal seeds give equal bits.
+        options: other values for some of the preset's options, by name.
+        threads: how many the engine may use, by default all that there are.
+        progress: called with a `Progress` a few times a second.
+
+    Raises:
+        InvalidInput: no runs, or one that cannot be learnt from.
+    """
+    found, apart = list(runs), list(held_out)
+    if not found or not all(isinstance(run, Trajectory) for run in [*found, *apart]):
         raise InvalidInput(
             "identify: expected at least one Trajectory, such as twinloop.load gives, found something else; pass a"
             " list."
@@ -61,4 +88,8 @@ def identify(
     )
     for run in found:
         campaign.attach(run)
-    return campaign.twin
+    twin = campaign.twin
+    for run in apart:
+        campaign.attach(run)
+    campaign.interrupted = True  # what was learnt so far is enough
+    return twin, campaign

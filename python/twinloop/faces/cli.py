@@ -22,6 +22,7 @@ from twinloop.faces.certifying import certify
 from twinloop.faces.console import Watch
 from twinloop.faces.exporting import export
 from twinloop.faces.from_file import run_file
+from twinloop.faces.from_logs import identify
 from twinloop.faces.report.command import compare, report
 from twinloop.faces.settings import settings
 from twinloop.faces.stored import resume, show
@@ -203,6 +204,7 @@ def run(
 
 for command in (new, ask, tell, attach, abandon):
     main.add_command(command)
+main.add_command(identify)
 main.add_command(resume)
 main.add_command(show)
 main.add_command(report)

@@ -38,8 +38,8 @@ def checks(found: Examination) -> Checks:
 
 
 def _of_twin(found: Examination) -> Iterator[Check]:
-    twin, runs = found.twin, len(found.experiments)
-    worst = max((row.normalised for row in twin.errors), default=math.inf)
+    twin, runs = found.twin, found.learnt
+    worst = max((row.normalised for row in twin.errors[:runs]), default=math.inf)
     follows = twin.follows
     yield Check(
         "follows", "twin", worst, None, follows, True,

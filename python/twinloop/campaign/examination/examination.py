@@ -107,6 +107,12 @@ class Examination:
 
     # The twin
 
+    @property
+    def learnt(self) -> int:
+        """How many of the experiments, the first ones, the twin has learnt."""
+        history = self.campaign.history
+        return len(history[-1].tests) if history else 0
+
     @cached_property
     def unseen(self) -> tuple[Unseen, ...]:
         """Flights that had not been learnt beside what was predicted of them, in the order told."""

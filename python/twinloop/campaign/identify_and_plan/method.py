@@ -315,7 +315,7 @@ class IdentifyAndPlan:
         return None if self.memory.asked is None else self.memory.asked.identified.model
 
     def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
-        """What was known earlier: the twin of the last question with its band, those before it as models alone."""
+        """Twins that have not learnt all: with bands those of the last question and of today, else models alone."""
         latest, asked, divergence = self._latest(), self.memory.asked, self.options.divergence_factor
         told = [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
         found = {
@@ -324,7 +324,9 @@ class IdentifyAndPlan:
         }
         if asked is not None:
             found[asked.told] = self._twin(asked, book, [])
-        return tuple((learnt, found[learnt]) for learnt in sorted(found) if learnt < latest.told)
+        # Of today it is where flights were told that nobody has learnt yet.
+        found[latest.told] = self._twin(latest, book, [])
+        return tuple((learnt, found[learnt]) for learnt in sorted(found) if learnt < len(book.experiments))
 
     def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
         """Whitened prediction errors of the twin's own filter; None of exact readings, which leave rounding alone."""

@@ -70,7 +70,7 @@ def axis(
     if names:
         ticks = tuple((float(i), name) for i, name in enumerate(names))
         return Axis(-0.5, len(names) - 0.5, False, length, ticks)
-    low, high = _ends(values, log) if ends is None else ends
+    low, high = _ends(values, log) if ends is None or not ends[0] < ends[1] else ends
     if log:
         return Axis(low, high, True, length, _decades(low, high))
     return Axis(low, high, False, length, _even(low, high, count, whole))

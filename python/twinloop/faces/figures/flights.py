@@ -35,12 +35,13 @@ def unseen(found: Examination) -> Figure | None:
         if last.inside is None
         else f" {100.0 * last.inside:.0f} % of the readings are inside the 90 % band."
     )
+    how = "its recorded commands" if last.number is None else "the test's own controller"
     return Figure(
         "unseen",
         f"The twin against {said(last.number)}, which it had not learnt",
         panels,
-        f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under the"
-        f" test's own controller; no reading after the first was used.{band}",
+        f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under"
+        f" {how}; no reading after the first was used.{band}",
     )
 
 

@@ -55,7 +55,7 @@ def style() -> str:
 
 def report_page(
     campaign: Campaign, name: str, system: Mapping[str, object], run_info: Mapping[str, object],
-    sessions: Sequence[Mapping[str, Any]] = (),
+    sessions: Sequence[Mapping[str, Any]] = (), controller: bool = True,
 ) -> str:  # fmt: skip
     """The report of a campaign.
 
@@ -65,6 +65,7 @@ def report_page(
         system: what was experimented on.
         run_info: of the process that makes the report.
         sessions: that have worked on the campaign, where a store knows them.
+        controller: whether a controller was to be tuned; otherwise the page is about the twin alone.
 
     Returns:
         One page of HTML that needs nothing else.
@@ -75,20 +76,21 @@ def report_page(
     template = templates().get_template("page.html")
     found, result = campaign.examine(), summary(campaign, system, run_info)
     checked = checks(found)
-    history = campaign.history
-    learnt = len(history[-1].tests) if history else 0
+    if not controller:
+        found.best = None
     text: str = template.render(
         name=name,
         result=result,
         system=result["system"],
-        unlearnt=len(found.experiments) - learnt,
-        verdict=verdict(found, checked, result),
-        checks=checked,
+        unlearnt=len(found.experiments) - found.learnt,
+        tuned=controller,
+        verdict=verdict(found, checked, result)[: None if controller else 1],
+        checks=[check for check in checked if controller or check.subject == "twin"],
         evidence=EVIDENCE,
         equations="\n".join(result["twin"]["equations"]),  # type: ignore[call-overload,index,arg-type]
         remarks=campaign.twin.remarks,
         twin_figures=_figures(found, TWIN),
-        controller_figures=_figures(found, CONTROLLER),
+        controller_figures=_figures(found, CONTROLLER if controller else ()),
         campaign_figures=_figures(found, CAMPAIGN),
         twin_tables=_present(
             tables.states(result), tables.disturbances(result), tables.actuators(result), tables.rivals(found),
@@ -97,8 +99,8 @@ def report_page(
         controller_tables=_present(
             tables.gains(result), tables.margins(found), tables.steps(found), tables.effort(found),
             tables.envelope(found), *tables.poles(found)[1:],
-        ),
-        campaign_tables=_present(tables.flights(result), tables.data(found)),
+        ) if controller else [],
+        campaign_tables=_present(tables.flights(result) if controller else None, tables.data(found)),
         next=_next(campaign, result),
         failures=campaign.failures,
         sessions=sessions,

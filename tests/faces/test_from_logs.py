@@ -1,0 +1,119 @@
+"""`twinloop identify`: a twin from logs alone, judged on a log that it has not learnt, with a page about it."""
+
+import json
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from browser import SIZES, browser, kept, opened, serious
+from command import invoke
+from lives import by_hand
+from twinloop.logs import write_columns
+
+RIG = """
+dt = 0.05
+[states.angle]
+unit = "rad"
+scale = 3.141592653589793
+[states.rate]
+unit = "rad/s"
+scale = 8.0
+derivative_of = "angle"
+[commands.torque]
+unit = "N m"
+bounds = [-2.0, 2.0]
+[options]
+committee_size = 4
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three logs and the file that says what is in them."""
+    room = tmp_path_factory.mktemp("logs")
+    (room / "rig.toml").write_text(RIG)
+    noise = np.random.default_rng(0)
+    for number in range(3):
+        run = by_hand(60, seed=number)
+        read = run.states + noise.normal(size=run.states.shape) * [1e-2, 5e-2]
+        names = dict(zip(("angle", "rate"), read.T, strict=True))
+        write_columns(room / f"{number}.csv", {"t": run.t, **names, "torque": run.commands[:, 0]})
+    return room
+
+
+def identified(folder, *more, logs=("0.csv", "1.csv")):
+    files = [str(folder / name) for name in logs]
+    return invoke("identify", *files, "--config", str(folder / "rig.toml"), "--threads", "1", *more)
+
+
+@pytest.fixture(scope="module")
+def done(folder):
+    pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
+    return identified(
+        folder, "--held-out", str(folder / "2.csv"), "-o", str(folder / "twin.json"),
+        "--report", str(folder / "logs.html"), "--json",
+    )  # fmt: skip
+
+
+def test_the_twin_is_that_of_the_package_and_is_judged_on_the_log_held_out(folder, done):
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    signals = tl.load_twin(folder / "twin.json").signals
+    runs = [tl.load(folder / f"{number}.csv", signals) for number in range(3)]
+    twin = tl.identify(runs[:2], signals, options={"committee_size": 4}, threads=1)
+    again = tl.load_twin(folder / "twin.json")
+    assert found["exact_equations"] == twin.equations(17).splitlines() == again.equations(17).splitlines()
+    assert [log["learnt"] for log in found["logs"]] == [True, True, False]
+    fits = {row.name: row.fit for row in twin.fit(runs[2])}
+    assert found["logs"][2]["fit"] == pytest.approx(fits) and min(fits.values()) > 90.0
+
+
+def test_as_text_it_is_equations_and_a_table(folder):
+    said = identified(folder).stdout
+    assert "d angle / dt = rate" in said and "FIT angle (%)" in said and "held out" not in said
+
+
+def test_the_page_has_what_there_is_and_nothing_of_a_controller(folder, done):
+    page = (folder / "logs.html").read_text()
+    assert "Report of a twin from logs" in page and 'figure id="unseen"' in page
+    assert "Trust it" in page and "inside its 90 % band" in page and "under its recorded commands" in page
+    for absent in ('id="controller"', 'id="next"', "controller to fly", "Do not fly", 'id="gains-table"'):
+        assert absent not in page, absent
+    for target in ("checks", "twin", "campaign", "again", "crosscorrelation"):
+        assert f'href="#{target}"' in page and f'id="{target}"' in page
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_page_opens_without_a_complaint_and_keeps_nobody_out(folder, done, size):
+    with browser() as chromium, opened(chromium, folder / "logs.html", size) as (page, said):
+        kept(page, f"logs-{size}")
+        assert said == [] and serious(page) == []
+        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+        assert wide[0] <= wide[1]
+
+
+def test_without_a_log_held_out_the_page_does_not_say_to_trust_it(folder):
+    pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
+    page = folder / "all.html"
+    assert identified(folder, "--report", str(page)).exit_code == 0
+    assert "Do not trust it" in page.read_text()
+
+
+def test_a_log_that_cannot_be_learnt_names_itself_and_what_to_do(folder):
+    lines = (folder / "0.csv").read_text().splitlines()
+    (folder / "gap.csv").write_text("\n".join(lines[:20] + lines[24:]))
+    refused = identified(folder, logs=("gap.csv",))
+    assert refused.exit_code == 2 and "gap.csv" in refused.stderr and "twinloop check" in refused.stderr
+
+
+def test_misuse_is_refused_before_any_work(folder):
+    for more, logs, words in (
+        ((), (), "at least one log"),
+        (("-o", str(folder / "twin.txt")), ("0.csv",), ".json"),
+        ((), ("none.csv",), "check its name"),
+    ):
+        refused = identified(folder, *more, logs=logs)
+        assert refused.exit_code == 2 and words in refused.stderr
+    missing = invoke("identify", str(folder / "0.csv"))
+    assert missing.exit_code == 2 and "--config" in missing.stderr
