@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 from twinloop.arrays import whole
 from twinloop.campaign.presets import PRESETS, parsed
 from twinloop.errors import InvalidInput, unknown
 from twinloop.systems import BUILT_IN
+from twinloop.systems.named import imported
 
 MOST_JOBS = 100_000
 NEEDED = ("signals", "controller", "initial_state", "target_state", "duration", "default_gains", "run")
@@ -119,17 +119,15 @@ def system_of(text: str, seed: int) -> Any:
     name, _, rest = text.partition(":")
     if name in BUILT_IN:
         return _built_in(name, rest, seed)
-    module, _, attribute = text.partition(":")
-    if not attribute:
+    if not rest:
         raise unknown("system", text, BUILT_IN)
+    found = imported(text, "is on the path of every worker")
     try:
-        found = getattr(import_module(module), attribute)
         # A class or a function makes a system of the seed; anything else is one.
         system = found(seed=seed) if isinstance(found, type) or not hasattr(found, "run") else found
-    except (ImportError, AttributeError, ValueError, TypeError) as failure:
+    except (ValueError, TypeError) as failure:
         raise InvalidInput(
-            f"System {text!r}: expected module:object, a system or a function of seed that makes one, found: {failure};"
-            " check the spelling, and that the module is on the path of every worker."
+            f"System {text!r}: expected a system or a function of seed that makes one, found: {failure}; mend it."
         ) from failure
     missing = [needed for needed in NEEDED if not hasattr(system, needed)]
     if missing:

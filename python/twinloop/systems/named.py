@@ -27,6 +27,7 @@ NAMED: Mapping[str, Any] = {
     "folder": Folder,
 }
 """What makes each system that has a name."""
+BESIDE = "stands beside the campaign file or is installed"
 
 
 def system_named(name: object, arguments: Mapping[str, Any], signals: Signals | None, folder: Path) -> System:
@@ -48,7 +49,7 @@ def system_named(name: object, arguments: Mapping[str, Any], signals: Signals | 
     if not isinstance(name, str) or (name not in NAMED and ":" not in name):
         raise unknown("system", name, [*NAMED, "module:object"])
     with _importable(folder):
-        found = NAMED[name] if name in NAMED else _imported(name)
+        found = NAMED[name] if name in NAMED else imported(name, BESIDE)
         system = _made(name, found, dict(arguments), signals, folder)
     own = getattr(system, "signals", None)
     if not isinstance(own, Signals) or not callable(getattr(system, "run", None)):
@@ -65,7 +66,16 @@ def system_named(name: object, arguments: Mapping[str, Any], signals: Signals | 
     return made
 
 
-def _imported(name: str) -> Any:
+def imported(name: str, place: str) -> Any:
+    """What a `module:object` names. Importing runs the module's code.
+
+    Args:
+        name: module, colon, object, which may be an attribute of one.
+        place: where the module should be, for the error.
+
+    Raises:
+        InvalidInput: there is none.
+    """
     module, _, attribute = name.partition(":")
     try:
         found: Any = import_module(module)
@@ -73,8 +83,8 @@ def _imported(name: str) -> Any:
             found = getattr(found, part)
     except (ImportError, AttributeError, ValueError) as reason:
         raise InvalidInput(
-            f"System {name!r}: expected module:object, found: {reason}; check the spelling, and that the module stands"
-            " beside the campaign file or is installed."
+            f"System {name!r}: expected module:object, found: {reason}; check the spelling, and that the module"
+            f" {place}."
         ) from reason
     return found
 
