@@ -12,6 +12,7 @@ import numpy as np
 
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.errors import NotAvailable
+from twinloop.faces.figures.units import shown_unit
 from twinloop.objectives import normalised_error
 from twinloop.signals import State
 from twinloop.test import Test
@@ -293,17 +294,3 @@ def _error_lines(axes: Any, errors: Mapping[int, Sequence[tuple[float, float]]],
     axes.set_ylabel(label)
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-
-def shown_unit(unit: str) -> tuple[float, str]:
-    """The unit of a face: degrees instead of radians.
-
-    Args:
-        unit: of a signal.
-
-    Returns:
-        What to multiply with, and the unit that is shown.
-    """
-    if unit == "rad" or unit.startswith("rad/"):
-        return 180.0 / math.pi, "°" + unit[3:]
-    return 1.0, unit or "1"
