@@ -8,19 +8,10 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
 from twinloop.campaign import available_threads
 from twinloop.errors import RemarkWarning, TwinloopError
 from twinloop.law.twin import Twin
+from twinloop.sweep.progress import JobBar
 from twinloop.sweep.workers import HERE, finished
 from twinloop_exam import campaigns
 from twinloop_exam.campaigns import Measured
@@ -49,31 +40,13 @@ def work_off(path: Path, jobs: Sequence[Job], processes: int) -> int:
         KeyboardInterrupt: Ctrl-C; what was measured is kept.
     """
     failed = 0
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[last]}"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    console = Console(stderr=True)
-    done, spoke = 0, time.monotonic()
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("exam", total=len(jobs), last="")
+    with JobBar("exam", len(jobs), LINE_SECONDS) as bar:
         for stage in (False, True):
             ready = [job for job in jobs if isinstance(job.who, Fitter) is stage]
             for job, failure in _finished(path, ready, processes):
                 failed += failure is not None
-                name = f"{job.address.learner} on {job.address.system}, seed {job.address.seed}"
-                if failure is not None:
-                    bar.console.print(f"Failed: {name}: {failure}", highlight=False, markup=False)
-                done += 1
-                bar.update(task, advance=1, last=name)
-                if not console.is_terminal and time.monotonic() - spoke > LINE_SECONDS:
-                    spoke = time.monotonic()
-                    console.print(f"{done} of {len(jobs)} jobs: {name}", highlight=False, markup=False)
+                address = job.address
+                bar.advance(f"{address.learner} on {address.system}, seed {address.seed}", failure)
     return failed
 
 

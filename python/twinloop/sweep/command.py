@@ -6,15 +6,6 @@ import json
 from pathlib import Path
 
 import click
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from twinloop.campaign.presets import PRESETS
 from twinloop.errors import InvalidInput
@@ -22,6 +13,7 @@ from twinloop.store import is_address
 from twinloop.sweep.campaigns import Outcome
 from twinloop.sweep.campaigns import sweep as fly_all
 from twinloop.sweep.jobs import Job, crossed
+from twinloop.sweep.progress import JobBar
 from twinloop.sweep.summary import as_text, summarised
 from twinloop.sweep.workers import HERE
 
@@ -80,21 +72,10 @@ def sweep(
 
 
 def _work(jobs: list[Job], store: str, cluster: str, outcomes: list[Outcome]) -> None:
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[last]}"),
-        TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
-    )  # fmt: skip
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("sweep", total=len(jobs), last="")
+    with JobBar("sweep", len(jobs)) as bar:
         for outcome in fly_all(jobs, store if is_address(store) else Path(store), cluster):
             outcomes.append(outcome)
-            name = outcome.job.name
-            if outcome.failure is not None:
-                bar.console.print(f"Failed: {name}: {outcome.failure}", highlight=False, markup=False)
-            bar.update(task, advance=1, last=name)
-            if not console.is_terminal and outcome.seconds is not None:
-                console.print(f"{len(outcomes)} of {len(jobs)}: {name}", highlight=False, markup=False)
+            bar.advance(outcome.job.name, outcome.failure, known=outcome.seconds is None)
 
 
 def _seeds(text: str) -> list[int]:
