@@ -103,6 +103,25 @@ def at_least_zero(what: str, value: object) -> float:
     return found
 
 
+def share(what: str, value: object) -> float:
+    """A number between nothing and all, such as a probability.
+
+    Args:
+        what: how to call it in an error.
+        value: the number.
+
+    Returns:
+        The number as a float.
+
+    Raises:
+        InvalidInput: it is not a finite real number from 0 to 1.
+    """
+    found = number(what, value)
+    if not 0.0 <= found <= 1.0:
+        raise InvalidInput(f"{what}: expected a number from 0 to 1, found {value}; change it.")
+    return found
+
+
 def whole(what: str, value: object, *, least: int = 0) -> int:
     """A whole number that is not too small.
 

@@ -43,7 +43,7 @@ def test_a_first_test_that_fails_and_two_in_a_row_are_told_and_raised(new_campai
     assert len(campaign.failures) == 2 and len(campaign.experiments) == 1
 
 
-@pytest.mark.parametrize("bad", [-0.1, float("nan"), "low"])
+@pytest.mark.parametrize("bad", [-0.1, 1.1, 2, float("nan"), "low"])
 def test_a_risk_that_is_none_is_refused(new_campaign, pendulum, bad):
     with pytest.raises(tl.InvalidInput, match="max_risk"):
         new_campaign().run(pendulum, 2, max_risk=bad)

@@ -12,7 +12,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, at_least_zero, floats, whole
+from twinloop.arrays import Floats, floats, share, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
@@ -337,8 +337,8 @@ class Campaign(Shown, Lasting, kind="campaign"):
             The campaign.
 
         Raises:
-            InvalidInput: no system, one that answers with something else than a usable trajectory, or fewer experiments
-                than were told already.
+            InvalidInput: no system, one that answers with something else than a usable trajectory, fewer experiments
+                than were told already, or a `max_risk` that is no probability.
             KeyboardInterrupt: Ctrl-C. Nothing that was told is lost: `interrupted` says so, the results give the best
                 so far, and calling again goes on from there with the same bits.
             NotAvailable: there is no first test.
@@ -347,7 +347,7 @@ class Campaign(Shown, Lasting, kind="campaign"):
             TooRisky: a test is riskier than `max_risk`; it waits. Raise `max_risk`, fly it by hand, or abandon it.
         """
         budget = whole("Campaign.run, experiments", experiments, least=1)
-        allowed = 1.0 if max_risk is None else at_least_zero("Campaign.run, max_risk", max_risk)
+        allowed = 1.0 if max_risk is None else share("Campaign.run, max_risk", max_risk)
         described = isinstance(getattr(system, "signals", None), Signals)
         if not (described and callable(getattr(system, "run", None))):
             raise InvalidInput(
