@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -205,3 +206,25 @@ def test_a_worker_does_not_outlive_the_process_that_asked_for_it(tmp_path):
     process.kill()
     # The worker has the same standard output: it is closed only once both are gone.
     assert process.communicate(timeout=60)[0] == b""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="needs masks of signals")
+def test_ctrl_c_is_one_sentence_and_none_of_the_workers(tmp_path):
+    """A terminal sends it to all processes, as here."""
+    psutil = pytest.importorskip("psutil", reason="needs the extra cluster")  # distributed brings it
+    words = ["sweep", "quadrotor", "--seeds", "0:3", "--experiments", "8", "--cluster", "local:2"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "twinloop", *words, "--store", str(tmp_path / "sweep.db")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    tracker_and_workers = 3
+    for _ in range(600):
+        children = psutil.Process(process.pid).children()
+        if len(children) >= tracker_and_workers:
+            break
+        time.sleep(0.1)
+    assert len(children) >= tracker_and_workers
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert said.startswith("Interrupted: what was finished") and said.count("\n") == 1

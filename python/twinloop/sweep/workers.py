@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from twinloop.errors import InvalidInput, NotAvailable
@@ -93,17 +95,16 @@ def _client(cluster: Any) -> Iterator[Client]:
     count = processes(cluster)
     with dask.config.set({"distributed.scheduler.allowed-failures": LOST}):
         if count is not None:
-            with (
-                LocalCluster(
+            with _deaf_to_ctrl_c():
+                local = LocalCluster(
                     n_workers=count,
                     threads_per_worker=1,
                     host="127.0.0.1",
                     dashboard_address=None,
                     memory_limit=None,
                     silence_logs=logging.CRITICAL,
-                ) as local,
-                Client(local) as client,
-            ):
+                )
+            with local, Client(local) as client:
                 yield client
             return
         try:
@@ -115,3 +116,21 @@ def _client(cluster: Any) -> Iterator[Client]:
             ) from failure
         with client:
             yield client
+
+
+@contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """Processes that are begun meanwhile, and theirs in turn, never see Ctrl-C, which a terminal sends to all.
+
+    This process alone is interrupted, and ends them. It sees a Ctrl-C of meanwhile afterwards.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    # It unblocks SIGINT where it is started, and so has to be there before.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
