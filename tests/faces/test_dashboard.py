@@ -4,6 +4,9 @@ import contextlib
 import http.client
 import json
 import os
+import signal
+import subprocess
+import sys
 import threading
 import time
 from urllib.parse import urlsplit
@@ -222,6 +225,22 @@ def test_a_store_that_is_none_and_a_port_that_is_taken_are_refused(store, tmp_pa
         prepared(str(tmp_path / "none.db"), 0)
     with served(store) as address, pytest.raises(tl.InvalidInput, match="free port"):
         prepared(str(store), urlsplit(address).port)
+
+
+def test_ctrl_c_ends_it_without_a_word(store):
+    """It is the way to end it, and no failure."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "twinloop", "dashboard", str(store), "--port", "0"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    address = process.stdout.readline().split()[1]
+    for _ in range(200):
+        with contextlib.suppress(ConnectionError):
+            assert call(address, "GET", "/c/1")[0] == 200
+            break
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=30)[1] == "" and process.returncode == 0
 
 
 def test_names_of_strangers_stay_text(tmp_path):

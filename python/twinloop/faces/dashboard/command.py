@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import socket
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -33,7 +34,8 @@ def dashboard(store: str, port: int, host: str, token: str | None, threads: int 
     """Show STORE in the browser: the report, live, the next test, and forms to approve and to tell."""
     server, address = prepared(store, port, host, token, threads)
     click.echo(f"Dashboard: {address}  (Ctrl-C ends it)")
-    server.run()
+    with suppress(KeyboardInterrupt):  # the way to end it: there is nothing to say of that
+        server.run()
 
 
 def prepared(
