@@ -11,6 +11,22 @@ SMALL = {
     "moves": 800, "starts": 1, "generations": 0, "lags": False, "evaluations": 128, "candidates": 24,
     "committee_size": 4, "tuning_steps": 3, "draws": 2, "tuning_starts": 1,
 }  # fmt: skip
+RIG = """
+dt = 0.05
+[states.angle]
+unit = "rad"
+scale = 3.141592653589793
+[states.rate]
+unit = "rad/s"
+scale = 8.0
+derivative_of = "angle"
+[commands.torque]
+unit = "N m"
+bounds = [-2.0, 2.0]
+[options]
+committee_size = 4
+"""
+"""What a campaign file says of the signals."""
 THOROUGH = {**SMALL, "moves": 1500, "evaluations": 256, "candidates": 32, "tuning_steps": 4}
 """Where it matters that the twin is right."""
 OTHER_GAINS = {**PENDULUM_GAINS, "angle.kp": 1.2}

@@ -48,6 +48,24 @@ def load(
     Raises:
         InvalidInput: no such file, a column that is missing, or something that is no number.
     """
+    t, states, commands = read_log(path, signals, name)
+    return Trajectory(t, states, commands, ended=ended, reason=reason)
+
+
+def read_log(path: str | Path, signals: Signals, name: str | None = None) -> tuple[Floats, Floats, Floats]:
+    """The columns of a log as they stand there, whatever is wrong with them.
+
+    Args:
+        path: of the file.
+        signals: names of the columns, and the order of states and commands.
+        name: what messages call it; None: its path.
+
+    Returns:
+        Times (n + 1,), states (n + 1, n_x) and commands (n, n_u); of an `.npz` file in the shapes that it has.
+
+    Raises:
+        InvalidInput: no such file, a column that is missing, or something that is no number.
+    """
     path = Path(path)
     called = str(path) if name is None else name
     try:
@@ -55,13 +73,11 @@ def load(
         t, states, commands = (
             _arrays(path, called) if path.suffix == ".npz" else _columns(path, called, signals)
         )
-    except OSError as reason_:
+    except OSError as reason:
         raise InvalidInput(
-            f"Log {called}: expected a file, found {reason_.strerror}; check its name."
-        ) from reason_
-    if len(commands) == len(t):
-        commands = commands[:-1]
-    return Trajectory(t, states, commands, ended=ended, reason=reason)
+            f"Log {called}: expected a file, found {reason.strerror}; check its name."
+        ) from reason
+    return t, states, commands[:-1] if len(commands) == len(t) else commands
 
 
 def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:

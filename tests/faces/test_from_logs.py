@@ -8,24 +8,8 @@ import pytest
 import twinloop as tl
 from browser import SIZES, browser, kept, opened, serious
 from command import invoke
-from lives import by_hand
+from lives import RIG, by_hand
 from twinloop.logs import write_columns
-
-RIG = """
-dt = 0.05
-[states.angle]
-unit = "rad"
-scale = 3.141592653589793
-[states.rate]
-unit = "rad/s"
-scale = 8.0
-derivative_of = "angle"
-[commands.torque]
-unit = "N m"
-bounds = [-2.0, 2.0]
-[options]
-committee_size = 4
-"""
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from twinloop.faces.console import Watch
 from twinloop.faces.exporting import export
 from twinloop.faces.from_file import run_file
 from twinloop.faces.from_logs import identify
+from twinloop.faces.log_check import check
 from twinloop.faces.report.command import compare, report
 from twinloop.faces.settings import settings
 from twinloop.faces.stored import resume, show
@@ -204,6 +205,7 @@ def run(
 
 for command in (new, ask, tell, attach, abandon):
     main.add_command(command)
+main.add_command(check)
 main.add_command(identify)
 main.add_command(resume)
 main.add_command(show)

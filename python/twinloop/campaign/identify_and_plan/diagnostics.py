@@ -13,6 +13,7 @@ from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
 
 MOVED = 20.0
 """Standard deviations of its noise that a state must have moved before it is held against its derivative."""
@@ -48,7 +49,8 @@ def doubts(
     Returns:
         Remarks, none where nothing does.
     """
-    said = [*_against_derivatives(experiments, signals), *suspicious(experiments, signals)]
+    recorded = [run.trajectory for run in experiments]
+    said = [*against_derivatives(recorded, signals), *suspicious(recorded, signals)]
     if others:
         said.append(
             serious(
@@ -129,9 +131,14 @@ def other_commands(experiments: Sequence[Experiment]) -> list[int]:
     return found
 
 
-def _against_derivatives(experiments: Sequence[Experiment], signals: Signals) -> Iterator[Remark]:
-    """States that do not change as their declared derivatives say."""
-    runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in experiments]
+def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]:
+    """States that do not change as their declared derivatives say.
+
+    Args:
+        recorded: runs, periodic states among them as they were wrapped.
+        signals: of the system.
+    """
+    runs = [Run.of(run.states, run.commands) for run in recorded]
     noise = guessed_noise(runs, np.array([state.scale for state in signals.states]))
     for i, rate in enumerate(signals.states):
         if rate.derivative_of is None:

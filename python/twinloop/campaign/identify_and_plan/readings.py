@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.campaign.history import Experiment
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
 
 FROZEN = 0.1
 """Share of a run over which a sensor that moved before must give one number to be taken for frozen."""
@@ -21,14 +21,13 @@ WHITE = 1.5
 """Von Neumann's ratio, 2 for white noise and near 0 for what moves smoothly, above which nothing else is seen."""
 
 
-def suspicious(experiments: Sequence[Experiment], signals: Signals) -> Iterator[Remark]:
+def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]:
     """Remarks on readings that no machine gives.
 
     Args:
-        experiments: that were learnt from.
+        runs: that were recorded.
         signals: of the system.
     """
-    runs = [run.trajectory for run in experiments]
     for i, state in enumerate(signals.states):
         frozen = sum(froze(run.states[:, i]) for run in runs)
         if frozen:

@@ -1,0 +1,275 @@
+"""A log looked at before it is told or learnt: its clock, its gaps, and what its columns give away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.identify_and_plan.diagnostics import against_derivatives
+from twinloop.campaign.identify_and_plan.readings import suspicious
+from twinloop.errors import InvalidInput
+from twinloop.identification.records import Run, guessed_noise
+from twinloop.limits import Limits
+from twinloop.remarks import Remark, note, serious
+from twinloop.signals import Signals
+from twinloop.trajectory import JITTER, Trajectory, check_recorded
+
+LOST = 1.5
+"""Periods between two rows from which rows were lost."""
+MOVED = 3.0
+"""Standard deviations of its noise, as guessed from above, that a state must have moved for anything to be learnt."""
+SATURATED = 0.5
+"""Share of the rows at a bound above which a command says little."""
+SMALL = 1e-3
+"""Share of its scale within which a state that moved may be in another unit."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a log.
+
+    Args:
+        name: of the state or command.
+        unit: of it.
+        command: whether it is a command.
+        least: its least value that is a number; None where there is none.
+        greatest: its greatest.
+        missing: rows without a finite number.
+        moved: of a state, root mean square about its mean over the most noise that it can have; None: unknown.
+        at_bound: of a command, share of the rows at a bound.
+        beyond: share of the rows beyond its bounds or its envelope.
+    """
+
+    name: str
+    unit: str
+    command: bool
+    least: float | None
+    greatest: float | None
+    missing: int
+    moved: float | None
+    at_bound: float | None
+    beyond: float | None
+
+
+@dataclass(frozen=True)
+class LogCheck:
+    """What a log is worth.
+
+    Args:
+        rows: of it.
+        seconds: from its first to its last time.
+        period: the median time between two rows, s; None with fewer than two rows.
+        jitter: the largest departure from the declared period where no row was lost, as a share of it.
+        gaps: pairs of rows between which others were lost.
+        longest_gap: s; None without a gap.
+        columns: states, then commands.
+        remarks: what a person should know; a serious one is to be mended first.
+    """
+
+    rows: int
+    seconds: float
+    period: float | None
+    jitter: float | None
+    gaps: int
+    longest_gap: float | None
+    columns: tuple[Column, ...]
+    remarks: tuple[Remark, ...]
+
+    @property
+    def fit(self) -> bool:
+        """Whether nothing serious speaks against learning from it."""
+        return not any(remark.serious for remark in self.remarks)
+
+
+def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> LogCheck:
+    """Looks at a log as it was recorded.
+
+    Args:
+        t: times of the rows (n + 1,), s.
+        states: readings (n + 1, n_x), in the units of the signals.
+        commands: as sent (n, n_u).
+        signals: that they should be.
+    """
+    steps = np.diff(t)
+    known = steps[np.isfinite(steps)]
+    lost = known > LOST * signals.dt
+    near = known[~lost]
+    remarks = [*_of_times(t, known, signals.dt)]
+    columns = (*_states(states, signals), *_commands(commands, signals))
+    remarks += [remark for column in columns for remark in _of_column(column, len(t))]
+    remarks += _of_scales(states, signals)
+    if (
+        np.isfinite(t).all()
+        and np.isfinite(states).all()
+        and np.isfinite(commands).all()
+        and len(commands) > 1
+    ):
+        remarks += _of_run(t, states, commands, signals, bool(remarks and any(r.serious for r in remarks)))
+    return LogCheck(
+        rows=len(t),
+        seconds=float(t[-1] - t[0]) if len(t) else 0.0,
+        period=float(np.median(known)) if len(known) else None,
+        jitter=float(np.abs(near / signals.dt - 1.0).max()) if len(near) else None,
+        gaps=int(lost.sum()),
+        longest_gap=float(known[lost].max()) if lost.any() else None,
+        columns=columns,
+        remarks=tuple(remarks),
+    )
+
+
+def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:
+    if len(t) < 3:
+        yield serious("short", f"The log has {len(t)} rows: at least 3 are needed to learn from.")
+        return
+    if len(steps) < len(t) - 1:
+        yield serious("times", "Some rows have no time: take them out.")
+        return
+    if (steps <= 0.0).any():
+        row = int(np.argmax(steps <= 0.0)) + 1
+        yield serious(
+            "order",
+            f"Time does not go on at row {row + 1}, {t[row]:g} s: sort the rows, and take out what was logged twice.",
+        )
+        return
+    period = float(np.median(steps))
+    if abs(period / dt - 1.0) > JITTER:
+        yield serious(
+            "period",
+            f"Rows are {period:.6g} s apart ({1.0 / period:.4g} Hz), {dt:g} s are declared: thin the log out, declare"
+            " its own period as dt, or look whether t is in s.",
+        )
+        return
+    lost = steps > LOST * dt
+    if lost.any():
+        rows = int(np.rint(steps[lost] / dt - 1.0).sum())
+        first = int(np.argmax(lost))
+        yield serious(
+            "gaps",
+            f"Rows are missing in {int(lost.sum())} place{'s' * (int(lost.sum()) != 1)}, about {rows} in all, the first"
+            f" after {t[first]:g} s: cut the log there and use its parts, or put the rows in.",
+        )
+    worst = float(np.abs(steps[~lost] / dt - 1.0).max(initial=0.0))
+    if worst > JITTER:
+        yield serious(
+            "jitter",
+            f"The time between two rows departs by up to {100.0 * worst:.2g} % from dt; {100.0 * JITTER:g} % are"
+            " allowed. Where the loop only jitters around its period, write even times.",
+        )
+
+
+def _finite(values: Floats) -> tuple[Floats, int]:
+    kept = values[np.isfinite(values)]
+    return kept, len(values) - len(kept)
+
+
+def _ends(values: Floats) -> tuple[float | None, float | None]:
+    return (float(values.min()), float(values.max())) if len(values) else (None, None)
+
+
+def _states(states: Floats, signals: Signals) -> Iterator[Column]:
+    moved: list[float | None] = [None] * signals.n_x
+    if len(states) > 3 and np.isfinite(states).all():
+        run = Run.of(states, np.zeros((len(states) - 1, signals.n_u))).continued(signals)
+        noise = np.sqrt(guessed_noise([run], np.array([state.scale for state in signals.states])))
+        moved = (run.states.std(axis=0) / noise).tolist()
+    for i, state in enumerate(signals.states):
+        kept, missing = _finite(states[:, i])
+        beyond = None
+        if state.envelope is not None and len(kept):
+            low, high = state.envelope
+            beyond = float(((kept < low) | (kept > high)).mean())
+        least, greatest = _ends(kept)
+        yield Column(state.name, state.unit, False, least, greatest, missing, moved[i], None, beyond)
+
+
+def _commands(commands: Floats, signals: Signals) -> Iterator[Column]:
+    for j, command in enumerate(signals.commands):
+        kept, missing = _finite(commands[:, j])
+        low, high = command.bounds
+        near = 1e-9 * (high - low)
+        at_bound = beyond = None
+        if len(kept):
+            at_bound = float(((kept <= low + near) | (kept >= high - near)).mean())
+            beyond = float(((kept < low - near) | (kept > high + near)).mean())
+        least, greatest = _ends(kept)
+        yield Column(command.name, command.unit, True, least, greatest, missing, None, at_bound, beyond)
+
+
+def _of_column(column: Column, rows: int) -> Iterator[Remark]:
+    name = column.name
+    if column.missing:
+        yield serious(
+            "not-a-number",
+            f"{name} has no finite number in {column.missing} of {rows} rows: take these rows out, or cut the log"
+            " there.",
+        )
+        return
+    if column.command:
+        if column.beyond:
+            yield serious(
+                "beyond-bounds",
+                f"{name} is beyond its bounds in {100.0 * column.beyond:.3g} % of the rows ({column.least:g} to"
+                f" {column.greatest:g} {column.unit}): check its unit, and that what was sent was logged, not what was"
+                " asked for.",
+            )
+        elif (column.at_bound or 0.0) > SATURATED and column.least != column.greatest:
+            yield note(
+                "saturated",
+                f"{name} is at a bound in {100.0 * (column.at_bound or 0.0):.3g} % of the rows: what it does in between"
+                " can hardly be learnt.",
+            )
+        return
+    if column.least == column.greatest:
+        yield serious(
+            "still",
+            f"{name} is {column.least:g} {column.unit} in every row: its sensor was off, or not logged.",
+        )
+    elif column.moved is not None and column.moved < MOVED:
+        yield note(
+            "little-moved",
+            f"{name} moved only {column.moved:.2g} times its noise: below {MOVED:g} little can be learnt of it; excite"
+            " it more.",
+        )
+    if column.beyond:
+        yield note(
+            "envelope", f"{name} was outside its envelope in {100.0 * column.beyond:.3g} % of the rows."
+        )
+
+
+def _of_scales(states: Floats, signals: Signals) -> Iterator[Remark]:
+    """Readings that are far from what was declared as usual: most often a unit."""
+    for i, state in enumerate(signals.states):
+        kept, _ = _finite(states[:, i])
+        if not len(kept) or state.periodic:
+            continue
+        most = float(np.abs(kept).max())
+        if most > 2.0 * Limits(signals).states[i]:
+            yield serious(
+                "scale",
+                f"{state.name} reaches {most:.4g} {state.unit}, {most / state.scale:.3g} times its scale: check its"
+                " unit (degrees, milli?), or declare a larger scale.",
+            )
+        elif 0.0 < most < SMALL * state.scale:
+            yield note(
+                "scale",
+                f"{state.name} stays within {most:.3g} {state.unit}, {most / state.scale:.2g} of its scale: check its"
+                " unit.",
+            )
+
+
+def _of_run(t: Floats, states: Floats, commands: Floats, signals: Signals, known: bool) -> Sequence[Remark]:
+    """What is said of a run when it is learnt, and what would refuse it that was not said yet."""
+    try:
+        run = Trajectory(t, states, commands)
+    except InvalidInput as reason:
+        return [] if known else [serious("refused", str(reason))]
+    found = [*against_derivatives([run], signals), *suspicious([run], signals)]
+    if not known:
+        try:
+            check_recorded(run, Limits(signals), None)
+        except InvalidInput as reason:
+            found.append(serious("refused", str(reason)))
+    return found

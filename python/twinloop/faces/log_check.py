@@ -1,0 +1,76 @@
+"""`twinloop check`: whether a log can be learnt from, before it is told."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import click
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.campaign_file import read_signals
+from twinloop.campaign.examination.log_check import LogCheck, check_log
+from twinloop.errors import InvalidInput
+from twinloop.faces.result import plain_dict, to_json
+from twinloop.faces.text import table
+from twinloop.logs import read_log
+
+
+@click.command()
+@click.argument("log", type=Path)
+@click.argument("config", type=Path, metavar="FILE.toml")
+@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+def check(log: Path, config: Path, as_json: bool) -> int:
+    """Look at a LOG, as CSV or .npz, before it is told: its clock, gaps, sensors, commands and units.
+
+    FILE.toml says dt, states and commands, as for a campaign. Exits with 1 where something has to be mended first.
+    """
+    signals, _ = read_signals(config)
+    t, states, commands = read_log(log, signals)
+    name = f"Log {log}"
+    found = check_log(
+        _numbers(f"{name}, t", t, np.shape(t)[:1]),
+        _numbers(f"{name}, states", states, (len(t), signals.n_x)),
+        _numbers(f"{name}, commands", commands, (max(0, len(t) - 1), signals.n_u)),
+        signals,
+    )
+    if as_json:
+        facts = {"file": str(log), "fit": found.fit, **dataclasses.asdict(found)}
+        click.echo(to_json(plain_dict(facts)), nl=False)
+    else:
+        click.echo(_text(log, found), nl=False)
+    return 0 if found.fit else 1
+
+
+def _numbers(what: str, values: Floats, shape: tuple[int, ...]) -> Floats:
+    """What a file of NumPy holds may be of any kind and shape; gaps are what is looked for."""
+    if values.dtype.kind not in "iufb" or values.shape != shape:
+        raise InvalidInput(
+            f"{what}: expected real numbers {shape}, found {values.dtype} {values.shape}; check the file."
+        )
+    return np.asarray(values, dtype=np.float64)
+
+
+def _text(log: Path, found: LogCheck) -> str:
+    rate = (
+        "" if found.period is None else f", one in {1e3 * found.period:.4g} ms ({1.0 / found.period:.4g} Hz)"
+    )
+    lines = [f"{log}: {found.rows} rows over {found.seconds:.4g} s{rate}."]
+    rows = [
+        [
+            column.name,
+            column.unit or "1",
+            column.least,
+            column.greatest,
+            column.moved,
+            None if column.at_bound is None else 100.0 * column.at_bound,
+            None if column.beyond is None else 100.0 * column.beyond,
+        ]
+        for column in found.columns
+    ]
+    head = ["", "unit", "least", "greatest", "moved, in noises", "at a bound (%)", "beyond (%)"]
+    lines += ["", table(head, rows), ""]
+    lines += [f"{'✗' if remark.serious else '○'} {remark.sentence}" for remark in found.remarks]
+    lines.append("It can be learnt from." if found.fit else "Mend what is marked ✗ before it is told.")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,118 @@
+"""`twinloop check`: what is wrong with a log is said before it is told, each fault by its own name."""
+
+import json
+
+import numpy as np
+import pytest
+
+from command import invoke
+from lives import RIG, by_hand
+from twinloop.logs import write_columns
+
+FULL = RIG.replace('derivative_of = "angle"', 'derivative_of = "angle"\nenvelope = [-12.0, 12.0]')
+
+
+@pytest.fixture
+def checked(tmp_path):
+    """What is said of a good log after it was changed."""
+
+    def look(change=lambda log: None, *more):
+        run, noise = by_hand(120, seed=2), np.random.default_rng(1)
+        states = run.states + noise.normal(size=run.states.shape) * [1e-3, 5e-3]
+        log = {"t": run.t, "angle": states[:, 0], "rate": states[:, 1], "torque": run.commands[:, 0]}
+        log = {name: values.copy() for name, values in log.items()}
+        change(log)
+        (tmp_path / "rig.toml").write_text(FULL)
+        write_columns(tmp_path / "flight.csv", log)
+        return invoke("check", str(tmp_path / "flight.csv"), str(tmp_path / "rig.toml"), *more)
+
+    return look
+
+
+def test_nothing_is_said_against_a_good_log(checked):
+    said = checked()
+    assert said.exit_code == 0 and "It can be learnt from." in said.stdout
+    assert "121 rows over 6 s, one in 50 ms (20 Hz)" in said.stdout and "✗" not in said.stdout
+    found = json.loads(checked(lambda log: None, "--json").stdout)
+    assert found["fit"] and found["gaps"] == 0 and found["period"] == pytest.approx(0.05)
+    angle, rate, torque = found["columns"]
+    noise = {"angle": 1e-3, "rate": 5e-3}
+    for column, values in (
+        (angle, by_hand(120, seed=2).states[:, 0]),
+        (rate, by_hand(120, seed=2).states[:, 1]),
+    ):
+        true = values.std() / noise[column["name"]]
+        assert 3.0 < column["moved"] < 1.2 * true  # the noise is guessed from above
+    commands = by_hand(120, seed=2).commands
+    assert torque["at_bound"] == pytest.approx((np.abs(commands) == 2.0).mean()) and torque["beyond"] == 0.0
+
+
+def changed(name, value, rows=slice(None)):
+    def change(log):
+        log[name][rows] = value(log[name][rows]) if callable(value) else value
+
+    return change
+
+
+def without(rows):
+    def change(log):
+        for name, values in log.items():
+            log[name] = np.delete(values, [row for row in rows if row < len(values)])
+
+    return change
+
+
+FAULTS = {
+    "period": (changed("t", lambda t: 1e3 * t), "look whether t is in s"),
+    "gaps": (without([30, 31, 32, 70]), "in 2 places, about 4 in all, the first after 1.45 s"),
+    "jitter": (changed("t", lambda t: t + 0.002 * (np.arange(len(t)) % 2)), "up to 4 %"),
+    "order": (changed("t", 1.0, 50), "row 51"),
+    "not-a-number": (changed("rate", np.nan, 40), "rate has no finite number in 1 of 121 rows"),
+    "still": (changed("rate", 0.25), "0.25 rad/s in every row"),
+    "frozen": (changed("angle", lambda x: x[0], slice(60, 90)), "froze"),
+    "derivative": (changed("rate", lambda x: -x), "declared derivative"),
+    "scale": (changed("angle", lambda x: 1e3 * x), "check its unit"),
+    "beyond-bounds": (changed("torque", lambda u: 100.0 * u), "beyond its bounds"),
+    "short": (without(range(2, 121)), "2 rows"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_called_by_its_name_and_ends_with_one(checked, fault):
+    change, words = FAULTS[fault]
+    said = checked(change)
+    assert said.exit_code == 1 and words in said.stdout and "Mend what is marked" in said.stdout
+    assert fault in {each["code"] for each in json.loads(checked(change, "--json").stdout)["remarks"]}
+
+
+NOTES = {
+    "constant-command": (changed("torque", 1.0), "torque is 1 N m in every row"),
+    "saturated": (changed("torque", lambda u: np.sign(u) * 2.0), "at a bound in 100 %"),
+    "envelope": (changed("rate", lambda x: np.where(np.arange(len(x)) == 60, 13.0, x)), "outside its envelope"),
+    "little-moved": (
+        changed("rate", lambda x: np.random.default_rng(4).normal(size=x.shape)), "little can be learnt of it"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", NOTES)
+def test_what_is_worth_a_look_is_noted(checked, code):
+    change, words = NOTES[code]
+    found = json.loads(checked(change, "--json").stdout)
+    assert {"code": code, "severity": "note"} in [
+        {key: each[key] for key in ("code", "severity")} for each in found["remarks"]
+    ]
+    assert words in checked(change).stdout
+
+
+def test_a_log_without_a_column_and_a_strange_archive_are_misuse(checked, tmp_path):
+    checked()
+    rig = str(tmp_path / "rig.toml")
+    (tmp_path / "other.csv").write_text("t,angle,torque\n0,1,2\n")
+    missing = invoke("check", str(tmp_path / "other.csv"), rig)
+    assert missing.exit_code == 2 and "rate" in missing.stderr
+    np.savez(tmp_path / "x.npz", t=np.zeros(4), states=np.zeros((4, 3)), commands=np.zeros((3, 1)))
+    shaped = invoke("check", str(tmp_path / "x.npz"), rig)
+    assert shaped.exit_code == 2 and "(4, 3)" in shaped.stderr
+    np.savez(tmp_path / "x.npz", t=np.zeros(4), states=np.array([["a"] * 2] * 4), commands=np.zeros((3, 1)))
+    assert invoke("check", str(tmp_path / "x.npz"), rig).exit_code == 2
