@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import twinloop as tl
+from browser import SIZES, browser, kept, opened, serious
 from conftest import PENDULUM_GAINS
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign.certificate import certificate
@@ -224,3 +225,34 @@ def test_exact_readings_leave_rounding_and_that_speaks_against_nobody():
     assert campaign.twin.errors[0].closed_loop < 1e-20
     assert campaign.examine().innovations is None
     assert campaign.checks().twin_passed
+
+
+# In a browser
+
+
+@pytest.fixture(scope="module")
+def pages(flown, tmp_path_factory):
+    """The page of a controller that is granted, and of one that is refused."""
+    pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
+    folder, (_, store) = tmp_path_factory.mktemp("pages"), flown
+    certify(store, folder / "granted")
+    campaign = rig_campaign()
+    campaign.run(plant(), experiments=1)
+    young = tmp_path_factory.mktemp("young") / "young.db"
+    campaign.save(young)
+    certify(young, folder / "refused")
+    return folder
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", ["granted", "refused"])
+def test_the_page_opens_without_a_complaint_and_keeps_nobody_out(pages, name, size):
+    with browser() as chromium, opened(chromium, pages / name / "certificate.html", size) as (page, said):
+        kept(page, f"certificate-{name}-{size}")
+        assert said == [] and serious(page) == []
+        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+        assert wide[0] <= wide[1]
+        assert page.locator("svg").count() == SIGNALS.n_x
+        for drawn in page.locator("svg").all():
+            box = drawn.bounding_box()
+            assert box["width"] > 150 and box["height"] > 60
