@@ -8,7 +8,8 @@ from pathlib import Path
 
 import twinloop as tl
 
-PAGE = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = "\n".join((DOCS / name).read_text(encoding="utf-8") for name in ("api.md", "options.md"))
 ENTRIES = re.findall(r"^::: (\S+)$", PAGE, re.MULTILINE)
 
 ONLY = {
