@@ -1,5 +1,6 @@
 """Whether two values are the same to the last bit, and what another process would read of them."""
 
+import copy
 import dataclasses
 import json
 import math
@@ -42,3 +43,21 @@ def same(a, b):
     if type(a).__module__ == "twinloop._core":
         return type(a) is type(b)  # numbers for the engine, made of what is compared already
     return type(a) is type(b) and a == b
+
+
+def copied(a):
+    """A copy that shares nothing that can change; what the native engine holds never does."""
+    if type(a).__module__ == "twinloop._core":
+        return a
+    if isinstance(a, Pool):
+        return copy.deepcopy(a)
+    if dataclasses.is_dataclass(a):
+        other = copy.copy(a)
+        for field in dataclasses.fields(a):
+            object.__setattr__(other, field.name, copied(getattr(a, field.name)))
+        return other
+    if isinstance(a, dict):
+        return {key: copied(value) for key, value in a.items()}
+    if isinstance(a, list) or type(a) is tuple:
+        return type(a)(copied(value) for value in a)
+    return copy.deepcopy(a)

@@ -9,7 +9,7 @@ from late_sensors import DT as LATE_DT
 from late_sensors import PENDULUM, read, swinging
 from twinloop import _core
 from twinloop.campaign.presets import options_of
-from twinloop.identification.forms import candidates, likeliest, steps_like_euler
+from twinloop.identification.forms import candidates, steps_like_euler
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 
@@ -108,13 +108,6 @@ def test_declared_derivatives_of_a_flow_are_believed_at_once():
 def test_a_form_of_the_options_is_the_form(form):
     found = identified(recorded(flow), signals_of(), form=form)
     assert found.model.form == form and all(remark.code != "form" for remark in found.remarks)
-
-
-def test_a_law_of_a_step_has_to_pay_for_holding_for_that_step_alone():
-    lengths = {"acceleration": 10.0, "increment": 0.0}
-    assert likeliest(("acceleration", "increment"), lengths.__getitem__)[0] == "acceleration"
-    lengths["increment"] = -3.0
-    assert likeliest(("acceleration", "increment"), lengths.__getitem__)[0] == "increment"
 
 
 def test_a_disturbance_that_explains_all_hides_no_form():

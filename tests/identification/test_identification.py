@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from oracles import UNARY, operate, same_bits
+from sameness import same
+from small_plants import fans, gravity, pendulum_like, swung
 from twinloop import _core
 from twinloop.campaign.presets import options_of
-from twinloop.identification.fit.fitting import Fitting
-from twinloop.identification.fit.parts import parts
+from twinloop.identification.fit import fitting
 from twinloop.identification.identify import identify_runs
+from twinloop.identification.proposals.parts import cut
 from twinloop.identification.records import HELD, Run, guessed_noise
 from twinloop.identification.search.structure import all_judged, prices
 from twinloop.identification.sensors.chains import chains
@@ -102,17 +104,17 @@ def test_equal_expressions_are_one_node():
 
 
 @given(pools(), pools())
-def test_what_is_forgotten_is_as_if_it_had_never_been_entered(pool, more):
-    nodes, entered = list(pool.nodes), len(pool)
+def test_a_copy_of_a_pool_grows_as_the_pool_would_and_leaves_it_as_it_was(pool, more):
+    before, again = pool.to_record(), pool.copy()
+    for grown in (again, other := pool.copy()):
+        for number in range(INPUTS, len(more)):
+            grown.rungs[grown.enter(more[number])] = 3
+            grown.found[grown.enter(more[number])] = 1.0
+            grown.length(grown.enter(more[number]))
+    assert pool.to_record() == before
+    assert same(again, other) and again.nodes[: len(pool)] == pool.nodes
     for number in range(INPUTS, len(more)):
-        pool.rungs[pool.enter(more[number])] = 3
-        pool.found[pool.enter(more[number])] = 1.0
-    pool.forget(entered)
-    assert pool.nodes == nodes and len(pool) == entered
-    assert all(number < entered for number in [*pool.rungs, *pool.found])
-    again = Pool(INPUTS)
-    for node in [*nodes, *more.nodes]:
-        assert pool.enter(node) == again.enter(node)
+        assert pool.enter(more[number]) == again.enter(more[number])
 
 
 def test_an_empty_sum_is_zero_and_one_is_one():
@@ -142,14 +144,6 @@ def test_longer_expressions_cost_more_and_what_is_known_elsewhere_its_own_price(
     few, many = (prices(pool, terms, 1000, runs, {terms[4]: 1.25}) for runs in (5, 20))
     np.testing.assert_allclose(few, found)
     np.testing.assert_allclose(many, 8.0**0.5 * found)
-
-
-def pendulum_like():
-    return tl.Signals(
-        [tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 6.0, derivative_of="angle")],
-        [tl.Command("torque", "N m", (-2.0, 2.0), scale=1.0)],
-        0.02,
-    )
 
 
 def test_each_rung_has_the_terms_of_those_below_and_a_stranger_stands_above_all():
@@ -312,25 +306,6 @@ def test_a_first_guess_of_the_noise_is_its_variance_and_never_nothing():
 # Laws of small plants
 
 
-def swung(slope, seed, steps=100, dt=0.02, start=(0.5, 0.0), noise=0.0, amplitude=1.5):
-    """A run of a second-order plant under a command that changes now and then, in fine steps."""
-    stream = np.random.default_rng(seed)
-    commands = np.repeat(stream.uniform(-amplitude, amplitude, (steps // 5 + 1, 1)), 5, axis=0)[:steps]
-    x, states = np.array(start, dtype=float), [np.array(start, dtype=float)]
-    for u in commands[:, 0]:
-        for _ in range(20):
-            h = dt / 20
-            middle = x + 0.5 * h * np.array([x[1], slope(*x, u)])
-            x = x + h * np.array([middle[1], slope(*middle, u)])
-        states.append(x)
-    states = np.array(states)
-    return Run.of(states + noise * stream.normal(size=states.shape), commands)
-
-
-def gravity(angle, rate, torque):
-    return -9.0 * np.sin(angle) - 0.4 * rate + 5.0 * torque
-
-
 def identified(runs, signals, rests=(), workers=WORKERS, seed=0, **changes):
     options = options_of("default", {**FAST, **changes})
     return identify_runs(runs, signals, options, rests=rests, workers=workers, seed=seed)
@@ -423,29 +398,6 @@ def test_a_lag_of_the_actuator_is_found():
     terms = law(found)
     assert set(terms) == {0, 1}
     assert terms[0] == pytest.approx(-0.8, rel=0.1) and terms[1] == pytest.approx(3.0, rel=0.1)
-
-
-def fans(runs, fading, seed=3, noise=1e-3):
-    """Two fans turn a rotor against each other; the air that both have set moving weakens them, and comes to rest."""
-    dt, stream, found = 0.02, np.random.default_rng(seed), []
-    fan = {"unit": "1", "bounds": (0.0, 2.0), "scale": 1.0}
-    signals = tl.Signals(
-        [tl.State("speed", "rad/s", 5.0)],
-        [tl.Command("left", **fan), tl.Command("right", **fan)],
-        dt,
-    )
-    for _ in range(runs):
-        commands = np.repeat(stream.uniform(0.2, 1.8, (15, 2)), 10, axis=0)
-        speed, air, states = 0.0, 0.0, [0.0]
-        for left, right in commands:
-            for _ in range(50):
-                push = 6.0 * (left * left - right * right)
-                air += dt / 50 * (0.5 * (left * left + right * right) - 1.0 - air / 0.8)
-                speed += dt / 50 * (push - 1.5 * speed - fading * air * (left - right))
-            states.append(speed)
-        readings = np.array(states)[:, None]
-        found.append(Run.of(readings + noise * stream.normal(size=readings.shape), commands))
-    return signals, found
 
 
 def test_a_hidden_state_that_commands_fill_is_found():
@@ -549,7 +501,7 @@ def test_a_part_begins_with_the_effects_that_its_commands_have_there():
     signals, [run] = fans(1, fading=3.0)
     whole = Actuation((Actuator(0.06, 1, None), Actuator(0.0, 2, 0.5)))
     effects = _core.command_effects(whole.actuators, (), [1.0, 1.0], signals.dt, run.commands)[0]
-    found = parts(run, signals, whole)
+    found = cut(run, signals, whole)
     assert [len(part.commands) for part, _ in found] == [105, 105, 75, 75]
     for (part, begun), first in zip(found, (0, 45, 0, 75), strict=True):
         rows = slice(first, first + len(part.commands))
@@ -559,9 +511,9 @@ def test_a_part_begins_with_the_effects_that_its_commands_have_there():
         # A delay of periods before the part is not in its commands; a lag goes on from where it was.
         np.testing.assert_allclose(own[2:, 1], effects[rows][2:, 1], rtol=1e-12)
         np.testing.assert_allclose(own[0], effects[rows][0], rtol=1e-12)
-    short = parts(run.part(0, 30), signals, whole)
+    short = cut(run.part(0, 30), signals, whole)
     assert [len(part.commands) for part, _ in short] == [21, 21]
-    assert parts(run.part(0, 20), signals, whole) == []
+    assert cut(run.part(0, 20), signals, whole) == []
 
 
 def test_exact_readings_leave_the_noise_of_rounding_and_members_as_far_apart():
@@ -664,13 +616,13 @@ def test_what_was_learnt_before_is_not_changed_and_the_same_bits_come_again():
 
 def test_a_model_that_a_small_change_makes_diverge_keeps_its_terms(monkeypatch):
     # Then tuning knows no covariance, and nothing can be said of a weight.
-    tune = Fitting.tune
+    tune = fitting.tune
 
-    def without_covariance(self, *arguments, **named):
-        model, left, readings, covariance, draws = tune(self, *arguments, **named)
-        return model, left, readings, covariance[:0], draws
+    def without_covariance(*arguments, **named):
+        fit, draws = tune(*arguments, **named)
+        return replace(fit, covariance=fit.covariance[:0]), draws
 
-    monkeypatch.setattr(Fitting, "tune", without_covariance)
+    monkeypatch.setattr(fitting, "tune", without_covariance)
     stream = np.random.default_rng(5)
     commands = stream.uniform(-1.0, 1.0, (40, 1))
     states = np.zeros((41, 1))

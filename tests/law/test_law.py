@@ -51,15 +51,6 @@ def test_equal_expressions_are_one_node_and_operands_come_first():
     assert all(max(store[number].operands, default=-1) < number for number in range(len(store)))
 
 
-def test_what_is_forgotten_gets_its_number_again():
-    store = Expressions()
-    x = store.input(0)
-    entered = len(store)
-    number = store.add("sin", x)
-    store.forget(entered)
-    assert len(store) == entered and store.add("cos", x) == number and store.add("sin", x) == number + 1
-
-
 def test_an_instruction_may_hold_a_constant_in_front():
     store = Expressions()
     two = store.constant(2.0)

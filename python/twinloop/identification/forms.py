@@ -7,18 +7,22 @@ believed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from twinloop.identification.context import Context
+from twinloop.identification.evidence import STEPPING, strongest
+from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Run
-from twinloop.identification.search.description import shorter
+from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
 from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.starts import FORMS, LAGS_AGAIN, begun
+from twinloop.identification.terms.pool import Pool
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
 
-PRICE = 12.0
-"""What increments must gain in description length: a law of a step holds for that step alone."""
 SURE = 5.0
 """Standard errors from 0 of a share that is believed."""
 WHOLE = 0.15
@@ -81,27 +85,40 @@ def steps_like_euler(runs: Sequence[Run], signals: Signals) -> bool:
     return False
 
 
-def likeliest(forms: Sequence[str], length: Callable[[str], float]) -> tuple[str, list[Remark]]:
-    """The form of the shorter description, with what a person should know of the choice.
+def likeliest(context: Context) -> tuple[str, list[Remark]]:
+    """The form of the shorter description of the runs, with what a person should know of the choice.
 
     Args:
-        forms: to choose from, one or two; the second one has to pay for being the law of a step.
-        length: description length of the readings under a form.
+        context: of the identification.
 
     Returns:
         The form, and a remark where there was a choice.
     """
+    forms = candidates(context.options, context.signals, context.runs)
+    if context.known is not None and len(context.runs) > LAGS_AGAIN and context.known.model.form in forms:
+        forms = (context.known.model.form,)
     if len(forms) == 1:
         return forms[0], []
-    lengths = [length(form) for form in forms]
-    best = int(shorter(lengths[1] + PRICE, lengths[0]))
-    own, other = forms[best], forms[1 - best]
-    gain = lengths[1 - best] - lengths[best]
+    context.watch("form")
+    looks = [brief_look(context, form, FORMS + place) for place, form in enumerate(forms)]
+    best = strongest(looks)
+    return best.form, [_said(best, next(look for look in looks if look is not best))]
+
+
+def brief_look(context: Context, form: str, start: int) -> Hypothesis:
+    """What a short search finds under a form, with what disturbs explained by terms as far as they can."""
+    brief = replace(context.brief(context.runs), as_integrated=True)
+    signals = context.signals
+    pool = Pool(signals.n_x + signals.n_u, len(context.options.operators))
+    return undisturbed(brief, climbed(brief, from_both_sides(brief, begun(brief, form, pool, start))))
+
+
+def _said(best: Hypothesis, other: Hypothesis) -> Remark:
+    gain = other.length - best.length
     than = "longer" if gain > 0.0 else "shorter"
-    said = note(
+    return note(
         "form",
-        f"The form of the law was searched. The readings are described as {MEANINGS[own]} (form {own!r}): as"
-        f" {MEANINGS[other]} (form {other!r}) their description is {abs(gain):.3g} {than},"
-        f" where {PRICE:g} would decide. The option form fixes it.",
+        f"The form of the law was searched. The readings are described as {MEANINGS[best.form]}"
+        f" (form {best.form!r}): as {MEANINGS[other.form]} (form {other.form!r}) their description is"
+        f" {abs(gain):.3g} {than}, where {STEPPING:g} would decide. The option form fixes it.",
     )
-    return own, [said]

@@ -68,12 +68,6 @@ class Expressions:
             self.nodes.append(node)
         return self._numbers[node]
 
-    def forget(self, first: int) -> None:
-        """Takes back all nodes from a number on: what is entered later gets the numbers that it would have had."""
-        for node in self.nodes[first:]:
-            del self._numbers[node]
-        del self.nodes[first:]
-
     def input(self, place: int) -> int:
         """The node of an input, by its place among them."""
         return self.enter(Node(INPUT, (), place))

@@ -9,60 +9,80 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.elementary import exp
-from twinloop.identification.fit.fitting import Fitting
-from twinloop.identification.search.problem import Problem
+from twinloop.identification.context import Context
+from twinloop.identification.fit.models import model_of
+from twinloop.identification.fit.tuning import tune
+from twinloop.identification.hypothesis import Fit, Hypothesis
+from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.noise import exact
 from twinloop.identification.terms.bounds import bounded_solution
 
 PLAUSIBLE = 1.5
 """Multiple of the best model's χ² up to which another structure is a member."""
+ROUNDING = 2.0**-50
+"""Share of a reading that rounding takes of it in a step or two: no model follows it more closely."""
+SEATS = 4
+"""Of so many members one is of a part of the only run."""
 
 
 def committee(
-    problem: Problem,
-    fitting: Fitting,
-    sums: Sequence[Sum],
-    observer: Sequence[Chain],
-    best: _core.Model,
-    others: Sequence[_core.Model] = (),
-) -> list[_core.Model]:
+    context: Context, hypothesis: Hypothesis, fit: Fit, rivals: Sequence[Hypothesis]
+) -> tuple[list[_core.Model], tuple[Chain, ...], bool]:
     """The best model, draws from what the runs leave open of it, and other structures that are nearly as good.
 
     Args:
-        problem: that the sums were found on.
-        fitting: that tunes members.
-        sums: of the best model, with the other subsets of their search.
-        observer: all chains, with their noise.
-        best: the best model, tuned.
-        others: models that were found elsewhere, fewer than there are seats.
+        context: of the identification.
+        hypothesis: that is believed; its sums hold the other subsets of their search.
+        fit: of it.
+        rivals: that were proposed on the way to it; those of parts of the only run have seats.
 
     Returns:
-        At most as many as the options ask for, the best first.
+        At most as many models as the options ask for, the best first; all chains with noise that explains what is left;
+        and whether there are members of parts.
     """
-    size = fitting.options.committee_size - len(others)
-    draw = fitting.unit.stream("structures")
-    members = [best]
-    _, base, readings, _, draws = fitting.tune(best, sums, observer, 0, size)
-    plausible = PLAUSIBLE * max(base, readings)
-    grams = {}
+    observer = _rescaled(hypothesis, fit)
+    seats = context.options.committee_size // SEATS
+    others = [rival.fit.model for rival in rivals if rival.of_part and rival.fit is not None][:seats]
+    size = context.options.committee_size - len(others)
+    base, draws = tune(context, hypothesis, fit.model, observer, 0, size)
+    members = [fit.model, *_structures(context, hypothesis, base, draws, size)]
+    while len(members) < size and draws:
+        members.append(draws.pop())
+    # The others first: gains are tuned on the first few members, and should suit laws that differ, not their constants.
+    members = [members[0], *others, *members[1:]]
+    if hypothesis.offsets.any():
+        # What flies them from here on is read as the runs were.
+        members = [member.with_offsets(hypothesis.offsets.tolist()) for member in members]
+    return members, observer, bool(others)
+
+
+def _structures(
+    context: Context, hypothesis: Hypothesis, base: Fit, draws: list[_core.Model], size: int
+) -> list[_core.Model]:
+    """Members of subsets drawn by how likely they are; where the best one's is drawn, its next constants."""
+    problem, draw = posed(context, hypothesis), context.unit.stream("structures")
+    plausible = PLAUSIBLE * max(base.left, base.readings)
+    members: list[_core.Model] = []
+    grams: dict[tuple[int, tuple[int, ...]], _core.Gram] = {}
     for attempt in range(3 * size):
-        if len(members) >= size:
+        if len(members) + 1 >= size:
             break
-        structures = [_other(found, draw) for found in sums]
+        structures = [_other(found, draw) for found in hypothesis.sums]
         if all(s is None for s in structures):
             if draws:
                 members.append(draws.pop())
             continue
         varied = []
-        for i, (found, subset) in enumerate(zip(sums, structures, strict=True)):
+        for i, (found, subset) in enumerate(zip(hypothesis.sums, structures, strict=True)):
             if subset is None:
                 varied.append(found)
                 continue
             terms = problem.usable(subset)
             if (i, subset) not in grams:
                 regression = problem.regression(found.chain, terms)
-                grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, fitting.workers)
+                grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, context.workers)
             limits = problem.limits(found.chain, terms)
             solved = bounded_solution(grams[i, subset], range(len(terms)), limits)
             if solved is None:
@@ -70,14 +90,25 @@ def committee(
             else:
                 weights = dict(zip(terms, solved[0].tolist(), strict=True))
                 varied.append(replace(found, weights=weights))
-        model = fitting.model(varied, fitting.actuation(best))
-        _, left, _, _, drawn = fitting.tune(model, varied, observer, 4, 1, number=attempt + 1)
-        if np.isfinite(left) and left <= plausible and drawn:
+        other = replace(hypothesis, sums=tuple(varied), fit=None)
+        fit, drawn = tune(context, other, model_of(context, other), base.observer, 4, 1, number=attempt + 1)
+        if fit.lasts and fit.left <= plausible and drawn:
             members.append(drawn[0])
-    while len(members) < size and draws:
-        members.append(draws.pop())
-    # The others first: gains are tuned on the first few members, and should suit laws that differ, not their constants.
-    return [best, *others, *members[1:]]
+    return members
+
+
+def _rescaled(hypothesis: Hypothesis, fit: Fit) -> tuple[Chain, ...]:
+    """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
+    misfit = fit.left / max(1, fit.readings) if fit.lasts else 1.0
+    factor = misfit if exact(misfit) else max(misfit, 1.0)
+    sizes = np.max([np.abs(run.states).max(axis=0) for run in hypothesis.runs], axis=0)
+    scaled = []
+    for chain in fit.observer:
+        least = np.square(ROUNDING * sizes[list(chain.states)])
+        sensors = np.where(least > 0.0, np.maximum(chain.sensors * factor, least), chain.sensors)
+        motion = (chain.motion[0] * factor, chain.motion[1] * factor, chain.motion[2])
+        scaled.append(chain.with_noise(sensors, motion))
+    return tuple(scaled)
 
 
 def _other(found: Sum, draw: _core.Stream) -> tuple[int, ...] | None:

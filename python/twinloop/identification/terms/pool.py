@@ -104,12 +104,13 @@ class Pool(Expressions, Recorded, kind="pool"):
         nodes = (self.constant(each) if isinstance(each, float) else each for each in operands)
         return super().add(operation, *nodes)
 
-    def forget(self, first: int) -> None:
-        """Takes back all nodes from a number on: what is entered later gets the numbers that it would have had."""
-        super().forget(first)
-        self.rungs = {number: rung for number, rung in self.rungs.items() if number < first}
-        self.found = {number: price for number, price in self.found.items() if number < first}
-        self._lengths = {number: length for number, length in self._lengths.items() if number < first}
+    def copy(self) -> Pool:
+        """The same expressions by the same numbers; what is entered in one of the two does not show in the other."""
+        other = Pool(self.inputs, self.operations)
+        other.nodes, other._numbers = list(self.nodes), dict(self._numbers)
+        other.rungs, other.found = dict(self.rungs), dict(self.found)
+        other._lengths = dict(self._lengths)
+        return other
 
     def rung(self, numbers: Iterable[int]) -> int:
         """The highest rung of the ladder that some terms stand on; one above all for what was evolved."""

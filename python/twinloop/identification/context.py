@@ -1,0 +1,67 @@
+"""Context: what an identification is given; it stays the same while hypotheses come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.identification.identified import Identified
+from twinloop.identification.records import Run
+from twinloop.identification.settings import IdentificationOptions
+from twinloop.limits import Limits
+from twinloop.signals import Signals
+from twinloop.streams import Unit
+
+
+def _silent(step: str) -> None:
+    """Tells nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What every proposal may read.
+
+    Args:
+        runs: as they were recorded, at least one.
+        signals: of the system.
+        options: of the identification.
+        unit: of work; what is drawn for a hypothesis is a part of it.
+        workers: how the work is carried out.
+        rests: commands whose effect may be there at the start of a run (n_u,).
+        known: what was learnt from fewer runs.
+        watch: called with the name of each step.
+        as_integrated: whether chains on increments bear what integration leaves, too: where forms are compared, what a
+            derivative could not show is no evidence for them.
+    """
+
+    runs: Sequence[Run]
+    signals: Signals
+    options: IdentificationOptions
+    unit: Unit
+    workers: _core.Workers
+    rests: Sequence[Floats] = ()
+    known: Identified | None = None
+    watch: Callable[[str], None] = _silent
+    as_integrated: bool = False
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Where a simulated run counts as diverged."""
+        return Limits(self.signals, self.options.divergence_factor)
+
+    @property
+    def may_hide(self) -> bool:
+        """Whether a hidden state is looked for: in one run it is a function of time, and that may be anything."""
+        return self.options.hidden and len(self.runs) > 1
+
+    def under(self, form: str) -> Context:
+        """The same once a form is believed: what was known under another one is no help."""
+        known = self.known if self.known is not None and self.known.model.form == form else None
+        return replace(self, known=known)
+
+    def brief(self, runs: Sequence[Run]) -> Context:
+        """The same for a short look at some runs, of which nothing is known."""
+        return replace(self, runs=runs, options=self.options.brief(), known=None, watch=_silent)

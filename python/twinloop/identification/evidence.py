@@ -1,0 +1,82 @@
+"""Evidence: what the readings say for a hypothesis. Here, and nowhere else, two hypotheses are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from twinloop.identification.search.description import shorter
+from twinloop.law.actuation import Actuation
+
+LAGGING = 12.0
+"""What a lag or a delay must gain in description length: its number, and the choice of having one."""
+HIDING = 30.0
+"""What a hidden state must gain: its time, its kind, and what a search may find by luck."""
+STEPPING = 12.0
+"""What increments must gain: a law of a step holds for that step alone."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the readings say for a hypothesis: first how far it was worked out, then how briefly it describes them.
+
+    Description lengths of the same stage compare; those of different stages do not, for they are of other features.
+
+    Args:
+        aligned: whether lags and delays of its inputs were searched, or are known.
+        fitted: whether its constants were tuned on predictions.
+        lasts: whether its model stays near its own runs; where that is not known yet it is taken to.
+        smoothed: whether its terms were selected on states that a model has smoothed.
+        length: description length of the readings: −2 log of their likelihood, the price of its terms, and that of
+            what else it holds (`price`).
+    """
+
+    aligned: bool
+    fitted: bool
+    lasts: bool
+    smoothed: bool
+    length: float
+
+    @property
+    def stage(self) -> tuple[bool, ...]:
+        """How far it was worked out; what runs away is worth nothing, however its terms were selected."""
+        return self.aligned, self.fitted, self.lasts, self.lasts and self.smoothed
+
+    def beats(self, other: Evidence) -> bool:
+        """Whether this hypothesis is believed rather than the other; of two that run away neither is."""
+        if self.stage != other.stage:
+            return self.stage > other.stage
+        return self.lasts and shorter(self.length, other.length)
+
+
+class Judged(Protocol):
+    """Anything with evidence."""
+
+    @property
+    def evidence(self) -> Evidence:
+        """What the readings say for it."""
+
+
+Hypotheses = TypeVar("Hypotheses", bound=Judged)
+
+
+def strongest(hypotheses: Iterable[Hypotheses]) -> Hypotheses:
+    """The first of some hypotheses, at least one, that none of those after it beats."""
+    several = iter(hypotheses)
+    best = next(several)
+    for hypothesis in several:
+        if hypothesis.evidence.beats(best.evidence):
+            best = hypothesis
+    return best
+
+
+def price(form: str, actuation: Actuation) -> float:
+    """What a hypothesis pays for besides its terms, in units of χ².
+
+    Args:
+        form: what its outputs mean.
+        actuation: between commands and its law.
+    """
+    lagging = not all(actuator.direct for actuator in actuation.actuators)
+    return STEPPING * (form == "increment") + LAGGING * lagging + HIDING * bool(actuation.hidden)

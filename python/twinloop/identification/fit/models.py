@@ -1,0 +1,74 @@
+"""Models of sums: which constants a model has, which of them may move, and within which bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from twinloop import _core
+from twinloop.errors import engine_input
+from twinloop.identification.context import Context
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.terms.bounds import Limits
+from twinloop.signals import Bounds
+
+
+def model_of(context: Context, hypothesis: Hypothesis) -> _core.Model:
+    """The model whose outputs are a hypothesis' sums; without hidden states that no sum uses."""
+    pool, actuation = hypothesis.pool, hypothesis.actuation
+    if not any(pool.is_hidden(term) for found in hypothesis.sums for term in found.weights):
+        actuation = actuation.bare()
+    outputs = [dict.fromkeys(_fixed(hypothesis, found), 1.0) | found.weights for found in hypothesis.sums]
+    if hypothesis.form == "absolute":
+        for i, terms in enumerate(outputs):
+            terms[i] = terms.get(i, 0.0) + 1.0
+    program = pool.program_of_sums(outputs, len(actuation.hidden))
+    with engine_input():
+        return _core.Model(
+            program, hypothesis.form, context.signals.engine, actuation.actuators, actuation.hidden
+        )
+
+
+def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:
+    """Which of a model's constants may move, and which are the weights of each output.
+
+    Constants inside nodes come first, then, output after output, a 1 for each known node and the weights.
+    """
+    pool, absolute = hypothesis.pool, hypothesis.form == "absolute"
+    known = [node for nodes in hypothesis.candidates.told.fixed.values() for node in nodes]
+    used = [term for found in hypothesis.sums for term in found.weights if term != pool.one]
+    held = pool.held([*used, *known])
+    kept = {pool.one, *pool.needed(known)}
+    free = [place for place, node in enumerate(held) if node not in kept]
+    place, weights = len(held), []
+    for output, found in enumerate(hypothesis.sums):
+        place += len(_fixed(hypothesis, found))
+        weights.append(range(place, place + len(found.weights)))
+        free += weights[-1]
+        place += len(found.weights)
+        # The state itself, where the output is the next one.
+        place += absolute and output not in found.weights
+    return free, weights
+
+
+def limits_of(hypothesis: Hypothesis) -> dict[int, Bounds]:
+    """Bounds by place among a model's constants."""
+    limits: dict[int, Bounds] = {}
+    for found, places in zip(hypothesis.sums, layout(hypothesis)[1], strict=True):
+        bounds = bounds_of(hypothesis, found)
+        for place, term in zip(places, found.weights, strict=True):
+            if term in bounds:
+                itself = float(hypothesis.form == "absolute" and term == found.chain.states[0])
+                low, high = bounds[term]
+                limits[place] = (low + itself, high + itself)
+    return limits
+
+
+def bounds_of(hypothesis: Hypothesis, found: Sum) -> Limits:
+    """Bounds of a sum's coefficients, by node."""
+    return hypothesis.candidates.told.bounds.get(found.chain.states[0], {})
+
+
+def _fixed(hypothesis: Hypothesis, found: Sum) -> Sequence[int]:
+    """Nodes that are known to drive what a sum drives."""
+    return hypothesis.candidates.told.fixed.get(found.chain.states[0], ())

@@ -1,0 +1,75 @@
+"""Tuning: constants and lags of a model on its predictions, within bounds, and draws of what the runs leave open."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.errors import engine_input
+from twinloop.identification.context import Context
+from twinloop.identification.fit.models import layout, limits_of
+from twinloop.identification.hypothesis import Fit, Hypothesis
+from twinloop.identification.inputs.actuation import groups
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.terms.bounds import bounded_model
+from twinloop.law.actuation import Actuation
+
+
+def tune(
+    context: Context,
+    hypothesis: Hypothesis,
+    model: _core.Model,
+    observer: Sequence[Chain],
+    steps: int,
+    draws: int = 0,
+    number: int = 0,
+) -> tuple[Fit, list[_core.Model]]:
+    """A model tuned on its predictions; a constant that leaves its bounds is held at the nearer one.
+
+    Args:
+        context: of the identification.
+        hypothesis: whose sums the model is made of, and on whose runs it is tuned.
+        model: to begin with.
+        observer: all chains, with their noise.
+        steps: at most.
+        draws: models to be drawn from what the runs leave open.
+        number: of the call, which tells its draws from those of others.
+
+    Returns:
+        The fit, and the draws.
+    """
+    signals, tuning = context.signals, context.options.tuning
+    free = list(range(len(model.constants))) if hypothesis.form == "absolute" else layout(hypothesis)[0]
+    actuation = Actuation.of(model, signals)
+    lags = [group for group in groups(signals) if actuation.actuators[group[0]].lag > 0.0]
+    lags += [[signals.n_u + j] for j in range(len(actuation.hidden))]
+    limits = limits_of(hypothesis) if tuning else {}
+    # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
+    start = model.constants.tolist()
+    held = {place for place, bounds in limits.items() if steps == 0 and start[place] in bounds}
+    for turn in itertools.count():
+        with engine_input():
+            tuned, left, readings, covariance, drawn = _core.tune(
+                model,
+                context.limits.engine,
+                [chain.engine for chain in observer],
+                [(run.states, run.weights, run.commands) for run in hypothesis.runs],
+                free=[place for place in free if place not in held] if tuning else [],
+                lags=lags if tuning else [],
+                iterations=steps,
+                draws=draws,
+                unit=context.unit.part(number, turn).named("members") if draws else None,
+                workers=context.workers,
+            )
+        model, beyond = bounded_model(tuned, limits)
+        if not beyond:
+            break
+        held |= beyond
+    if covariance.size:
+        for place in (place for place, constant in enumerate(free) if constant in held):
+            covariance = np.insert(np.insert(covariance, place, 0.0, axis=0), place, 0.0, axis=1)
+    fit = Fit(tuned, tuple(observer), left, readings, covariance)
+    return fit, [bounded_model(one, limits)[0] for one in drawn]

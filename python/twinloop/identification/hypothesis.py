@@ -1,0 +1,103 @@
+"""Hypothesis: all that is believed of a system at one point of its identification, as one value."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.identification.evidence import Evidence, price
+from twinloop.identification.records import Run
+from twinloop.identification.search.structure import Sum, total
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.terms.candidates import Candidates
+from twinloop.identification.terms.pool import Pool
+from twinloop.law.actuation import Actuation
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model whose constants were tuned on predictions.
+
+    Args:
+        model: the tuned one.
+        observer: all chains, with the noise under which its predictions were made.
+        left: χ² of the whitened prediction errors; infinite where the model runs away from its own runs.
+        readings: that counted.
+        covariance: of the constants and lags that were free; empty where a small change makes the model diverge.
+    """
+
+    model: _core.Model
+    observer: tuple[Chain, ...]
+    left: float
+    readings: int
+    covariance: Floats
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the model stays near its own runs."""
+        return bool(np.isfinite(self.left))
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """What is believed. A proposal makes others of it by `replace`; nothing in it ever changes.
+
+    Args:
+        form: what outputs mean.
+        offsets: by how much later than those of the driven states each state's readings were taken from it (n_x,), s.
+        runs: the records as they are read under it: moved by the offsets, with outliers weighed 0, and with the states
+            that features are made of, once a model has smoothed them.
+        actuation: lags, delays and hidden states between commands and the law.
+        candidates: the terms to choose from.
+        driven: chains that outputs drive, with a first guess of their noise.
+        given: chains that other states drive, with their noise.
+        sums: terms that drive each of `driven`, with the noise under which they were found.
+        modest: sums that were found with the noise from above, for where `sums` run away.
+        fit: the model of the sums; None until it is tuned.
+        aligned: whether lags and delays were searched, or are known.
+        smoothed: whether the states in `runs` were smoothed by a model.
+        of_part: whether a part of the only run has led to it.
+        start: number of the start that has led to it; what it draws is a part of the unit of work of that number.
+        searches: how many searches have led to it; the next one draws from the next part of that unit.
+    """
+
+    form: str
+    offsets: Floats
+    runs: tuple[Run, ...]
+    actuation: Actuation
+    candidates: Candidates
+    driven: tuple[Chain, ...]
+    given: tuple[Chain, ...]
+    start: int
+    sums: tuple[Sum, ...] = ()
+    modest: tuple[Sum, ...] = ()
+    fit: Fit | None = None
+    aligned: bool = False
+    smoothed: bool = False
+    of_part: bool = False
+    searches: int = 0
+
+    @property
+    def pool(self) -> Pool:
+        """Of all expressions; whoever enters more does so in a copy (`Candidates.growing`)."""
+        return self.candidates.pool
+
+    @property
+    def length(self) -> float:
+        """Description length of the sums."""
+        return total(self.sums)
+
+    @property
+    def evidence(self) -> Evidence:
+        """What the readings say for it."""
+        lasts = self.fit is None or self.fit.lasts
+        length = self.length + price(self.form, self.actuation)
+        return Evidence(self.aligned, self.fit is not None, lasts, self.smoothed, length)
+
+    def searched(self, sums: Sequence[Sum]) -> Hypothesis:
+        """The same with what one more search has found, which nobody has fitted yet."""
+        return replace(self, sums=tuple(sums), searches=self.searches + 1, fit=None)

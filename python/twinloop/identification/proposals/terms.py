@@ -1,0 +1,23 @@
+"""Terms of all rungs and evolved ones, and the model that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from twinloop.identification.context import Context
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.selection import climbed
+
+
+def terms(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The hypothesis with the best sums of all rungs, fitted; where it runs away, one that began from above, too."""
+    if hypothesis.fit is not None:
+        return
+    context.watch("terms")
+    found = fitted(context, climbed(context, hypothesis))
+    yield found
+    if not found.evidence.lasts:
+        # A short description that runs away is none: the one from above is more modest.
+        yield fitted(context, climbed(context, replace(hypothesis, sums=hypothesis.modest)))

@@ -1,0 +1,124 @@
+"""Starts: the hypotheses that a search begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twinloop.identification.context import Context
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.identified import Identified
+from twinloop.identification.proposals.hidden import with_hidden
+from twinloop.identification.records import guessed_noise
+from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.chains import chains
+from twinloop.identification.sensors.noise import declared_noise, given_noise, kinematic_noise
+from twinloop.identification.sensors.offsets import moved, search_offsets
+from twinloop.identification.terms.candidates import Candidates
+from twinloop.identification.terms.pool import Pool
+from twinloop.law.actuation import Actuation
+
+LAGS_AGAIN = 4
+"""Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
+ANEW, PARTS, RENEWED, FORMS = 0, 1, 10, 100
+"""Numbers of starts, by which what one draws is told from what others draw: whole runs anew, the first part of the only
+run, what was known, the first form; those of further parts and forms follow."""
+
+
+def starts(context: Context, form: str) -> Iterator[Hypothesis]:
+    """What the search begins with: the runs anew, and what was known of fewer of them.
+
+    Args:
+        context: of the identification.
+        form: what outputs mean.
+    """
+    aligned = with_offsets(context, begun(context, form, _first_pool(context), ANEW))
+    yield anew(context, aligned)
+    if context.known is not None and context.known.actuation.hidden:
+        # What is hidden shows when terms are nearly right, and these when it shows.
+        yield renewed(context, context.known, aligned)
+
+
+def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
+    """Nothing but candidates and a first guess of the noise.
+
+    Args:
+        context: of the identification.
+        form: what outputs mean.
+        pool: that candidates are entered in; nobody else's.
+        start: its number.
+    """
+    signals, options, runs = context.signals, context.options, tuple(context.runs)
+    every = chains(signals, form, guessed_noise(runs, np.array([state.scale for state in signals.states])))
+    again = context.known is None or len(runs) <= LAGS_AGAIN
+    seen = [node for node in _known_terms(context) if not pool.is_hidden(node)]
+    return Hypothesis(
+        form=form,
+        offsets=np.zeros(signals.n_x),
+        runs=runs,
+        actuation=Actuation.direct(signals),
+        candidates=Candidates.of(pool, signals, options, form, seen),
+        driven=tuple(declared_noise(chain, signals) for chain in every if chain.output is not None),
+        given=tuple(given_noise(chain, signals) for chain in every if chain.output is None),
+        start=start,
+        aligned=not (options.lags and again),
+    )
+
+
+def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis with runs as they would have been read had all sensors been read at once."""
+    signals, runs, known = context.signals, context.runs, context.known
+    offsets = hypothesis.offsets
+    if context.options.offsets and known is not None and len(runs) > LAGS_AGAIN:
+        offsets = known.offsets
+    elif context.options.offsets:
+        scales = np.array([state.scale for state in signals.states])
+        every = [*hypothesis.driven, *hypothesis.given]
+        offsets = search_offsets(runs, signals, every, scales, context.workers)
+    at_once = tuple(moved(runs, signals, offsets))
+    given = tuple(kinematic_noise(chain, at_once, signals) for chain in hypothesis.given)
+    return replace(hypothesis, offsets=offsets, runs=at_once, given=given)
+
+
+def anew(context: Context, aligned: Hypothesis) -> Hypothesis:
+    """Noise and terms searched anew, with lags as they were known to begin with."""
+    known = context.known
+    if known is None:
+        return from_both_sides(context, aligned)
+    sums = [_without_hidden(found, aligned.pool) for found in known.sums]
+    return from_both_sides(context, replace(aligned, actuation=known.actuation.bare()), sums)
+
+
+def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothesis:
+    """What was known with its hidden state, tuned on all runs."""
+    begins = replace(
+        aligned,
+        actuation=known.actuation,
+        candidates=with_hidden(context, aligned.candidates),
+        sums=tuple(replace(found, others=[]) for found in known.sums),
+        aligned=True,
+        start=RENEWED,
+    )
+    return fitted(context, begins)
+
+
+def _first_pool(context: Context) -> Pool:
+    """A pool of the search's own: what it enters must not change what was known."""
+    signals = context.signals
+    if context.known is not None:
+        return context.known.pool.copy()
+    return Pool(signals.n_x + signals.n_u, len(context.options.operators))
+
+
+def _known_terms(context: Context) -> Sequence[int]:
+    return [] if context.known is None else [node for found in context.known.sums for node in found.weights]
+
+
+def _without_hidden(found: Sum, pool: Pool) -> Sum | None:
+    """A sum without terms of a hidden state; None where nothing is left of it."""
+    weights = {node: weight for node, weight in found.weights.items() if not pool.is_hidden(node)}
+    return None if found.weights and not weights else replace(found, weights=weights, others=[])

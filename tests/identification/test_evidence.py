@@ -1,0 +1,79 @@
+"""Evidence puts hypotheses in an order, and what they hold beside terms has to pay."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, Evidence, price, strongest
+from twinloop.identification.identify import Found
+from twinloop.identification.search.description import TIE
+from twinloop.law.actuation import Actuation, Actuator, HiddenState
+
+LENGTHS = st.one_of(st.floats(-1e4, 1e4), st.sampled_from([0.0, 0.5 * TIE, 2.0 * TIE, -0.5 * TIE]))
+EVIDENCE = st.builds(Evidence, st.booleans(), st.booleans(), st.booleans(), st.booleans(), LENGTHS)
+AT_ONCE, LATE = Actuation((Actuator(), Actuator())), Actuation((Actuator(), Actuator(0.1, 0, None)))
+CLIMB = (HiddenState((0, 1), True, None, 2.0),)
+
+
+@given(EVIDENCE, EVIDENCE, EVIDENCE)
+def test_to_beat_is_a_strict_order(one, two, three):
+    assert not one.beats(one)
+    assert not (one.beats(two) and two.beats(one))
+    if one.beats(two) and two.beats(three):
+        assert one.beats(three)
+
+
+class Named:
+    def __init__(self, name, evidence):
+        self.name, self.evidence = name, evidence
+
+
+@given(st.lists(EVIDENCE, min_size=1, max_size=6))
+def test_nobody_beats_the_strongest_and_it_is_the_first_of_its_kind(several):
+    named = [Named(i, evidence) for i, evidence in enumerate(several)]
+    best = strongest(named)
+    assert not any(other.evidence.beats(best.evidence) for other in named)
+    assert best.name == 0 or best.evidence.beats(named[0].evidence)
+    # What does not beat it may as well not have been proposed, wherever it stood behind.
+    assert strongest([best, *(other for other in named if other is not best)]) is best
+
+
+def evidence(length=0.0, **changes):
+    known = {"aligned": True, "fitted": True, "lasts": True, "smoothed": False, "length": length}
+    return Evidence(**{**known, **changes})
+
+
+def test_what_runs_away_beats_nothing_that_was_fitted_and_what_lasts_beats_it():
+    away = evidence(-1e9, lasts=False)
+    assert evidence(1e9).beats(away) and not away.beats(evidence(1e9))
+    assert not away.beats(evidence(0.0, lasts=False)) and not evidence(0.0, lasts=False).beats(away)
+    assert not evidence(-1e9, lasts=False, smoothed=True).beats(away)
+
+
+def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
+    assert evidence(5.0, smoothed=True).beats(evidence(0.0))
+    assert evidence(-1.0, smoothed=True).beats(evidence(0.0, smoothed=True))
+    assert not evidence(1.0, smoothed=True).beats(evidence(0.0, smoothed=True))
+
+
+@pytest.mark.parametrize(
+    ("form", "actuation", "expected"),
+    [
+        ("acceleration", AT_ONCE, 0.0),
+        ("absolute", AT_ONCE, 0.0),
+        ("increment", AT_ONCE, STEPPING),
+        ("acceleration", LATE, LAGGING),
+        ("acceleration", Actuation(LATE.actuators, CLIMB), LAGGING + HIDING),
+        ("increment", Actuation(AT_ONCE.actuators, CLIMB), STEPPING + HIDING),
+    ],
+)
+def test_what_is_there_beside_terms_is_paid_for(form, actuation, expected):
+    assert price(form, actuation) == expected
+
+
+def test_rounding_alone_decides_nothing():
+    lengths = -1e5 + TIE * np.linspace(-0.4, 0.4, 5)
+    named = [Named(i, evidence(length)) for i, length in enumerate(lengths)]
+    assert strongest(named).name == 0
+    assert Found(named[3]).evidence is named[3].evidence

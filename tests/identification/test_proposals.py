@@ -1,0 +1,148 @@
+"""A proposal is a function of what it is given: it changes nothing, and gives the same again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sameness import copied, same
+from small_plants import fans, gravity, pendulum_like, swung
+from twinloop import _core
+from twinloop.campaign.presets import options_of
+from twinloop.identification.context import Context
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.identify import PROPOSALS, Found, decided, identify_runs, searched
+from twinloop.identification.proposals import terms as terms_file
+from twinloop.identification.proposals.hidden import hidden
+from twinloop.identification.proposals.lags import lags
+from twinloop.identification.proposals.parts import parts
+from twinloop.identification.proposals.second_look import second_look
+from twinloop.identification.proposals.terms import terms
+from twinloop.identification.search.selection import climbed, from_both_sides
+from twinloop.identification.starts import RENEWED, starts
+from twinloop.streams import Unit
+
+WORKERS = _core.Workers(1)
+QUICK = {"moves": 2000, "starts": 2, "generations": 2, "population": 30, "committee_size": 4, "passes": 3}
+NAMES = [proposal.__name__ for proposal in PROPOSALS]
+
+
+def context_of(signals, runs, rests=(), known=None, watch=None, **changes):
+    options = options_of("default", {**QUICK, **changes})
+    said = [] if watch is None else watch
+    return Context(
+        runs, signals, options, Unit(3, (len(runs),)), WORKERS, rests=rests, known=known, watch=said.append
+    )
+
+
+def pendulum(count=1, **changes):
+    runs = [swung(gravity, seed, noise=1e-3) for seed in range(count)]
+    return context_of(pendulum_like(), runs, **changes)
+
+
+def two_fans(count=3, fading=3.0, **changes):
+    signals, runs = fans(count, fading=fading)
+    return context_of(signals, runs, rests=[np.ones(2)], **changes)
+
+
+def start_of(context):
+    return next(iter(starts(context, "acceleration")))
+
+
+@pytest.mark.parametrize("context", [pendulum(1), pendulum(2), two_fans(3)], ids=["one", "two", "fans"])
+def test_no_proposal_changes_what_it_is_given_and_each_gives_the_same_again(context):
+    found, proposed = Found(start_of(context)), []
+    for propose in PROPOSALS:
+        before = copied(found)
+        once, again = (list(propose(context, found.best)) for _ in range(2))
+        assert same(found, before) and same(once, again)
+        proposed += [propose.__name__] * bool(once)
+        found = decided(found, once)
+    assert found.best.evidence.stage == (True, True, True, True)
+    assert proposed == (["lags", "terms", "second_look"] + ["parts"] * (len(context.runs) == 1)) or (
+        proposed == ["lags", "hidden", "terms", "second_look"] and found.best.actuation.hidden
+    )
+
+
+@pytest.mark.parametrize("step", [start_of, lambda context: fitted(context, start_of(context))])
+def test_steps_of_a_search_change_nothing_either(step):
+    context = pendulum(2)
+    hypothesis = step(context)
+    before = copied(hypothesis)
+    for work in (from_both_sides, climbed, fitted):
+        once, again = work(context, hypothesis), work(context, hypothesis)
+        assert same(hypothesis, before) and same(once, again)
+
+
+def test_what_finds_nothing_changes_nothing_wherever_it_is_proposed():
+    context = pendulum(2)
+    start = start_of(context)
+
+    def silent(context, hypothesis):
+        return []
+
+    def longer(context, hypothesis):
+        more = (replace(found, energy=found.energy + 1.0) for found in hypothesis.sums)
+        return [hypothesis, replace(hypothesis, sums=tuple(more))]
+
+    plain = searched(context, start).best
+    for place in range(len(PROPOSALS) + 1):
+        for idle in (silent, longer):
+            several = (*PROPOSALS[:place], idle, *PROPOSALS[place:])
+            assert same(searched(context, start, several).best, plain)
+
+
+def test_where_nothing_is_hidden_it_does_not_matter_when_that_is_looked_for():
+    context = two_fans(2, fading=0.0)
+    start = start_of(context)
+    orders = [(lags, hidden, terms), (hidden, lags, terms), (lags, hidden, hidden, terms), (lags, terms)]
+    plain, *others = (searched(context, start, order).best for order in orders)
+    assert plain.actuation.hidden == () and all(same(other, plain) for other in others)
+
+
+def test_what_an_option_switches_off_or_is_done_already_is_not_proposed():
+    context = pendulum(2, lags=False, hidden=False, parts=False, passes=1)
+    start = start_of(context)
+    assert start.aligned and not any(list(propose(context, start)) for propose in (lags, hidden))
+    model = searched(context, start).best
+    assert model.fit is not None and not model.smoothed
+    assert [
+        name for name, propose in zip(NAMES, PROPOSALS, strict=True) if list(propose(context, model))
+    ] == []
+    assert list(parts(pendulum(2), model)) == [] and list(second_look(pendulum(2), start)) == []
+
+
+def test_where_the_shortest_runs_away_the_modest_one_is_proposed_too(monkeypatch):
+    context, tried = pendulum(2), []
+    start = start_of(context)
+
+    def runs_away_once(context, hypothesis):
+        found = fitted(context, hypothesis)
+        tried.append(hypothesis)
+        return replace(found, fit=replace(found.fit, left=np.inf)) if len(tried) == 1 else found
+
+    monkeypatch.setattr(terms_file, "fitted", runs_away_once)
+    aligned = decided(Found(start), lags(context, start)).best
+    found = decided(Found(aligned), terms(context, aligned))
+    assert len(tried) == 2 and found.best.evidence.lasts and found.rivals == ()
+    assert same(found.best, fitted(context, climbed(context, replace(aligned, sums=aligned.modest))))
+
+
+def test_what_was_known_is_a_start_of_its_own_that_changes_no_other():
+    signals, runs = fans(3, fading=3.0)
+    options = options_of("default", QUICK)
+    known = identify_runs(
+        runs[:2], signals, options, rests=[np.ones(2)], seed=3, iteration=2, workers=WORKERS
+    )
+    assert known.model.form == "acceleration" and known.actuation.hidden
+    context = context_of(signals, runs, rests=[np.ones(2)], known=known)
+    before = copied(known)
+    one, two = starts(context, "acceleration")
+    assert same(known, before)
+    assert one.fit is None and one.actuation.hidden == () and two.start == RENEWED
+    assert two.evidence.lasts and two.actuation.hidden
+    assert len(list(starts(replace(context, known=None), "acceleration"))) == 1
+    # The order in which they are searched does not matter, for they share nothing that changes.
+    late = searched(context, two)
+    assert same(searched(context, one).best, searched(context, one).best)
+    assert same(late.best, searched(context, two).best)
