@@ -1,0 +1,1 @@
+"""Plants different in kind that nobody tuned on, and what the preset `default` makes of them as it comes."""
