@@ -38,6 +38,7 @@ test: $(VENV)/.installed-test $(VENV)/.installed-others $(NATIVE) ## all tests, 
 	$(BIN)/python benchmarks/long_campaign.py --smoke
 	$(BIN)/python benchmarks/laws.py --smoke
 	$(BIN)/twinloop bench power --smoke
+	$(BIN)/twinloop bench zoo --smoke
 
 check: $(VENV)/.installed-check $(NATIVE) ## formatting, lints, types, layers
 	cargo fmt --all --check

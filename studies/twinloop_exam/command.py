@@ -27,6 +27,7 @@ from twinloop_exam.tables import FORMATS, as_text, render
 from twinloop_exam.tuning import EXPERIMENTS as TUNING_EXPERIMENTS
 from twinloop_exam.tuning import score, tuned, variants
 from twinloop_exam.version import version
+from twinloop_exam.zoo.command import zoo
 
 ASK_ABOVE = 600.0
 """Seconds of estimated work above which a person at a terminal is asked first."""
@@ -37,7 +38,10 @@ SMOKE_LEFT_OUT = ("ours-*", "without-*")
 
 @click.group()
 def bench() -> None:
-    """Compare Twinloop with others."""
+    """Compare Twinloop with others, and with what it should reach."""
+
+
+bench.add_command(zoo)
 
 
 @bench.command()

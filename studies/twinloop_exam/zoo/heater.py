@@ -28,8 +28,8 @@ def derivative(z: Row, u: Row) -> Row:
 
 SIGNALS = Signals(
     [
-        State("element", "K", 150.0, envelope=(-5.0, 250.0)),
-        State("plate", "K", 100.0, envelope=(-5.0, 130.0)),
+        State("element", "K", 150.0, envelope=(-20.0, 250.0)),
+        State("plate", "K", 100.0, envelope=(-20.0, 130.0)),
     ],
     [Command("power", "W", (0.0, 400.0))],
     2.0,

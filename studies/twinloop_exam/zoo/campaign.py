@@ -1,0 +1,183 @@
+"""One campaign on one plant, preset and options as they come, measured after each flight."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign.history import Lesson
+from twinloop.errors import RemarkWarning, SystemFailure, TwinloopError
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+from twinloop_exam.measures import violated
+from twinloop_exam.version import version
+from twinloop_exam.zoo import honesty
+from twinloop_exam.zoo.held_out import COUNT, HeldOut, held_out
+from twinloop_exam.zoo.honesty import Flight
+from twinloop_exam.zoo.optima import best_quality
+from twinloop_exam.zoo.plant import Plant
+from twinloop_exam.zoo.plants import plant as plant_named
+
+Measured = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One campaign.
+
+    Args:
+        plant: its name.
+        seed: of the campaign and of the sensors.
+        flights: in all, the first included.
+        options: of the preset, other than its own; for smoke runs.
+        held_out: controllers that twins are judged on.
+    """
+
+    plant: str
+    seed: int
+    flights: int = 5
+    options: tuple[tuple[str, object], ...] = ()
+    held_out: int = COUNT
+
+    @property
+    def name(self) -> str:
+        """What tells it from the others."""
+        return f"{self.plant}, seed {self.seed}"
+
+
+def fly(job: Job) -> Measured:
+    """Flies a campaign and measures it.
+
+    Args:
+        job: which.
+
+    Returns:
+        A plain dictionary: what `Job` says, the optimum, one dictionary a flight, and "failure" where it ended early.
+    """
+    plant = plant_named(job.plant)
+    found: Measured = {
+        "plant": job.plant,
+        "seed": job.seed,
+        "flights_asked": job.flights,
+        "version": version(),
+        "optimum": best_quality(plant),
+        "flights": [],
+        "failure": None,
+    }
+    clock = time.process_time()
+    with warnings.catch_warnings():
+        # What is remarked stands in the rows.
+        warnings.simplefilter("ignore", RemarkWarning)
+        try:
+            _fly(job, plant, found)
+        except TwinloopError as failure:
+            found["failure"] = str(failure)
+    found["cpu_seconds"] = time.process_time() - clock
+    return found
+
+
+def _fly(job: Job, plant: Plant, found: Measured) -> None:
+    system, asked, judge = plant.make(job.seed), plant.asked, _judge(job.plant, job.held_out)
+    found["held_out"] = [len(judge.tests), judge.tried]
+    campaign = Campaign(
+        system.signals,
+        controller=asked.controller,
+        initial_state=asked.start,
+        target_state=asked.target,
+        duration=asked.duration,
+        weights=dict(asked.weights) or None,
+        seed=job.seed,
+        options=dict(job.options) or None,
+        threads=1,
+    )
+    flown: list[Flight] = []
+    test = campaign.test(asked.first)
+    for number in range(job.flights):
+        row, flight = _flown(plant, system, campaign, test)
+        if flight is not None:
+            flown.append((test, flight))
+        clock = time.process_time()
+        last = number == job.flights - 1
+        # What is learnt of the last flight, and the test that would come next, cost what any other `ask` does.
+        following = None if last else campaign.ask(last=number == job.flights - 2)
+        twin = campaign.twin
+        if not last:
+            row["ask_seconds"] = time.process_time() - clock
+        row |= _known(plant, campaign, judge, flown)
+        found["flights"].append(row)
+        if following is not None:
+            test = following
+    found["confident"] = honesty.confident(campaign)
+    found["equations"] = twin.equations(4)
+
+
+@cache
+def _judge(name: str, count: int) -> HeldOut:
+    """Flown once a process: it is the same for all campaigns on a plant."""
+    return held_out(plant_named(name), count)
+
+
+def _flown(plant: Plant, system: Any, campaign: Campaign, test: Test) -> tuple[Measured, Trajectory | None]:
+    """Flies a test and tells it."""
+    row: Measured = {"predicted": test.predicted, "spread": test.spread, "reason": test.reason}
+    try:
+        flight = system.run(test)
+    except SystemFailure as failure:
+        campaign.tell_failed(test, str(failure))
+        return {**row, "ended": "failed", "left": True, "flown": None, "measured": None}, None
+    campaign.tell(test, flight)
+    measured = campaign.experiments[-1].quality
+    row |= {
+        "ended": flight.ended,
+        "left": violated(flight, system.signals),
+        "flown": plant.judged(flight, test),
+        "gains_quality": plant.true_quality(test.genes),
+        "gains": test.parameters,
+        "measured": measured,
+    }
+    return _plain(row), flight
+
+
+def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]) -> Measured:
+    """What is measured of the twin and the controller to fly."""
+    twin = campaign.twin
+    lesson = [record for record in campaign.history if isinstance(record, Lesson)][-1]
+    error, diverged = judge.judged(twin)
+    best = controller_to_fly(campaign)[0]
+    structures = honesty.found(twin, lesson)
+    return _plain(
+        {
+            "best_test": None if best is None else plant.true_quality(best.genes),
+            "error": error,
+            "diverged": diverged,
+            "found": structures,
+            "false": [name for name in structures if name not in plant.has],
+            "lags": list(lesson.lags),
+            "delays": list(lesson.delays),
+            "offsets": list(lesson.offsets),
+            "empty": honesty.empty_equations(twin, flown),
+            "missed": honesty.misses(plant, twin, flown),
+            "serious": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if one.serious}),
+            "follows": lesson.follows,
+            "misfit": lesson.misfit,
+            "form": lesson.form,
+            "terms": lesson.terms,
+        }
+    )
+
+
+def _plain(row: Measured) -> Measured:
+    """With null for what is not finite, which JSON does not have; "inf" where a large number means something."""
+    plain: Measured = {}
+    for name, value in row.items():
+        if isinstance(value, float | np.floating) and not np.isfinite(value):
+            plain[name] = "inf" if value > 0.0 else None
+        else:
+            plain[name] = float(value) if isinstance(value, np.floating) else value
+    return plain
