@@ -32,7 +32,7 @@ def test_gymnasium_finds_no_fault(which):
 def test_it_moves_as_the_twin_does_with_all_that_it_remembers(which):
     twin = TWINS[which]()
     flight = flown(twin, seed=5)
-    expected = twin.simulate_commands(flight.states[0], flight.commands).true_states
+    expected = twin.simulate_commands(flight.states[0], flight.commands).states
     env = env_of(twin, len(flight.commands))
     for _ in range(2):  # the second episode remembers nothing of the first
         seen = [env.reset(options={"initial_state": flight.states[0]})[0]]
@@ -70,11 +70,12 @@ print(json.dumps([seen, reward, truncated]))
         cwd=tmp_path, input=given, capture_output=True, text=True, check=True,
     )  # fmt: skip
     found, reward, truncated = json.loads(done.stdout)
-    expected = twin.simulate_commands(flight.states[0], 2.0 * flight.commands).true_states
+    run = twin.simulate_commands(flight.states[0], 2.0 * flight.commands)
+    expected = run.states
     np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-9, atol=1e-9)
     assert truncated and len(expected) == len(found)
     scales = np.array([state.scale for state in twin.signals.states])
-    off = np.abs(twin.signals.difference(np.array(found[-1]), np.zeros(len(scales))))
+    off = np.abs(twin.signals.difference(run.true_states[-1], np.zeros(len(scales))))
     assert reward == pytest.approx(-twin.signals.dt * float((off / scales).sum()), abs=1e-12)
 
 

@@ -193,7 +193,7 @@ class Twin(Shown, Recorded, kind="twin"):
         record = to_text(self.to_record()) if chosen == "json" else ""
         source = Source(
             self.law,
-            lambda state, commands: _true(self.simulate_commands(state, commands)),
+            lambda state, commands: taken(self.law, self.simulate_commands(state, commands)),
             self.flights,
             record,
             not force,
@@ -471,8 +471,15 @@ class Twin(Shown, Recorded, kind="twin"):
         return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"
 
 
-def _true(run: Trajectory) -> Floats:
-    return run.states if run.true_states is None else run.true_states
+def taken(law: Law, run: Trajectory) -> Floats:
+    """What an export is compared with: true states, and beside them what is read where a sensor is late.
+
+    Args:
+        law: of the twin.
+        run: of it.
+    """
+    states = run.states if run.true_states is None else run.true_states
+    return np.hstack([states, run.states]) if any(law.offsets) else states
 
 
 def load_twin(path: str | Path) -> Twin:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from twinloop._core import __version__
+from twinloop.law.exports.c_sensors import sensor_c, sensor_header
+from twinloop.law.exports.c_words import listed, number, places
 from twinloop.law.exports.python_source import joined, stepped_roots
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Writer, decimal
@@ -55,7 +56,7 @@ def _header(law: Law, name: str, precision: str) -> str:
         f"#ifndef {big}_H", f"#define {big}_H", "",
         f"#define {big}_STATES {signals.n_x}",
         f"#define {big}_COMMANDS {signals.n_u}",
-        f"#define {big}_DT {_number(signals.dt, precision)}",
+        f"#define {big}_DT {number(signals.dt, precision)}",
         "",
         f"typedef {precision} {name}_real;", "",
         "/* What its actuators and hidden states remember. */",
@@ -72,7 +73,8 @@ def _header(law: Law, name: str, precision: str) -> str:
         f"void {name}_clip({name}_real u[{signals.n_u}]);", "",
         "/* The state a period after x, under the commands u; next may be x. */",
         f"void {name}_step({name}_memory *memory, const {name}_real x[{signals.n_x}],",
-        f"    const {name}_real u[{signals.n_u}], {name}_real next[{signals.n_x}]);", "", "#endif", "",
+        f"    const {name}_real u[{signals.n_u}], {name}_real next[{signals.n_x}]);", "",
+        *sensor_header(law, name), "#endif", "",
     ])  # fmt: skip
 
 
@@ -89,25 +91,19 @@ def _source(law: Law, name: str, precision: str) -> str:
         *_stepped(law, name, precision, n_x), "",
         f"void {name}_reset({name}_memory *memory)", "{", "    memory->started = 0;", "}", "",
         f"void {name}_clip(real u[{signals.n_u}])", "{",
-        f"    static const real low[{signals.n_u}] = {_list([c.bounds[0] for c in signals.commands], precision)};",
-        f"    static const real high[{signals.n_u}] = {_list([c.bounds[1] for c in signals.commands], precision)};",
+        f"    static const real low[{signals.n_u}] = {listed([c.bounds[0] for c in signals.commands], precision)};",
+        f"    static const real high[{signals.n_u}] = {listed([c.bounds[1] for c in signals.commands], precision)};",
         f"    for (int i = 0; i < {signals.n_u}; ++i) {{",
         "        u[i] = u[i] < low[i] ? low[i] : u[i] > high[i] ? high[i] : u[i];",
         "    }", "}", "",
+        *_attitude_of_sensors(law, name, precision),
+        *sensor_c(law, name, precision),
     ])  # fmt: skip
 
 
 def _comment(unit: str) -> str:
     """A unit as a comment may hold it."""
     return one_line(unit).replace("*/", "* /").replace("/*", "/ *") or "1"
-
-
-def _number(value: float, precision: str) -> str:
-    return repr(float(value)) + ("f" if precision == "float" else "")
-
-
-def _list(values: Sequence[float], precision: str) -> str:
-    return "{" + ", ".join(_number(value, precision) for value in values) + "}"
 
 
 def _helpers(name: str, precision: str) -> dict[str, str]:
@@ -118,7 +114,7 @@ def _helpers(name: str, precision: str) -> dict[str, str]:
 
     return {
         "divided": written(
-            "divided", "real a, real b", f"fabs{f}(b) > {_number(1e-6, precision)} ? a / b : a"
+            "divided", "real a, real b", f"fabs{f}(b) > {number(1e-6, precision)} ? a / b : a"
         ),
         "wrapped": written("wrapped", "real a, real period", f"a - rint{f}(a / period) * period"),
         "min": written("min", "real a, real b", "a < b ? a : b"),
@@ -126,7 +122,7 @@ def _helpers(name: str, precision: str) -> dict[str, str]:
         "upright": written(
             "upright",
             "real a",
-            f"fabs{f}(a) >= {_number(1e-3, precision)} ? a : copysign{f}({_number(1e-3, precision)}, a)",
+            f"fabs{f}(a) >= {number(1e-3, precision)} ? a : copysign{f}({number(1e-3, precision)}, a)",
         ),
     }
 
@@ -184,7 +180,7 @@ def _seen(law: Law, name: str, precision: str, place: int) -> str:
     if place >= law.signals.n_x:
         return f"u[{place - law.signals.n_x}]"
     period = law.signals.states[place].period
-    return f"x[{place}]" if period is None else f"{name}_wrapped(x[{place}], {_number(period, precision)})"
+    return f"x[{place}]" if period is None else f"{name}_wrapped(x[{place}], {number(period, precision)})"
 
 
 def _actuation(law: Law, name: str, precision: str) -> list[str]:
@@ -192,13 +188,13 @@ def _actuation(law: Law, name: str, precision: str) -> list[str]:
     actuators, hidden, n_u = law.actuation.actuators, law.actuation.hidden, law.signals.n_u
     f = "f" if precision == "float" else ""
 
-    def number(value: float) -> str:
-        return _number(value, precision)
+    def literal(value: float) -> str:
+        return number(value, precision)
 
     lines = [
         f"static void {name}_effects({name}_memory *memory, const real u[{n_u}], real seen[3][SEEN])",
         "{",
-        f"    static const real factors[{n_u}] = {_list([1.0 / c.size for c in law.signals.commands], precision)};",
+        f"    static const real factors[{n_u}] = {listed([1.0 / c.size for c in law.signals.commands], precision)};",
     ]
     if not hidden and all(actuator.direct for actuator in actuators):
         return [
@@ -211,21 +207,21 @@ def _actuation(law: Law, name: str, precision: str) -> list[str]:
         ]
     delays = ", ".join(str(actuator.delay) for actuator in actuators)
     lines += [
-        f"    static const real lags[{n_u}] = {_list([actuator.lag for actuator in actuators], precision)};",
+        f"    static const real lags[{n_u}] = {listed([actuator.lag for actuator in actuators], precision)};",
         f"    static const int delays[{n_u}] = {{{delays}}};",
     ]
     begun = [
-        f"        memory->held[{i}] = {f'u[{i}]' if actuator.rest is None else number(actuator.rest)};"
+        f"        memory->held[{i}] = {f'u[{i}]' if actuator.rest is None else literal(actuator.rest)};"
         for i, actuator in enumerate(actuators)
     ]
     levels = []
     for j, h in enumerate(hidden):
         given = [f"u[{i}] * factors[{i}]" for i in h.commands]
         total = " + ".join(f"({g}) * ({g})" if h.squared else g for g in given)
-        levels.append(f"    const real level_{j} = ({total}) * {number(1.0 / len(given))};")
+        levels.append(f"    const real level_{j} = ({total}) * {literal(1.0 / len(given))};")
         begun += [
-            f"        memory->hidden[{j}] = {number(0.0)};",
-            f"        memory->levels[{j}] = {f'level_{j}' if h.rest is None else number(h.rest)};",
+            f"        memory->hidden[{j}] = {literal(0.0)};",
+            f"        memory->levels[{j}] = {f'level_{j}' if h.rest is None else literal(h.rest)};",
         ]
     lines += [
         *levels,
@@ -249,7 +245,7 @@ def _actuation(law: Law, name: str, precision: str) -> list[str]:
         "            queue[delays[i] - 1] = u[i];",
         "            queue += delays[i];",
         "        }",
-        f"        const real half = lags[i] > 0 ? exp{f}({number(-0.5 * law.signals.dt)} / lags[i]) : 0;",
+        f"        const real half = lags[i] > 0 ? exp{f}({literal(-0.5 * law.signals.dt)} / lags[i]) : 0;",
         "        const real start = lags[i] > 0 ? memory->held[i] : arrived;",
         "        const real middle = arrived + (start - arrived) * half;",
         "        const real end = arrived + (middle - arrived) * half;",
@@ -262,8 +258,8 @@ def _actuation(law: Law, name: str, precision: str) -> list[str]:
     for j, h in enumerate(hidden):
         lines += [
             "    {",
-            f"        const real kept = exp{f}({number(-0.5 * law.signals.dt / h.time)});",
-            f"        const real added = (level_{j} - memory->levels[{j}]) * ({number(h.time)} * (1 - kept));",
+            f"        const real kept = exp{f}({literal(-0.5 * law.signals.dt / h.time)});",
+            f"        const real added = (level_{j} - memory->levels[{j}]) * ({literal(h.time)} * (1 - kept));",
             f"        seen[0][{n_u + j}] = memory->hidden[{j}];",
             f"        seen[1][{n_u + j}] = seen[0][{n_u + j}] * kept + added;",
             f"        seen[2][{n_u + j}] = seen[1][{n_u + j}] * kept + added;",
@@ -298,16 +294,17 @@ def _stepped(law: Law, name: str, precision: str, n_x: int) -> list[str]:
         size, begun, slopes = n_x + 4, "begun", f"{name}_slopes(before, "
         lines = [
             *_turned(law, name, precision, body),
+            *_slopes(law, name, precision, body),
             *lines[:2],
             f"    real seen[3][SEEN], first[{size}], begun[{size}], ended[{size}];",
-            f"    const real before[3] = {{{', '.join(f'x[{i}]' for i in _places(law, body.angles))}}};",
+            f"    const real before[3] = {{{', '.join(f'x[{i}]' for i in places(law, body.angles))}}};",
             f"    {name}_effects(memory, u, seen);",
             f"    for (int i = 0; i < {n_x}; ++i) {{",
             "        begun[i] = x[i];",
             "    }",
             f"    {name}_quaternion(before, begun + {n_x});",
         ]
-    half, whole, sixth = (_number(law.signals.dt * share, precision) for share in (0.5, 1.0, 1.0 / 6.0))
+    half, whole, sixth = (number(law.signals.dt * share, precision) for share in (0.5, 1.0, 1.0 / 6.0))
     target = "next" if body is None else "ended"
 
     def moved(slope: str, time: str) -> list[str]:
@@ -333,15 +330,19 @@ def _stepped(law: Law, name: str, precision: str, n_x: int) -> list[str]:
     return [*lines, *([] if body is None else [f"    {name}_seen(before, ended, next);"]), "}"]
 
 
-def _places(law: Law, names: Sequence[str]) -> list[int]:
-    return [law.signals.state_names.index(name) for name in names]
+def _attitude_of_sensors(law: Law, name: str, precision: str) -> list[str]:
+    """What late sensors of a rigid body need, where the step has not brought it already."""
+    body = law.signals.kinematics
+    if body is None or law.form == "acceleration" or not any(law.offsets):
+        return []
+    return _turned(law, name, precision, body)
 
 
 def _turned(law: Law, name: str, precision: str, body: RigidBody) -> list[str]:
     """The attitude of a rigid body as a quaternion behind the states: no pitch is singular for it."""
     f, n_x = "f" if precision == "float" else "", law.signals.n_x
-    pi, half = _number(math.pi, precision), _number(0.5, precision)
-    angles, rates = _places(law, body.angles), _places(law, body.rates)
+    pi, half = number(math.pi, precision), number(0.5, precision)
+    angles = places(law, body.angles)
     return [
         f"static void {name}_quaternion(const real angles[3], real q[4])",
         "{",
@@ -377,6 +378,13 @@ def _turned(law: Law, name: str, precision: str, body: RigidBody) -> list[str]:
         *(f"    x[{place}] = angles[{i}];" for i, place in enumerate(angles)),
         "}",
         "",
+    ]
+
+
+def _slopes(law: Law, name: str, precision: str, body: RigidBody) -> list[str]:
+    """How the states and the quaternion behind them change."""
+    n_x, half, rates = law.signals.n_x, number(0.5, precision), places(law, body.rates)
+    return [
         f"static void {name}_slopes(const real before[3], const real y[{n_x + 4}], const real u[SEEN],",
         f"    real out[{n_x + 4}])",
         "{",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from twinloop._core import __version__
 from twinloop.law.exports.python_source import layout, outputs_source
+from twinloop.law.exports.sensor_source import reading_source
 from twinloop.law.exports.step_source import step_source
 from twinloop.law.law import Law
 from twinloop.law.writing import Dialect
@@ -98,6 +99,41 @@ def _angles(a, b, c, d, before):
     return [old - ca.remainder(old - new, math.tau) for old, new in zip(before, chosen)]
 '''
 
+_NUMBERS = """
+def _choose(condition, this, other):
+    return ca.if_else(condition, this, other)
+
+
+def _root(a):
+    return ca.sqrt(a)
+
+
+def _cosine(a):
+    return ca.cos(a)
+
+
+def _sinc(a):
+    return ca.if_else(a == 0.0, 1.0, ca.sin(a) / ca.if_else(a == 0.0, 1.0, a))
+"""
+
+_READ = '''
+_past = ca.SX.sym("past", PAST)
+_reading, _later = _read(ca.vertsplit(_x), ca.vertsplit(_past))
+read = ca.Function(
+    "read", [_x, _past], [ca.vertcat(*_reading), ca.vertcat(*_later)], ["x", "past"], ["reading", "past_next"]
+)
+"""What the sensors read at the state x, and what they remember then; before the first state all of that is 0."""
+
+
+def readings(states):
+    """What the sensors read of a run, the first state of which is where it began."""
+    found, past = [], [0.0] * PAST
+    for x in states:
+        reading, past = read(x, past)
+        found.append(reading.full().ravel().tolist())
+    return found
+'''
+
 _FUNCTIONS = '''
 _x, _u = ca.SX.sym("x", len(STATES)), ca.SX.sym("u", len(COMMANDS))
 _remembered = _start(ca.vertsplit(_u))
@@ -135,7 +171,8 @@ def casadi_source(law: Law) -> str:
         law: of a twin.
 
     Returns:
-        A module with `start`, `step` (CasADi functions of one period) and `simulate(initial_state, commands)`.
+        A module with `start`, `step` (CasADi functions of one period) and `simulate(initial_state, commands)`; where
+        sensors are late or early also `read` and `readings(states)`.
     """
     head = [
         f'"""A twin of {", ".join(law.signals.state_names)}, learnt by Twinloop {__version__}, as CasADi functions.',
@@ -149,6 +186,8 @@ def casadi_source(law: Law) -> str:
         "",
         *layout(law, actuated=True),
     ]
-    steps = step_source(law, "ca.sin, ca.cos", _ANGLES)
+    sines = "ca.sin, ca.cos"
+    steps = step_source(law, sines, _ANGLES)
     outputs = outputs_source(law, CASADI, ("ca", "math"))
-    return "\n".join(["\n".join(head) + "\n", _HELPERS, outputs, steps, _EFFECTS, _FUNCTIONS])
+    sensors = [reading_source(law, sines, _ANGLES, _NUMBERS), _READ] if any(law.offsets) else []
+    return "\n".join(["\n".join(head) + "\n", _HELPERS, outputs, steps, _EFFECTS, _FUNCTIONS, *sensors])

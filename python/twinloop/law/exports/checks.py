@@ -19,6 +19,7 @@ from twinloop.controllers import Family
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.compiling import compiled
 from twinloop.law.exports.python_source import equation_roots
+from twinloop.law.exports.sensor_source import reach
 from twinloop.law.law import Law
 from twinloop.trajectory import Trajectory
 
@@ -29,7 +30,8 @@ MOST_REMEMBERED = 10_000
 Commanding = Callable[[Floats, Floats], Floats]
 """Commands (n, n_u) on states (n, n_x), one period after the other, for a target (n_x,)."""
 Simulation = Callable[[Floats, Floats], Floats]
-"""The states (n + 1, n_x) of a free run from a state (n_x,) under commands (n, n_u)."""
+"""The states (n + 1, n_x) of a free run from a state (n_x,) under commands (n, n_u); where a sensor is late, beside
+them what all sensors read of it (n + 1, 2 n_x)."""
 
 
 def check_simulation(
@@ -53,7 +55,8 @@ def check_simulation(
     def difference(flight: Trajectory) -> Floats:
         expected = twin(flight.states[0], flight.commands)
         given = found(flight.states[0], flight.commands[: len(expected) - 1])
-        off: Floats = np.abs(given - expected) / np.maximum(scales, np.abs(expected))
+        sizes = np.maximum(np.tile(scales, expected.shape[1] // len(scales)), np.abs(expected))
+        off: Floats = np.abs(given - expected) / sizes
         return off
 
     _check(
@@ -73,7 +76,12 @@ def python_simulation(source: str) -> Simulation:
     """
     names: dict[str, Any] = {}
     exec(compile(source, "exported twin", "exec"), names)
-    return lambda state, commands: np.array(names["simulate"](state.tolist(), commands.tolist()))
+
+    def simulate(state: Floats, commands: Floats) -> Floats:
+        states = names["simulate"](state.tolist(), commands.tolist())
+        return np.hstack([states, names["readings"](states)]) if "OFFSETS" in names else np.array(states)
+
+    return simulate
 
 
 def casadi_simulation(source: str) -> Simulation:
@@ -108,7 +116,13 @@ def control_simulation(source: str) -> Simulation:
         times = names["DT"] * np.arange(len(commands) + 1)
         held = np.concatenate([commands, commands[-1:]])
         run = control.input_output_response(system, times, held.T, start)
-        return np.asarray(run.outputs, dtype=np.float64).reshape(len(state), -1).T
+        found = np.asarray(run.outputs, dtype=np.float64).reshape(system.noutputs, -1).T
+        states = found[:, : len(state)]
+        if "OFFSETS" not in names:
+            return states
+        read = states.copy()
+        read[:, list(names["_LATE"])] = found[:, len(state) :]
+        return np.hstack([states, read])
 
     return simulate
 
@@ -138,9 +152,13 @@ def gymnasium_simulation(source: str) -> Simulation:
 
     def simulate(state: Floats, commands: Floats) -> Floats:
         env = names["TwinEnv"](steps=max(1, len(commands)))
-        seen = [env.reset(options={"initial_state": state.tolist()})[0]]
-        seen += [env.step(command)[0] for command in commands]
-        return np.array(seen)
+        read, known = env.reset(options={"initial_state": state.tolist()})
+        states, readings = [known["state"]], [read]
+        for command in commands:
+            read, _, _, _, known = env.step(command)
+            states.append(known["state"])
+            readings.append(read)
+        return np.hstack([states, readings]) if "OFFSETS" in names else np.array(readings)
 
     return simulate
 
@@ -174,6 +192,8 @@ def c_simulation(header: str, source: str, name: str, law: Law, precision: str) 
     n_x = law.signals.n_x
     # The struct's own size is the compiler's business: nothing of it is larger than these.
     held = 16 + 8 * (law.signals.n_u + sum(a.delay for a in law.actuation.actuators) + 2 * law.inputs + 4)
+    late = any(law.offsets)
+    past = 16 + 8 * n_x * (2 + reach(law))
 
     def simulate(state: Floats, commands: Floats) -> Floats:
         memory = ctypes.create_string_buffer(held)
@@ -189,7 +209,15 @@ def c_simulation(header: str, source: str, name: str, law: Law, precision: str) 
                 command.ctypes.data_as(pointer),
                 states[k + 1].ctypes.data_as(pointer),
             )
-        return states.astype(np.float64)
+        if not late:
+            return states.astype(np.float64)
+        sensors, readings = ctypes.create_string_buffer(past), np.zeros_like(states)
+        getattr(library, f"{name}_begin")(sensors)
+        for state, reading in zip(states, readings, strict=True):
+            getattr(library, f"{name}_read")(
+                sensors, state.ctypes.data_as(pointer), reading.ctypes.data_as(pointer)
+            )
+        return np.hstack([states, readings]).astype(np.float64)
 
     return simulate
 

@@ -47,27 +47,58 @@ def _remembered(twin):
 _SYSTEM = '''
 def _update(time, states, commands, parameters):
     """What follows a period later: the states of the twin, then what it remembers."""
-    x, memory = [float(value) for value in states[: len(STATES)]], [float(value) for value in states[len(STATES) :]]
+    x, memory, past = _parts(states)
     twin = _recalled(memory)
     clipped = [min(max(float(value), low), high) for value, (low, high) in zip(commands, BOUNDS)]
     following = twin.step(x, clipped)
-    return np.array([*following, *_remembered(twin)])
+    return np.array([*following, *_remembered(twin), *_seen(x, past)[1]])
 
 
 def _outputs_of(time, states, commands, parameters):
-    return states[: len(STATES)]
+    """The states of the twin, then what late sensors read of them."""
+    x, _, past = _parts(states)
+    return np.array([*x, *_seen(x, past)[0]])
+
+
+def _parts(states):
+    values, size, known = [float(value) for value in states], len(STATES), len(STATES) + len(_MEMORY)
+    return values[:size], values[size:known], values[known:]
 
 
 system = control.nlsys(
     _update,
     _outputs_of,
     inputs=[name for name, _ in COMMANDS],
-    outputs=[name for name, _ in STATES],
-    states=[*(f"{name}_state" for name, _ in STATES), *(f"memory_{name}" for name in _MEMORY)],
+    outputs=[*(name for name, _ in STATES), *(f"{STATES[i][0]}_read" for i in _LATE)],
+    states=[
+        *(f"{name}_state" for name, _ in STATES),
+        *(f"memory_{name}" for name in _MEMORY),
+        *(f"past_{k}" for k in range(_PAST)),
+    ],
     dt=DT,
     name="twin",
 )
 """In discrete time; its state is that of the twin, then what that remembers, which is 0 before a run."""
+'''
+
+
+_IN_TIME = '''
+_LATE, _PAST = (), 0
+
+
+def _seen(x, past):
+    """What late sensors read, and what they remember: none is late."""
+    return [], []
+'''
+
+_LATE = '''
+_LATE, _PAST = tuple(sorted(i for _, places in OFFSETS for i in places)), PAST
+
+
+def _seen(x, past):
+    """What late sensors read, and what they remember then."""
+    reading, later = _read(x, past)
+    return [reading[i] for i in _LATE], later
 '''
 
 
@@ -78,7 +109,8 @@ def control_source(law: Law) -> str:
         law: of a twin.
 
     Returns:
-        The module of `python_source` with `system`, a `control.NonlinearIOSystem` whose outputs are the states.
+        The module of `python_source` with `system`, a `control.NonlinearIOSystem` whose outputs are the states
+        and, by names that end in `_read`, what late sensors read of them.
     """
     text = python_source(law)
     text = text.replace("\nimport math\n", "\nimport math\n\nimport control\nimport numpy as np\n", 1)
@@ -86,4 +118,5 @@ def control_source(law: Law) -> str:
         "It needs nothing but Python.", "`system` is a nonlinear system of python-control.", 1
     )
     direct = not law.actuation.hidden and all(each.direct for each in law.actuation.actuators)
-    return "\n".join([text, _NOTHING_REMEMBERED if direct else _REMEMBERED, _SYSTEM])
+    remembered = _NOTHING_REMEMBERED if direct else _REMEMBERED
+    return "\n".join([text, remembered, _LATE if any(law.offsets) else _IN_TIME, _SYSTEM])

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 
 from twinloop.arrays import Floats, floats, whole
 from twinloop.errors import NotAvailable
+from twinloop.law.law import Law
 from twinloop.law.noise import Noise
 from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
 
 Reward = Callable[[Floats, Floats, Floats], float]
 """(state (n_x,), command (n_u,), next state (n_x,)) -> reward."""
@@ -34,6 +36,15 @@ class Simulator(Protocol):
     @property
     def divergence_factor(self) -> float:
         """Multiple of a state's scale beyond which a run counts as diverged."""
+        ...
+
+    @property
+    def law(self) -> Law:
+        """Its sensors' offsets among all."""
+        ...
+
+    def simulate_commands(self, initial_state: ArrayLike, commands: ArrayLike) -> Trajectory:
+        """A free run."""
         ...
 
     def predict(self, states: ArrayLike, commands: ArrayLike, past: ArrayLike | None = None) -> Floats:
@@ -79,6 +90,8 @@ def environment(
     low, high = (np.array([command.bounds[i] for command in signals.commands]) for i in (0, 1))
     deviations = twin.noise.sensors if noisy and twin.noise is not None else np.zeros(signals.n_x)
 
+    late = any(twin.law.offsets)
+
     class TwinEnv(gymnasium.Env):  # type: ignore[misc]
         """The twin, with its lags, delays and hidden states; it remembers the commands of the episode."""
 
@@ -88,7 +101,7 @@ def environment(
             # Twice what diverges: noise is read beyond it as well. An angle that wraps goes on without end.
             self.observation_space = gymnasium.spaces.Box(-2.0 * limits, 2.0 * limits, dtype=np.float64)
             self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
-            self.state, self.sent = begin, []  # type: Floats, list[Floats]
+            self.begun, self.state, self.sent = begin, begin, []  # type: Floats, Floats, list[Floats]
 
         def reset(
             self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -97,7 +110,7 @@ def environment(
             super().reset(seed=seed)
             given = (options or {}).get("initial_state")
             start = begin if given is None else floats("reset, initial_state", given, (signals.n_x,))
-            self.state, self.sent = start, []
+            self.begun, self.state, self.sent = start, start, []
             return self._seen(), {"state": np.array(self.state)}
 
         def step(self, action: ArrayLike) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
@@ -117,9 +130,14 @@ def environment(
             return -signals.dt * float((np.abs(signals.difference(after, target)) / scales).sum())
 
         def _seen(self) -> Floats:
+            now = np.array(self.state)
+            if late:
+                # What a late sensor reads depends on the whole run.
+                sent = np.array(self.sent).reshape(-1, signals.n_u)
+                now = np.array(twin.simulate_commands(self.begun, sent).states[-1])
             if not deviations.any():
-                return np.array(self.state)
-            read: Floats = self.state + deviations * self.np_random.standard_normal(signals.n_x)
+                return now
+            read: Floats = now + deviations * self.np_random.standard_normal(signals.n_x)
             return read
 
     return TwinEnv()

@@ -10,7 +10,7 @@ from twinloop.law.law import Law
 
 _ENVIRONMENT = '''
 class TwinEnv(gymnasium.Env):
-    """The twin as an environment: observations are states, actions commands in their own units, a step a period.
+    """The twin, a period a step: observations are what its sensors read, actions commands in their own units.
 
     An episode is truncated after `steps` and terminates where a state leaves what `LIMITS` says. The reward, a function
     of state, command and next state, is by default the negative sum of errors after the step, each over its state's
@@ -26,15 +26,17 @@ class TwinEnv(gymnasium.Env):
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         self.initial_state, self.target_state = [float(v) for v in initial_state], [float(v) for v in target_state]
         self.steps, self.reward = int(steps), reward or self._nearness
-        self._twin, self._state, self._done = Twin(), list(self.initial_state), 0
+        self._twin, self._sensors, self._state, self._done = Twin(), Sensors(), list(self.initial_state), 0
 
     def reset(self, *, seed=None, options=None):
         """Begins an episode, at `options["initial_state"]` where that is given."""
         super().reset(seed=seed)
         self._twin.reset()
+        self._sensors.reset()
         start = (options or {}).get("initial_state", self.initial_state)
         self._state, self._done = [float(value) for value in start], 0
-        return self._seen(), {}
+        self._reading = self._sensors.read(self._state)
+        return self._seen(), self._known()
 
     def step(self, action):
         """One period; it terminates where the twin diverges, with the last state that did not."""
@@ -44,13 +46,17 @@ class TwinEnv(gymnasium.Env):
             math.isfinite(value) and (period is not None or abs(value) <= limit)
             for value, limit, period in zip(following, LIMITS, PERIODS)
         )
-        self._state = before if lost else following
+        if not lost:
+            self._state, self._reading = following, self._sensors.read(following)
         self._done += 1
         earned = float(self.reward(np.array(before), np.array(command), np.array(self._state)))
-        return self._seen(), earned, lost, self._done >= self.steps, {}
+        return self._seen(), earned, lost, self._done >= self.steps, self._known()
 
     def _seen(self):
-        return np.array(self._state, dtype=np.float64)
+        return np.array(self._reading, dtype=np.float64)
+
+    def _known(self):
+        return {"state": np.array(self._state, dtype=np.float64)}
 
     def _nearness(self, before, command, after):
         errors = [

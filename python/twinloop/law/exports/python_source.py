@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from twinloop._core import __version__
+from twinloop.law.exports.sensor_source import sensor_layout, sensor_source
 from twinloop.law.exports.step_source import step_source
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Term, Writer
@@ -160,7 +161,8 @@ def python_source(law: Law) -> str:
         law: of a twin.
 
     Returns:
-        A module with `simulate(initial_state, commands)` and a class `Twin` with `reset` and `step`.
+        A module with `simulate(initial_state, commands)`, a class `Twin` with `reset` and `step`, and what the sensors
+        read: `readings(states)` and a class `Sensors` with `reset` and `read`.
     """
     actuators, hidden = law.actuation.actuators, law.actuation.hidden
     direct = not hidden and all(actuator.direct for actuator in actuators)
@@ -169,7 +171,8 @@ def python_source(law: Law) -> str:
         "",
         "It needs nothing but Python.",
         "",
-        "`simulate(initial_state, commands)` is a free run, `Twin().step(x, u)` one period of it.",
+        "`simulate(initial_state, commands)` is a free run, `Twin().step(x, u)` one period of it;",
+        "`readings(states)` is what the sensors read of a run.",
         '"""',
         "",
         "import math",
@@ -178,7 +181,8 @@ def python_source(law: Law) -> str:
     ]
     steps = step_source(law, "_sin, _cos", _ANGLES)
     parts = ["\n".join(head) + "\n", _HELPERS, outputs_source(law, PYTHON, ("math",)), steps]
-    return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE])
+    sensors = sensor_source(law, "_sin, _cos", _ANGLES)
+    return "\n".join([*parts, _DIRECT if direct else _ACTUATED, _SIMULATE, sensors])
 
 
 def layout(law: Law, actuated: bool) -> list[str]:
@@ -205,11 +209,12 @@ def layout(law: Law, actuated: bool) -> list[str]:
             "  # commands that fill it, whether squared, level at rest, time (s)",
         ]
     lines += [
-        f"# {name} is read {offset:+.6g} s after the states that the equations drive; all are given at one time."
+        f"# {name} is read {offset:+.6g} s after the states that the equations drive."
         for name, offset in zip(signals.state_names, law.offsets, strict=True)
         if offset != 0.0
     ]
-    if law.form == "acceleration" and signals.kinematics is not None:
+    lines += sensor_layout(law)
+    if (law.form == "acceleration" or any(law.offsets)) and signals.kinematics is not None:
         body, place = signals.kinematics, signals.state_names.index
         lines += [
             f"ANGLES = {tuple(map(place, body.angles))!r}  # roll, pitch and yaw",

@@ -83,4 +83,14 @@ def step_source(law: Law, sines: str, angles: str) -> str:
         return _STEPS[law.form]
     if law.signals.kinematics is None:
         return "\n".join([_INTEGRATED, _STEPS[law.form]])
-    return "\n".join([_INTEGRATED, _QUATERNION.format(sines=sines), angles, _TURNED])
+    return "\n".join([_INTEGRATED, attitude_source(sines, angles), _TURNED])
+
+
+def attitude_source(sines: str, angles: str) -> str:
+    """The functions `_quaternion(roll, pitch, yaw)` and `_angles`.
+
+    Args:
+        sines: names of the functions sine and cosine, comma-separated.
+        angles: the function `_angles`, as for `step_source`.
+    """
+    return "\n".join([_QUATERNION.format(sines=sines), angles])

@@ -13,7 +13,7 @@ from twinloop.texts import one_line
 
 Tree = ElementTree.Element
 TIME = 0
-"""Value reference of the time; then come states, commands and hidden states."""
+"""Value reference of the time; then come states, commands, hidden states, and what late sensors read."""
 
 
 @dataclass(frozen=True)
@@ -49,17 +49,33 @@ def variables(law: Law, start: Floats, rest: Floats) -> list[Variable]:
     while time in taken:
         time += "_"
     found = [Variable(time, TIME, "independent", {"unit": "s"})]
-    for state, value, offset in zip(signals.states, start.tolist(), law.offsets, strict=True):
-        late = f"read {offset:+.6g} s after the states that the equations drive" if offset else ""
+    for state, value in zip(signals.states, start.tolist(), strict=True):
         attributes = {"unit": one_line(state.unit), "nominal": repr(state.scale), "start": repr(value)}
-        found.append(Variable(state.name, len(found), "output", attributes, late))
+        found.append(Variable(state.name, len(found), "output", attributes))
     for command, value in zip(signals.commands, rest.tolist(), strict=True):
         low, high = (repr(bound) for bound in command.bounds)
         attributes = {"unit": one_line(command.unit), "min": low, "max": high, "start": repr(value)}
         found.append(Variable(command.name, len(found), "input", attributes, "held for a period"))
     for name in law.hidden_symbols:
         found.append(Variable(name, len(found), "local", {}, "a hidden state that commands fill"))
+    for place in late_states(law):
+        state, name = signals.states[place], f"{signals.state_names[place]}_read"
+        while name in taken:
+            name += "_"
+        told = f"what its sensor reads, {law.offsets[place]:+.6g} s after the states that the equations drive"
+        attributes = {"unit": one_line(state.unit), "nominal": repr(state.scale)}
+        found.append(Variable(name, len(found), "output", attributes, told))
+        taken.add(name)
     return found
+
+
+def late_states(law: Law) -> list[int]:
+    """Places of the states that are read late or early.
+
+    Args:
+        law: of the twin.
+    """
+    return [place for place, offset in enumerate(law.offsets) if offset != 0.0]
 
 
 def model_description(version: int, law: Law, name: str, token: str, listed: Sequence[Variable]) -> bytes:
@@ -150,7 +166,7 @@ def _child(parent: Tree, tag: str, attributes: dict[str, str] | None = None) -> 
 
 
 def _variable(listing: Tree, each: Variable, third: bool) -> None:
-    initial = {"output": "exact", "local": "calculated"}
+    initial = {"output": "exact" if "start" in each.attributes else "calculated", "local": "calculated"}
     common = {
         "name": each.name,
         "valueReference": str(each.reference),
@@ -167,8 +183,18 @@ def _variable(listing: Tree, each: Variable, third: bool) -> None:
 
 def _structure(structure: Tree, listed: Sequence[Variable], third: bool) -> None:
     """What depends on inputs at once: nothing does."""
-    parent = structure if third else _child(structure, "Outputs")
-    for each in listed:
-        if each.causality == "output":
+    outputs = [each for each in listed if each.causality == "output"]
+    read = [each for each in outputs if "start" not in each.attributes]
+    for group, unknown, those in (
+        ("Outputs", "Output", outputs),
+        ("InitialUnknowns", "InitialUnknown", read),
+    ):
+        if not those:
+            continue
+        parent = structure if third else _child(structure, group)
+        for each in those:
             number = {"valueReference": str(each.reference)} if third else {"index": str(each.reference + 1)}
-            _child(parent, "Output" if third else "Unknown", number).set("dependencies", "")
+            # What is read at first depends on the states that were set; it is left open on which.
+            found = _child(parent, unknown if third else "Unknown", number)
+            if group == "Outputs":
+                found.set("dependencies", "")

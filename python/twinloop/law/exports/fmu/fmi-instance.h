@@ -1,6 +1,6 @@
 /* An instance of a twin, as FMI 2.0 and FMI 3.0 have it alike: its values, and how they move on.
 
-   Value references: 0 is the time, then come the states, the commands and the hidden states. */
+   Value references: 0 is the time, then come the states, the commands, the hidden states and what late sensors read. */
 #ifndef FMI_INSTANCE_H
 #define FMI_INSTANCE_H
 
@@ -34,6 +34,9 @@ typedef struct {
     double x[STATES];
     double u[COMMANDS];
     twin_memory memory;
+#if LATE > 0
+    twin_sensors sensors; /* Before they read x. */
+#endif
 } values;
 
 static void values_reset(values *now)
@@ -43,6 +46,9 @@ static void values_reset(values *now)
     memcpy(now->x, x, sizeof x);
     memcpy(now->u, u, sizeof u);
     twin_reset(&now->memory);
+#if LATE > 0
+    twin_begin(&now->sensors);
+#endif
 }
 
 /* Each gives NULL, or what is wrong. */
@@ -57,6 +63,14 @@ static const char *values_get(const values *now, unsigned reference, double *val
         *value = now->u[reference - 1 - STATES];
     } else if (reference <= STATES + COMMANDS + HIDDEN) {
         *value = now->memory.started ? now->memory.hidden[reference - 1 - STATES - COMMANDS] : 0.0;
+#if LATE > 0
+    } else if (reference <= STATES + COMMANDS + HIDDEN + LATE) {
+        static const int places[LATE] = LATE_PLACES;
+        double reading[STATES];
+        twin_sensors sensors = now->sensors;
+        twin_read(&sensors, now->x, reading);
+        *value = reading[places[reference - 1 - STATES - COMMANDS - HIDDEN]];
+#endif
     } else {
         return "Expected the value reference of a variable, found another number.";
     }
@@ -100,6 +114,10 @@ static const char *values_step(values *now, double from, double step)
     memcpy(u, now->u, sizeof u);
     twin_clip(u);
     for (double k = 0.0; k < periods; k += 1.0) {
+#if LATE > 0
+        double reading[STATES];
+        twin_read(&now->sensors, now->x, reading);
+#endif
         twin_step(&now->memory, now->x, u, now->x);
     }
     now->time = from + step;

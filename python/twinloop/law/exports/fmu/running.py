@@ -11,6 +11,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.checks import Simulation
+from twinloop.law.exports.fmu.description import late_states
 from twinloop.law.law import Law
 
 
@@ -26,6 +27,8 @@ def fmu_simulation(version: int, library: Path, token: str, law: Law) -> Simulat
     loaded = ctypes.CDLL(str(library))
     n_x, n_u, dt = law.signals.n_x, law.signals.n_u, law.signals.dt
     states = (c_uint32 * n_x)(*range(1, n_x + 1))
+    late = late_states(law)
+    read = (c_uint32 * len(late))(*range(1 + law.inputs, 1 + law.inputs + len(late)))
     commands = (c_uint32 * n_u)(*range(n_x + 1, n_x + n_u + 1))
 
     def call(name: str, *arguments: object) -> None:
@@ -58,7 +61,19 @@ def fmu_simulation(version: int, library: Path, token: str, law: Law) -> Simulat
         given = (c_double * n_x)(*state.tolist())
         call(f"Set{kind}", instance, states, c_size_t(n_x), *counted(given))
         call("ExitInitializationMode", instance)
-        found = [state.tolist()]
+
+        def seen() -> list[float]:
+            """The states, and beside them what is read where a sensor is late."""
+            call(f"Get{kind}", instance, states, c_size_t(n_x), *counted(given))
+            if not late:
+                return list(given)
+            readings, of = list(given), (c_double * len(late))()
+            call(f"Get{kind}", instance, read, c_size_t(len(late)), *counted(of))
+            for place, value in zip(late, of, strict=True):
+                readings[place] = value
+            return [*given, *readings]
+
+        found = [seen()]
         for k, command in enumerate(driven.tolist()):
             call(f"Set{kind}", instance, commands, c_size_t(n_u), *counted((c_double * n_u)(*command)))
             step = (c_double(k * dt), c_double(dt))
@@ -67,8 +82,7 @@ def fmu_simulation(version: int, library: Path, token: str, law: Law) -> Simulat
                 call("DoStep", instance, *step, c_bool(True), *flags, byref(c_double()))
             else:
                 call("DoStep", instance, *step, c_int(1))
-            call(f"Get{kind}", instance, states, c_size_t(n_x), *counted(given))
-            found.append(list(given))
+            found.append(seen())
         call("Terminate", instance)
         return np.array(found)
 

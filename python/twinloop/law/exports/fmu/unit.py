@@ -21,6 +21,7 @@ from twinloop.law.exports.c_source import c_source
 from twinloop.law.exports.compiling import compiled
 from twinloop.law.exports.fmu.description import (
     build_description,
+    late_states,
     model_description,
     source_files,
     variables,
@@ -141,12 +142,18 @@ def _header(law: Law, name: str, token: str, start: Floats, rest: Floats) -> str
     """What the functions of FMI need to know of a twin."""
     big = name.upper()
     lists = {key: ", ".join(map(repr, values.tolist())) for key, values in (("x", start), ("u", rest))}
+    late = late_states(law)
+    sensors = [
+        f"#define LATE_PLACES {{{', '.join(map(str, late))}}}",
+        f"#define twin_sensors {name}_sensors", f"#define twin_begin {name}_begin", f"#define twin_read {name}_read",
+    ] if late else []  # fmt: skip
     return "\n".join([
         f"/* Written by Twinloop {__version__}: what is behind the interface of FMI. */",
         "#ifndef FMI_TWIN_H", "#define FMI_TWIN_H", "", f'#include "{name}.h"', "",
         f'#define TOKEN "{token}"',
         f"#define STATES {big}_STATES", f"#define COMMANDS {big}_COMMANDS",
         f"#define HIDDEN {len(law.actuation.hidden)}",
+        f"#define LATE {len(late)}", *sensors,
         f"#define PERIOD {big}_DT",
         f"#define STARTS {{{lists['x']}}}", f"#define RESTS {{{lists['u']}}}", "",
         f"typedef {name}_memory twin_memory;", "",
