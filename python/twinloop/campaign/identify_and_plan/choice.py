@@ -121,7 +121,10 @@ class Choice:
                 )
         if better < self.confidence:
             share, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
-            return f"the twin prefers others in {share} of its predictions, and {asked} are asked for"
+            return (
+                f"newly tuned ones are better in only {share} of the twin's predictions, and proven gains are replaced"
+                f" from {asked} on"
+            )
         return ""
 
     def _doubtful(
