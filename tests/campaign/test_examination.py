@@ -12,8 +12,9 @@ import lives
 import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
-from twinloop.campaign.examination.checking import _damping
+from twinloop.campaign.examination.checking import _damping, _delay
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
+from twinloop.campaign.examination.data import movements
 from twinloop.law.linear.margins import LoopMargins
 
 STREAM = np.random.default_rng(7)
@@ -138,6 +139,27 @@ def test_a_twin_without_an_end_stop_that_the_system_has_does_not_pass():
     checks = lives.learnt(lives.with_end_stop, 3).checks()
     assert not checks.twin_passed
     assert {check.subject for check in checks.failed} >= {"twin"}
+
+
+def test_the_least_movement_is_that_of_the_state_that_moved_least_in_its_best_flight(good):
+    (check,) = (check for check in good.checks() if check.name == "movement")
+    slow = []
+    for state, sensor in enumerate(good.twin.noise.sensors):
+        flights = [run.trajectory.states[:, state] for run in good.experiments]
+        slow.append(max(np.sqrt(((x - x.mean()) ** 2).mean()) for x in flights) / sensor)
+    assert check.value == pytest.approx(min(slow)) and check.value > 10.0
+    assert check.verdict == "passed" and not check.binding
+    states = good.experiments[0].trajectory.states
+    assert movements(states, [0.5, 2.0] * states.std(axis=0)) == pytest.approx([2.0, 0.5])
+    assert movements(states, np.array([0.1, 0.0]))[1] == np.inf and movements(states, np.zeros(2)) is None
+
+
+@pytest.mark.parametrize(("delay", "verdict"), [(0.049, "failed"), (0.051, "passed"), (np.inf, "passed")])
+def test_a_loop_that_bears_less_than_a_period_of_delay_is_not_flown(good, delay, verdict):
+    (loop,) = good.examine().margins.worst
+    check = _delay(dataclasses.replace(loop, delay=delay), 0.05)
+    assert check.verdict == verdict and check.binding
+    assert (loop.loop in check.sentence) == np.isfinite(delay)
 
 
 def test_only_what_binds_decides():

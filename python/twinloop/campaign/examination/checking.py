@@ -17,10 +17,14 @@ MISSES = 4.0
 """Spreads by which the last quality that was predicted may have missed."""
 COLOURED = 0.1
 """Share of correlation coefficients that may lie beyond their 99 % limits."""
+MOVED = 10.0
+"""Standard deviations of its sensor that each state is to have moved by in some flight."""
 SENSITIVITY = 2.0
 """Ms up to which a loop is taken for well damped (Åström and Murray 2008, section 12.2)."""
 FRAGILE = 4.0
 """Ms above which a controller is not to be flown: a gain margin of 2.5 dB and 14° of phase are all that it promises."""
+PERIODS = 1.0
+"""Delay, in periods, that the loops have to bear beside their own: clocks, buses and schedulers are late by as much."""
 RISK = 0.05
 """Probability of leaving the envelope up to which a controller is flown."""
 
@@ -44,15 +48,26 @@ def _of_twin(found: Examination) -> Iterator[Check]:
     yield Check(
         "follows", "twin", worst, None, follows, True,
         f"Flown by itself the twin {'follows' if follows else 'does not follow'} the {runs} experiments that it was"
-        f" learnt from: error at most {worst:.2g} (0 is perfect, 1 a model that never moves).",
+        f" learnt from: {_error(worst)} (0 is perfect, 1 a model that never moves).",
     )  # fmt: skip
     grave = [remark for remark in twin.remarks if remark.serious]
     yield Check(
         "remarks", "twin", float(len(grave)), 0.0, not grave, True,
         "Nothing serious speaks against the data or the twin." if not grave else " ".join(str(each) for each in grave),
     )  # fmt: skip
+    if found.movement is not None:
+        state, most = found.movement
+        yield Check(
+            "movement", "twin", most, MOVED, most >= MOVED, False,
+            f"The state that moved least in all flights, {state}, moved by {most:.3g} standard deviations of its"
+            f" sensor; with less than {MOVED:g} little can be learnt of it.",
+        )  # fmt: skip
     yield from _of_unseen(found)
     yield from _of_innovations(found)
+
+
+def _error(worst: float) -> str:
+    return f"error at most {worst:.2g}" if math.isfinite(worst) else "on one it diverges"
 
 
 def _of_unseen(found: Examination) -> Iterator[Check]:
@@ -68,8 +83,8 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
     good = last.error <= LEFT
     yield Check(
         "unseen-flight", "twin", last.error, LEFT, good, True,
-        f"Before it had learnt it, the twin {'predicted' if good else 'did not predict'} {which}: error"
-        f" {last.error:.2g}, at most {LEFT:g} is asked for.",
+        f"Before it had learnt it, the twin {'predicted' if good else 'did not predict'} {which}:"
+        f" {f'error {last.error:.2g}' if math.isfinite(last.error) else 'it diverged'}, at most {LEFT:g} is asked for.",
     )  # fmt: skip
     if last.inside is not None:
         wide = last.inside >= INSIDE
@@ -81,10 +96,13 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
     miss = found.last_miss
     if miss is not None:
         near = abs(miss) <= MISSES
-        yield Check(
-            "quality", "twin", abs(miss), MISSES, near, True,
+        missed = (
             f"The last quality that was predicted missed what was flown by {abs(miss):.2g} of its standard deviations;"
-            f" at most {MISSES:g} are asked for.",
+            f" at most {MISSES:g} are asked for."
+        )
+        diverged = "Of the last flight no quality was predicted: the twin diverged under its gains."
+        yield Check(
+            "quality", "twin", abs(miss), MISSES, near, True, missed if math.isfinite(miss) else diverged,
         )  # fmt: skip
 
 
@@ -114,6 +132,20 @@ def _damping(worst: LoopMargins) -> Check:
     )  # fmt: skip
 
 
+def _delay(worst: LoopMargins, dt: float) -> Check:
+    periods = worst.delay / dt
+    borne = (
+        f"The loop that bears least delay, {worst.loop}, stays stable with up to {1e3 * worst.delay:.3g} ms more,"
+        f" {periods:.3g} periods"
+        if math.isfinite(periods)
+        else "No delay makes any loop unstable"
+    )
+    return Check(
+        "delay", "controller", periods, PERIODS, periods >= PERIODS, True,
+        f"{borne}; at least {PERIODS:g} is asked for, by which a command may be late.",
+    )  # fmt: skip
+
+
 def _of_controller(found: Examination) -> Iterator[Check]:
     best = found.best
     why = found.no_controller if best is None else f"There is a controller to fly. {best.reason}".strip()
@@ -132,6 +164,7 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         )  # fmt: skip
         if stable:  # of a loop that is not, a sensitivity says nothing
             yield _damping(max(margins.worst, key=lambda loop: loop.sensitivity))
+            yield _delay(min(margins.worst, key=lambda loop: loop.delay), found.signals.dt)
     if best.risk is not None:
         safe = best.risk <= RISK
         yield Check(

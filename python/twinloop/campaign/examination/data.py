@@ -58,9 +58,8 @@ def data_quality(
     flown, signals = run.trajectory, run.replayed.signals
     states = continued(flown, signals, flown.states[0]).states
     moved, least = None, ""
-    if sensors is not None and (sensors > 0.0).any():
-        shares = states.std(axis=0) / np.where(sensors > 0.0, sensors, np.inf)
-        shares[sensors <= 0.0] = np.inf
+    shares = movements(states, sensors)
+    if shares is not None:
         place = int(np.argmin(shares))
         moved, least = float(shares[place]), signals.state_names[place]
     large = None if innovations is None else float((np.abs(innovations[1:]) > LARGE).mean())
@@ -75,6 +74,22 @@ def data_quality(
         run.usage,
         fingerprint(run),
     )
+
+
+def movements(states: Floats, sensors: Floats | None) -> Floats | None:
+    """How much each state moved: root mean square about its mean, over its sensor's noise.
+
+    Args:
+        states: of a flight (n + 1, n_x).
+        sensors: standard deviation of each state's readings (n_x,); None where unknown.
+
+    Returns:
+        One a state (n_x,), infinite where its sensor has no noise; None where no sensor has any.
+    """
+    if sensors is None or not (sensors > 0.0).any():
+        return None
+    noise = np.where(sensors > 0.0, sensors, np.inf)
+    return np.where(sensors > 0.0, states.std(axis=0) / noise, np.inf)
 
 
 def fingerprint(run: Experiment) -> str:

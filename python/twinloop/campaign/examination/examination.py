@@ -17,7 +17,7 @@ from twinloop.campaign.examination.correlation import (
     crosscorrelation,
     lags_of,
 )
-from twinloop.campaign.examination.data import DataQuality, data_quality
+from twinloop.campaign.examination.data import DataQuality, data_quality, movements
 from twinloop.campaign.examination.frequency import Responses, frequency_responses
 from twinloop.campaign.examination.learning import ErrorMap, error_map
 from twinloop.campaign.examination.loops import (
@@ -38,7 +38,7 @@ from twinloop.errors import NotAvailable
 from twinloop.law.linear.margins import Loops, Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.test import Test
-from twinloop.trajectory import Trajectory
+from twinloop.trajectory import Trajectory, continued
 
 if TYPE_CHECKING:
     from twinloop.campaign.campaign import Campaign
@@ -172,6 +172,21 @@ class Examination:
             saturated = max((each.saturated for each in effort(run.trajectory, self.signals)), default=0.0)
             found.append(data_quality(run, sensors, own, saturated))
         return tuple(found)
+
+    @cached_property
+    def movement(self) -> tuple[str, float] | None:
+        """The state that moved least, and how much in the flight that moved it most, in noises; None: none is known."""
+        sensors = None if self.twin.noise is None else self.twin.noise.sensors
+        found = [
+            movements(continued(flown, self.signals, flown.states[0]).states, sensors)
+            for flown in (run.trajectory for run in self.experiments)
+        ]
+        known = [each for each in found if each is not None]
+        if not known:
+            return None
+        most = np.max(known, axis=0)
+        place = int(np.argmin(most))
+        return self.signals.state_names[place], float(most[place])
 
     # The controller
 

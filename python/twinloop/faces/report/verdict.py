@@ -22,9 +22,11 @@ EVIDENCE = {
     "whiteness": "autocorrelation",
     "commands": "crosscorrelation",
     "remarks": "remarks",
+    "movement": "data",
     "controller": "gains-table",
     "stable": "margins",
     "sensitivity": "margins",
+    "delay": "margins",
     "envelope": "envelope",
     "flown": "step",
 }
