@@ -1,7 +1,10 @@
 """The report: what it says first, that links lead somewhere, that nothing is fetched, and nothing strange gets in."""
 
+import dataclasses
+import html
 import re
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +13,17 @@ from click.testing import CliRunner
 import lives
 import twinloop as tl
 from conftest import pendulum_step
+from twinloop.faces.certificate import facts
 from twinloop.faces.cli import main
 from twinloop.faces.figures.axis import axis
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.figure import Band, Figure, Line, Panel
 from twinloop.faces.figures.svg import drawing, panel_svg
+from twinloop.faces.report.moot import moot
 from twinloop.faces.report.page import report_page
+from twinloop.faces.report.source import OWN
+from twinloop.faces.report.tables import margins as margins_table
+from twinloop.faces.result import summary
 from twinloop.records import to_text
 
 pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
@@ -66,6 +74,79 @@ def test_the_verdict_comes_first_with_numbers(good, bad, page):
     )
     of_bad = first_words(report_page(bad, "stop", {"name": "a pendulum"}, {}))
     assert "Do not trust it" in of_bad and "Fly it" not in of_bad
+
+
+def table(text, name):
+    """Cells of a table of the page, row by row; none where something else stands in its place."""
+    part = text[text.index(f'id="{name}"') :]
+    part = part[: part.index("</section>")]
+    rows = re.findall(r"<tr>(.*?)</tr>", part, re.DOTALL)
+    return [[html.unescape(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)] for row in rows]
+
+
+def test_a_controller_that_flew_has_one_prediction_the_one_before_its_flight():
+    campaign = lives.learnt(pendulum_step, 3)
+    best = campaign.best_test
+    if best.measured is None:  # fly it, as a person would
+        test = campaign.ask(last=True)
+        campaign.tell(test, lives.PLANT.run(test))
+        best = campaign.best_test
+    before = next(run.test for run in campaign.experiments if run.number == best.number)
+    assert best.measured is not None and before.predicted is not None
+    assert best.predicted != before.predicted  # what the twin makes of a flight that it has learnt
+    result = summary(campaign, {"name": "p"}, {})
+    assert (result["controller"]["predicted"], result["controller"]["spread"]) == (
+        before.predicted,
+        before.spread,
+    )
+    page = report_page(campaign, "p", {"name": "p"}, {})
+    assert f"less is better): {before.predicted:.4g} ± {before.spread:.2g} predicted, " in first_words(page)
+    (row,) = (row for row in table(page, "flights-table") if row[0] == f"test {best.number}")
+    assert row[1:3] == [f"{before.predicted:.4g}", f"{before.spread:.2g}"]
+    certified = facts(campaign, campaign.certificate(), "p.db", "p", None, {})["prediction"]
+    assert (certified["quality"], certified["spread"]) == (before.predicted, before.spread)
+
+
+def test_numbers_that_rest_on_a_twin_that_does_not_follow_give_way_to_the_reason(page, good, monkeypatch):
+    assert table(page, "margins") and "Not shown" not in page
+    monkeypatch.setattr(tl.Twin, "follows", property(lambda twin: False))
+    text = report_page(good, "stop", {"name": "a pendulum"}, {})
+    shown = text[text.index('id="controller"') : text.index('id="campaign"')]
+    assert not table(text, "margins") and shown.count("does not follow the flights") > 5
+    assert all(row[2:] == ["–"] * 4 for row in table(text, "steps")[1:] if not row[1].startswith("flown"))
+    assert not {"stable", "sensitivity", "delay"} & {check.name for check in good.checks()}
+    assert "not predicted, as the twin does not follow its flights" in first_words(text)
+    assert "Do not trust it" in first_words(text)
+
+
+def test_a_loop_that_is_unstable_has_no_margins(good):
+    found = good.examine()
+    (nominal,) = found.margins.nominal
+    unstable = dataclasses.replace(nominal, stable=False)
+    for changes, cells in (({"worst": (unstable,)}, 1), ({"worst": (unstable,), "nominal": (unstable,)}, 2)):
+        rows = margins_table(SimpleNamespace(margins=dataclasses.replace(found.margins, **changes))).rows
+        assert [row[2:] == [*["–"] * 7, "NO"] for row in rows] == [place < cells for place in range(2)]
+    found.margins = dataclasses.replace(found.margins, nominal=(unstable,))
+    assert "unstable" in moot(found)["nyquist"] and "closed-poles" not in moot(found)
+
+
+def test_what_is_trusted_is_said_with_its_range(page, good):
+    runs = [run.trajectory for run in good.experiments]
+    assert "within the range that was flown, for flights of up to 2 s" in first_words(page)
+    angles = np.degrees(np.concatenate([run.states[:, 0] for run in runs]))
+    row = next(row for row in table(page, "ranges") if row[0] == "angle")
+    assert row[1] == "°" and [float(cell.replace("−", "-")) for cell in row[2:]] == pytest.approx(
+        [angles.min(), angles.max()], rel=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "system", "title"),
+    [("hover", "quadrotor", "hover"), ("campaign", "quadrotor", "quadrotor"), ("campaign", OWN, "angle, rate"),
+     ("campaign", "campaign", "angle, rate")],
+)  # fmt: skip
+def test_a_campaign_that_nobody_named_is_called_by_its_system_or_its_states(good, name, system, title):
+    assert f"<h1>{title}</h1>" in report_page(good, name, {"name": system}, {})
 
 
 def test_every_link_leads_to_something_on_the_page(page, bad):

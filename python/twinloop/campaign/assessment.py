@@ -69,6 +69,27 @@ def advice(twin: Twin, setup: Setup, lessons: Sequence[Lesson], best: Test | Non
     )
 
 
+def foretold(best: Test, experiments: Sequence[Experiment]) -> tuple[float | None, float | None]:
+    """The quality that was predicted of a controller, and its spread.
+
+    Where its flight was foretold, that is what was said before it: what a twin makes of a flight that it has learnt is
+    no prediction. Elsewhere it is what the twin says now.
+
+    Args:
+        best: test of the controller.
+        experiments: in the order told.
+
+    Returns:
+        Both; None where nobody knows.
+    """
+    for run in reversed(experiments):
+        test = run.test
+        flown = test is not None and test.number == best.number and best.measured is not None
+        if test is not None and flown and test.predicted is not None:
+            return test.predicted, test.spread
+    return best.predicted, best.spread
+
+
 @dataclass(frozen=True)
 class Disturbance:
     """What moves a state beside the commands; standard deviations.

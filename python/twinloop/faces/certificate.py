@@ -13,6 +13,7 @@ from twinloop import __version__
 from twinloop.arrays import Floats
 from twinloop.autopilots import Autopilot
 from twinloop.campaign import Campaign
+from twinloop.campaign.assessment import foretold
 from twinloop.campaign.certificate import Certificate
 from twinloop.errors import NotAvailable
 from twinloop.faces.result import plain_dict, quality_unit
@@ -72,11 +73,12 @@ def facts(
         "autopilot": None,
     }
     if best is not None and found.step is not None:
+        predicted, spread = foretold(best, found.experiments)
         result["prediction"] = {
             "kind": quality.kind,
             "unit": quality_unit(quality),
-            "quality": best.predicted,
-            "spread": best.spread,
+            "quality": predicted,
+            "spread": spread,
             "t": found.step.t,
             "states": found.step.states,
             "band": found.step.band,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign import Campaign, assessment, controller_to_fly
 from twinloop.errors import NotAvailable
 from twinloop.faces.figures.units import shown_unit
 from twinloop.objectives import normalised_error
@@ -144,10 +144,9 @@ def _qualities(axes: Any, campaign: Campaign, label: str) -> None:
         color=TWIN, marker="D", markersize=4.5, linestyle="none", capsize=3.0, label="predicted ± spread",
     )  # fmt: skip
     best = controller_to_fly(campaign)[0]
-    if best is not None and best.predicted is not None and math.isfinite(best.predicted):
-        axes.axhline(
-            best.predicted, color=TWIN, linewidth=0.8, linestyle=":", label="controller to fly, predicted"
-        )
+    expected = None if best is None else assessment.foretold(best, campaign.experiments)[0]
+    if expected is not None and math.isfinite(expected):
+        axes.axhline(expected, color=TWIN, linewidth=0.8, linestyle=":", label="controller to fly, predicted")
     axes.set_xlabel("test")
     axes.set_ylabel(label)
     axes.set_ylim(bottom=0.0)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.campaign.assessment import disturbances, expected_quality
+from twinloop.campaign.assessment import disturbances, expected_quality, foretold
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
 from twinloop.law.accuracy import TestErrors
@@ -105,6 +105,7 @@ def _quality(quality: Quality) -> dict[str, object]:
 
 def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, object]:
     bounds = campaign.family.at_bounds(best.genes)
+    predicted, spread = foretold(best, campaign.experiments)
     found: dict[str, object] = {
         "test": best.number,
         "gains": [
@@ -118,12 +119,12 @@ def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, o
             }
             for gain in campaign.family.law_gains
         ],
-        "predicted": best.predicted,
+        "predicted": predicted,
         "measured": best.measured,
     }
     if identified:
         flown = any(run.number == best.number for run in campaign.experiments)
-        found |= {"spread": best.spread, "risk": best.risk, "why": best.reason, "flown": flown}
+        found |= {"spread": spread, "risk": best.risk, "why": best.reason, "flown": flown}
     return found
 
 

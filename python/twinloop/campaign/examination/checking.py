@@ -47,8 +47,9 @@ def _of_twin(found: Examination) -> Iterator[Check]:
     follows = twin.follows
     yield Check(
         "follows", "twin", worst, None, follows, True,
-        f"Flown by itself the twin {'follows' if follows else 'does not follow'} the {runs} experiments that it was"
-        f" learnt from: {_error(worst)} (0 is perfect, 1 a model that never moves).",
+        f"Flown by itself the twin {'follows' if follows else 'does not follow'} the"
+        f" {runs} experiment{'s' * (runs != 1)} that it was learnt from: {_error(worst)} (0 is perfect, 1 a"
+        " model that never moves).",
     )  # fmt: skip
     grave = [remark for remark in twin.remarks if remark.serious]
     yield Check(
@@ -154,7 +155,8 @@ def _of_controller(found: Examination) -> Iterator[Check]:
     )  # fmt: skip
     if best is None:
         return
-    margins = found.margins
+    # Loops around a twin that does not follow its own flights say nothing of the system's.
+    margins = found.margins if found.twin.follows else None
     if margins is not None:
         stable = all(loop.stable for loop in margins.worst)
         yield Check(

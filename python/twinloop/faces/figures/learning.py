@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from twinloop.campaign.assessment import foretold
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Cells, Figure, Level, Line, Mark, Panel, Spans
 from twinloop.faces.figures.units import said, words
@@ -81,8 +82,9 @@ def qualities(found: Examination) -> Figure | None:
         ),
     ]
     best = found.best
-    if best is not None and best.predicted is not None and math.isfinite(best.predicted):
-        marks.append(Level(best.predicted, "target", "controller to fly, predicted"))
+    predicted = None if best is None else foretold(best, found.experiments)[0]
+    if predicted is not None and math.isfinite(predicted):
+        marks.append(Level(predicted, "target", "controller to fly, predicted"))
     most = max([q for _, q in flown] + [q + 2 * s for _, q, s in told] + [0.0])
     main = Panel(
         "Quality of each flight (less is better)",

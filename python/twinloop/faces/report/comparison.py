@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from twinloop import _core
+from twinloop.campaign.assessment import foretold
 from twinloop.campaign.examination.checking import checks
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.page import templates
@@ -71,9 +72,10 @@ def _answers(source: Source) -> list[Row]:
     ]
     rows.append(("controller", "none" if best is None else f"test {best.number}"))
     if best is not None:
+        predicted, spread = foretold(best, found.experiments)
         rows += [
-            ("quality predicted", best.predicted),
-            ("± spread", best.spread),
+            ("quality predicted (less is better)", predicted),
+            ("± spread", spread),
             ("quality flown", best.measured),
             ("risk", best.risk),
         ]
@@ -81,12 +83,15 @@ def _answers(source: Source) -> list[Row]:
     if found.margins is not None:
         worst = found.margins.worst
         gain = min(loop.gain for loop in worst)
-        rows += [
-            ("worst gain margin (dB)", 20.0 * math.log10(gain)),
-            ("worst phase margin (°)", math.degrees(min(loop.phase for loop in worst))),
-            ("worst delay margin (ms)", 1e3 * min(loop.delay for loop in worst)),
-            ("largest Ms", max(loop.sensitivity for loop in worst)),
-        ]
+        if all(loop.stable for loop in worst):
+            rows += [
+                ("worst gain margin (dB)", 20.0 * math.log10(gain)),
+                ("worst phase margin (°)", math.degrees(min(loop.phase for loop in worst))),
+                ("worst delay margin (ms)", 1e3 * min(loop.delay for loop in worst)),
+                ("largest Ms", max(loop.sensitivity for loop in worst)),
+            ]
+        else:
+            rows.append(("margins", "none: a loop is unstable"))
     if best is not None:
         rows += [(f"gain {name}", value) for name, value in best.parameters.items()]
     return rows

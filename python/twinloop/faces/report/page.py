@@ -15,9 +15,15 @@ from twinloop.faces.figures.catalogue import CAMPAIGN, CONTROLLER, FIGURES, TWIN
 from twinloop.faces.figures.figure import Figure
 from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
 from twinloop.faces.figures.svg import panel_svg
+from twinloop.faces.figures.units import words
 from twinloop.faces.report import tables
+from twinloop.faces.report.moot import moot
+from twinloop.faces.report.source import OWN
 from twinloop.faces.report.verdict import EVIDENCE, verdict
 from twinloop.faces.result import summary
+
+UNNAMED = "campaign"
+"""The name of a campaign that nobody has named."""
 
 
 def templates() -> Any:
@@ -79,14 +85,15 @@ def report_page(
     if not controller:
         found.best = None
     text: str = template.render(
-        name=name,
+        name=_title(campaign, name, str(system["name"])),
         result=result,
-        system=result["system"],
+        system=OWN if system["name"] == UNNAMED else system["name"],
         unlearnt=len(found.experiments) - found.learnt,
         tuned=controller,
         verdict=verdict(found, checked, result)[: None if controller else 1],
         checks=[check for check in checked if controller or check.subject == "twin"],
         evidence=EVIDENCE,
+        moot=moot(found),
         equations="\n".join(result["twin"]["equations"]),  # type: ignore[call-overload,index,arg-type]
         remarks=campaign.twin.remarks,
         twin_figures=_figures(found, TWIN),
@@ -94,7 +101,7 @@ def report_page(
         campaign_figures=_figures(found, CAMPAIGN),
         twin_tables=_present(
             tables.states(result), tables.disturbances(result), tables.actuators(result), tables.rivals(found),
-            *tables.poles(found)[:1],
+            *tables.poles(found)[:1], tables.ranges(found),
         ),
         controller_tables=_present(
             tables.gains(result), tables.margins(found), tables.steps(found), tables.effort(found),
@@ -107,6 +114,14 @@ def report_page(
         version=_core.__version__,
     )  # fmt: skip
     return text
+
+
+def _title(campaign: Campaign, name: str, system: str) -> str:
+    """What a campaign is called: by its own name, else by its system's, else by its states."""
+    for known in (name, system):
+        if known not in (UNNAMED, OWN):
+            return known
+    return ", ".join(words(state) for state in campaign.signals.state_names)
 
 
 def _present(*found: tables.Table | None) -> list[tables.Table]:

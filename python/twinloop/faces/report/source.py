@@ -16,6 +16,8 @@ from twinloop.store import is_address
 
 LARGEST = 1 << 30
 """Bytes of a record that is read."""
+OWN = "a system of your own"
+"""A system that has no name."""
 
 
 @dataclass(frozen=True)
@@ -81,14 +83,12 @@ def _of_record(path: Path, name: str | None) -> Source:
             f"{what}: expected the record of a campaign, as campaign.to_record() gives, found another JSON; a result"
             " that `--output` wrote has no flights to examine: keep the campaign with --store."
         )
-    return Source(Campaign.from_record(record), name or path.stem, "a system of your own", ())
+    return Source(Campaign.from_record(record), name or path.stem, OWN, ())
 
 
 def _of_store(where: str, name: str | None) -> Source:
     held = look(where, name, read_only=True)
-    kind = (
-        "a system of your own" if held.system is None else str(held.system.get("kind", "")).replace("_", " ")
-    )
+    kind = OWN if held.system is None else str(held.system.get("kind", "")).replace("_", " ")
     campaign = Campaign.load(where, held.name, read_only=True)
     return Source(campaign, held.name, kind, [_session(session) for session in held.sessions])
 

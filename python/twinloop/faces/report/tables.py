@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.poles import Pole
 from twinloop.campaign.examination.use import envelope_use
-from twinloop.faces.figures.units import said, words
+from twinloop.faces.figures.units import said, shown_unit, words
 from twinloop.faces.text import cell, counted, held_at, quality_words
 
 RIVALS = 3
@@ -60,6 +62,11 @@ def shown_value(value: object) -> str:
             else f"{value:.4g}".replace("-", "−")
         )
     return cell(value)
+
+
+def shown_spread(value: float | None) -> str | None:
+    """A standard deviation, with as many digits as it is worth."""
+    return None if value is None else f"{value:.2g}"
 
 
 def states(result: Mapping[str, Any]) -> Table | None:
@@ -180,13 +187,16 @@ def margins(found: Examination) -> Table | None:
     known = found.margins
     if known is None:
         return None
-    rows = []
+    rows: list[list[object]] = []
     for nominal, worst in zip(known.nominal, known.worst, strict=True):
         for which, loop in (("worst", worst), ("twin", nominal)):
+            if not loop.stable:
+                rows.append([words(loop.loop), which, *[None] * 7, "NO"])
+                continue
             rows.append(
                 [words(loop.loop), which, 20.0 * math.log10(loop.gain) if loop.gain > 0 else None,
                  20.0 * math.log10(loop.gain_down) if loop.gain_down > 0 else -math.inf, math.degrees(loop.phase),
-                 1e3 * loop.delay, loop.crossover, loop.sensitivity, loop.complementary, "yes" if loop.stable else "NO"]
+                 1e3 * loop.delay, loop.crossover, loop.sensitivity, loop.complementary, "yes"]
             )  # fmt: skip
     head = [
         "loop",
@@ -203,7 +213,7 @@ def margins(found: Examination) -> Table | None:
     note = (
         f"Each loop broken at the {known.broken_at}, the others closed, at the target, with delays and lags; worst: the"
         f" worst of each over {known.members} model{'s' * (known.members != 1)} of the committee, which need not be one"
-        " model's."
+        " model's. A loop that is unstable on one of them has no margins."
     )
     return _table("margins", "Margins", head, rows, note)
 
@@ -217,23 +227,22 @@ def steps(found: Examination) -> Table | None:
         runs.append(("flown", found.best_flown.trajectory))
     if found.old is not None:
         runs.append(("first gains, on the twin", found.old))
-    rows = [
-        [
-            words(answer.state),
-            name,
-            answer.rise,
-            100.0 * answer.overshoot,
-            answer.settling,
-            100.0 * answer.left,
-        ]
-        for i in range(len(found.step(found.planned)))
-        for name, run in runs
-        for answer in [found.step(run)[i]]
-    ]
+    follows, steps = found.twin.follows, found.setup.steps
+    rows: list[list[object]] = []
+    for i in range(len(found.step(found.planned))):
+        for name, run in runs:
+            answer = found.step(run)[i]
+            on_twin = name != "flown"
+            if on_twin and (not follows or run.steps < steps):
+                why = "it diverges" if run.steps < steps else "the twin does not follow"
+                rows.append([words(answer.state), f"{name}: {why}", *[None] * 4])
+                continue
+            numbers = [answer.rise, 100.0 * answer.overshoot, answer.settling, 100.0 * answer.left]
+            rows.append([words(answer.state), name, *numbers])
     if not rows:
         return None
     head = ["state", "flight", "rise 10–90 % (s)", "overshoot (%)", "settling 5 % (s)", "off at the end (%)"]
-    return _table("steps", "The step", head, rows, "–: it does not get there within the flight.")
+    return _table("steps", "The step", head, rows, "–: it does not get there within the flight.", texts=(1,))
 
 
 def effort(found: Examination) -> Table | None:
@@ -294,6 +303,24 @@ def envelope(found: Examination) -> Table | None:
     return _table("envelope", "Use of the envelope", head, rows, f"100 % is a bound.{risk}")
 
 
+def ranges(found: Examination) -> Table:
+    """What was flown: where the twin's word holds."""
+    runs = [run.trajectory for run in found.experiments]
+    rows: list[list[object]] = []
+    of_states = [(state.name, state.unit) for state in found.signals.states]
+    of_commands = [(command.name, command.unit) for command in found.signals.commands]
+    for signals, values in (
+        (of_states, [run.states for run in runs]),
+        (of_commands, [run.commands for run in runs]),
+    ):
+        every = np.concatenate(values)
+        for (name, unit), low, high in zip(signals, every.min(axis=0), every.max(axis=0), strict=True):
+            factor, shown = shown_unit(unit)
+            rows.append([words(name), shown, factor * float(low), factor * float(high)])
+    note = "Of all flights together. Beyond, the twin goes on from its equations, and nobody has looked."
+    return _table("ranges", "The range that was flown", ["signal", "unit", "from", "to"], rows, note)
+
+
 def data(found: Examination) -> Table:
     """Data quality, flight by flight."""
     rows = [
@@ -324,7 +351,7 @@ def flights(result: Mapping[str, Any]) -> Table:
     """Predicted and flown, with the reason of each."""
     rows = [
         [
-            said(run["test"]), run["predicted"], run.get("spread"), run["measured"],
+            said(run["test"]), run["predicted"], shown_spread(run.get("spread")), run["measured"],
             run.get("predicted_minus_measured"),
             run.get("risk"), run.get("why") or ("" if run["test"] is None else "Gains of your own."),
         ]
@@ -332,5 +359,8 @@ def flights(result: Mapping[str, Any]) -> Table:
     ]  # fmt: skip
     head = ["flight", "predicted", "± spread", "flown", "predicted − flown", "risk", "why"]
     measure = result["quality"]
-    note = f"Quality: {quality_words(measure['kind'], measure['unit'])}. What counts: {counted(measure)}."
+    note = (
+        f"Quality: {quality_words(measure['kind'], measure['unit'])}; less is better. What counts: {counted(measure)}."
+        " Predicted and its spread are what was said before the flight."
+    )
     return _table("flights-table", "Flights", head, rows, note, texts=(6,))

@@ -12,6 +12,7 @@ import numpy as np
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.units import said, words
+from twinloop.faces.report.tables import shown_spread, shown_value
 from twinloop.faces.text import quality_words
 
 EVIDENCE = {
@@ -92,9 +93,21 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
     if found.autocorrelation is not None:
         text += " What is left is noise: it is correlated neither with itself nor with the commands."
     return Sentence(
-        "Twin", "Trust it", True, text,
-        (("unseen", "unseen flight"), ("crosscorrelation", "what is left"), ("checks", "all checks")),
+        "Twin", "Trust it where it was flown", True, f"{text} {_scope(found)}".strip(),
+        (("unseen", "unseen flight"), ("ranges", "the range"), ("crosscorrelation", "what is left"),
+         ("checks", "all checks")),
     )  # fmt: skip
+
+
+def _scope(found: Examination) -> str:
+    """For what the twin may be trusted: as long and as far as was flown."""
+    longest = max(float(run.trajectory.t[-1] - run.trajectory.t[0]) for run in found.experiments)
+    held = f"This holds within the range that was flown, for flights of up to {longest:.3g} s"
+    if found.beyond is None:
+        return f"{held}."
+    share = f"{100.0 * found.beyond:.0f}"
+    leaves = "stays inside" if share == "0" else f"leaves it for {share} % of its time"
+    return f"{held}; the task under the controller to fly {leaves}."
 
 
 def _unseen(found: Examination) -> str:
@@ -124,14 +137,11 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
     if best is None or found.best is None:
         return Sentence("Controller", "None to fly", False, found.no_controller, (("checks", "all checks"),))
     measure = result["quality"]
-    quality = quality_words(measure["kind"], measure["unit"])
-    told = f"{quality} {_number(best['predicted'])}"
-    if best.get("spread") is not None:  # the preset paper gives none
-        told += f" ± {_spread(best['spread'])}"
-    told += " predicted"
-    told += f", {_number(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
+    quality = quality_words(measure["kind"], measure["unit"]).rstrip(")")
+    told = f"{quality}{'; ' if measure['unit'] else ' ('}less is better): {_predicted(found, best)}"
+    told += f", {shown_value(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
     if first is not None and first["measured"] is not None:
-        told += f"; the first gains had {_number(first['measured'])}"
+        told += f"; the first gains had {shown_value(first['measured'])}"
     margins = _margins(found)
     if failed:
         return Sentence(
@@ -146,6 +156,17 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
         "Controller", "Fly it" if best["measured"] is None else "Keep it", True, f"{_capital(told)}.{margins}",
         (("step", "step"), ("margins", "margins"), ("gains-table", "gains")),
     )  # fmt: skip
+
+
+def _predicted(found: Examination, best: Mapping[str, Any]) -> str:
+    if best["predicted"] is None:
+        return "not predicted, as the twin diverges under these gains"
+    if not found.twin.follows:
+        return "not predicted, as the twin does not follow its flights"
+    spread = best.get("spread")  # the preset paper gives none
+    return (
+        f"{shown_value(best['predicted'])}{'' if spread is None else f' ± {shown_spread(spread)}'} predicted"
+    )
 
 
 def _margins(found: Examination) -> str:
@@ -214,10 +235,6 @@ def _links(failed: list[Check]) -> tuple[tuple[str, str], ...]:
 
 def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:.3g}"
-
-
-def _spread(value: float | None) -> str:
-    return "–" if value is None else f"{value:.1g}"
 
 
 def _capital(text: str) -> str:
