@@ -366,8 +366,16 @@ class Family:
         """Places (rows, size) of parameters (rows, size), 0 to 1 between the bounds, on each one's scale."""
     def at(self, places: ArrayLike) -> _Floats:
         """Parameters (rows, size) at places (rows, size), those beyond a bound at the bound."""
-    def controller(self, parameters: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
+    def controller(
+        self, parameters: ArrayLike, excitation: ArrayLike | None = None, hold_back: HoldBack | None = None
+    ) -> Controller:
         """excitation (n, n_u): a row is added to each command in turn, nothing after the last."""
+
+@final
+class HoldBack:
+    """How much of an excitation is sent, by what the states do; ranges (n_x, 2), infinite where there are none."""
+
+    def __new__(cls, full: ArrayLike, none: ArrayLike) -> HoldBack: ...
 
 @final
 class Controller:
@@ -419,6 +427,7 @@ class LookAhead:
         envelope: ArrayLike,
         *,
         excitation: ArrayLike | None = None,
+        hold_back: HoldBack | None = None,
     ) -> LookAhead:
         """Parameters (size,), target (n_x,) or (steps + 1, n_x), envelope (n_x, 2), excitation (steps, n_u)."""
     def reset(self) -> None: ...
@@ -452,6 +461,7 @@ def rollout(
     *,
     noise: ArrayLike | None = None,
     excitation: ArrayLike | None = None,
+    hold_back: HoldBack | None = None,
     disturbance: ArrayLike | None = None,
     workers: Workers | None = None,
 ) -> Runs:
@@ -486,6 +496,7 @@ class SelectedTests:
         states: ArrayLike,
         commands: ArrayLike,
         excitation: ArrayLike | None = None,
+        hold_back: HoldBack | None = None,
     ) -> SelectedTests:
         """These and one more: states (n + 1, n_x) as measured, commands (n, n_u), excitation (≥ n, n_u)."""
     def with_record(self, states: ArrayLike, commands: ArrayLike) -> SelectedTests:
@@ -535,6 +546,7 @@ class Flights:
         steps: int,
         *,
         excitation: ArrayLike | None = None,
+        hold_back: HoldBack | None = None,
     ) -> Flights:
         """parameters (K, size), initial and target states (K, n_x), excitation (K, steps, n_u)."""
     @property

@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats, Integers, floats
 from twinloop.controllers import Family
 from twinloop.errors import engine_input
+from twinloop.hold_back import HoldBack
 from twinloop.limits import Limits
 from twinloop.signals import Signals
 
@@ -23,6 +24,7 @@ def candidates(
     steps: int,
     *,
     excitation: ArrayLike | None = None,
+    hold_back: HoldBack | None = None,
     limits: Limits | None = None,
 ) -> _core.Flights:
     """K flights of one length, laid out for the engine once and judged as often as needed.
@@ -35,6 +37,7 @@ def candidates(
             flight (K, n + 1, n_x).
         steps: number of commands of each, n.
         excitation: what is added to the commands of each (K, n, n_u), in their units; None: nothing.
+        hold_back: what holds the excitation of all of them back while they fly; None: nothing does.
         limits: where a flight counts as diverged; None: at ten times a state's scale.
 
     Returns:
@@ -53,6 +56,7 @@ def candidates(
             _states("Flights, target states", target_states, len(rows), n_x, steps),
             steps,
             excitation=excitation,
+            hold_back=None if hold_back is None else hold_back.engine,
         )
 
 

@@ -44,8 +44,9 @@ def selected_tests(
         selected = _core.SelectedTests((limits or Limits(family.signals)).setting(family))
         for test, trajectory in zip(tests, trajectories, strict=True):
             selected = selected.with_test(
-                test.genes, test.target_state, trajectory.states, trajectory.commands, test.excitation
-            )
+                test.genes, test.target_state, trajectory.states, trajectory.commands, test.excitation,
+                None if test.hold_back is None else test.hold_back.engine,
+            )  # fmt: skip
     return selected
 
 

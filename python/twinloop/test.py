@@ -13,6 +13,7 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, whole
 from twinloop.controllers.family import Controller, Family
 from twinloop.errors import InvalidInput
+from twinloop.hold_back import HoldBack
 from twinloop.records import Recorded
 from twinloop.replay import Replay
 from twinloop.showing import Shown
@@ -40,6 +41,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
         spread: standard deviation that the measured quality is expected to have; None where nothing was predicted.
         risk: probability that the flight leaves the envelope, by the committee; None where there was none.
         reason: why this test, for a person.
+        hold_back: what holds the excitation back while it flies; None: nothing does.
 
     Raises:
         InvalidInput: shapes that do not fit the family's signals, or numbers that are not finite.
@@ -60,6 +62,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
     spread: float | None = None
     risk: float | None = None
     reason: str = ""
+    hold_back: HoldBack | None = None
 
     def __post_init__(self) -> None:
         n_x = self.family.signals.n_x
@@ -71,6 +74,10 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
         if self.excitation is not None:
             shape = (self.steps, self.family.signals.n_u)
             object.__setattr__(self, "excitation", floats("Test.excitation", self.excitation, shape))
+        if self.hold_back is not None and len(self.hold_back.full) != n_x:
+            raise InvalidInput(
+                f"Test.hold_back: expected ranges of {n_x} states, found {len(self.hold_back.full)}."
+            )
 
     @property
     def signals(self) -> Signals:
@@ -97,7 +104,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
 
     def controller(self) -> Controller:
         """A fresh controller for one run: `.command(state, target)` once a period, the excitation in it."""
-        return self.family.controller(self.genes, self.excitation)
+        return self.family.controller(self.genes, self.excitation, self.hold_back)
 
     def judged(self, predicted: float | None, measured: float | None) -> Test:
         """The same test with its quality.
@@ -113,7 +120,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
 
     def quiet(self) -> Test:
         """The same test without its excitation: what is flown once nothing is to be learnt any more."""
-        return dataclasses.replace(self, excitation=None)
+        return dataclasses.replace(self, excitation=None, hold_back=None)
 
     def explained(self, spread: float, risk: float, reason: str) -> Test:
         """The same test with what a committee says of it.
@@ -136,6 +143,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
             and self.initial_state.tobytes() == other.initial_state.tobytes()
             and self.target_state.tobytes() == other.target_state.tobytes()
             and _bits(self.excitation) == _bits(other.excitation)
+            and _ranges(self.hold_back) == _ranges(other.hold_back)
         )
 
     def __repr__(self) -> str:
@@ -180,6 +188,10 @@ def final_distance(last_state: ArrayLike, target_state: ArrayLike, signals: Sign
 
 def _bits(values: Floats | None) -> bytes | None:
     return None if values is None else values.tobytes()
+
+
+def _ranges(hold_back: HoldBack | None) -> tuple[bytes, bytes] | None:
+    return None if hold_back is None else (hold_back.full.tobytes(), hold_back.none.tobytes())
 
 
 def check_signals(test: object, signals: Signals) -> None:

@@ -72,6 +72,8 @@ class World:
         self.setting = _core.Setting(self.limits, self.family)
         empty = _core.SelectedTests(self.setting)
         self.selected = empty.with_test(self.gains[0], self.target, self.states, self.commands)
+        self.inner = np.array([(-1.0, 1.0)] * n_x)
+        self.hold_back = _core.HoldBack(self.inner, 2.0 * self.inner)
         self.ahead = _core.LookAhead(
             [self.model], self.setting, self.gains[0], self.target, 4, [(-2.0, 2.0)] * n_x
         )
@@ -143,6 +145,7 @@ def calls(world):
     ahead = {
         "members": [w.model], "setting": w.setting, "parameters": w.gains[0], "target": w.target, "steps": 5,
         "envelope": np.array([(-1.0, 1.0)] * w.n_x), "excitation": np.zeros((5, w.n_u)),
+        "hold_back": w.hold_back,
     }  # fmt: skip
     learnt = {"form": "absolute", "signals": w.signals}
     found = {
@@ -210,7 +213,7 @@ def calls(world):
         ),
         "Family.controller": (
             w.family.controller,
-            {"parameters": w.gains[0], "excitation": w.excitation[0]},
+            {"parameters": w.gains[0], "excitation": w.excitation[0], "hold_back": w.hold_back},
         ),
         "Controller.reset": (w.family.controller(w.gains[0]).reset, {}),
         "Controller.command": (
@@ -225,9 +228,11 @@ def calls(world):
                 **flown,
                 "noise": w.noise,
                 "excitation": w.excitation,
+                "hold_back": w.hold_back,
                 "disturbance": w.disturbance,
             },
         ),
+        "HoldBack": (_core.HoldBack, {"full": w.inner, "none": 2.0 * w.inner}),
         "Limits": (_core.Limits, {"signals": w.signals, "divergence_factor": 10.0}),
         "Setting": (_core.Setting, {"limits": w.limits, "family": w.family}),
         "SelectedTests": (_core.SelectedTests, {"setting": w.setting}),
@@ -243,6 +248,7 @@ def calls(world):
                 "states": w.states,
                 "commands": w.commands,
                 "excitation": w.excitation[0],
+                "hold_back": w.hold_back,
             },
         ),
         "SelectedTests.__len__": (w.selected.__len__, {}),
@@ -260,6 +266,7 @@ def calls(world):
                 **starts,
                 "steps": 4,
                 "excitation": w.excitation,
+                "hold_back": w.hold_back,
             },
         ),
         "Flights.__len__": (w.flights.__len__, {}),
@@ -585,7 +592,18 @@ STARTS = {
     *((f"Family.{law}", "signals") for law in LAWS),
 }
 """Arguments that all others are numbers for."""
-NUMBERS = {"program", "first", "second", "grammar", "task", "quality", "grams", "population", "archive"}
+NUMBERS = {
+    "hold_back",
+    "program",
+    "first",
+    "second",
+    "grammar",
+    "task",
+    "quality",
+    "grams",
+    "population",
+    "archive",
+}
 """Arguments that are made of numbers without a unit or a period: others where they are more or fewer."""
 ALONE = {
     ("Model", "signals"),

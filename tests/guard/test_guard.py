@@ -16,6 +16,7 @@ from twinloop import _core
 from twinloop.guard import Guard, Guarded
 from twinloop.guard.band import DRAWS, BandWatch
 from twinloop.guard.guarded import led_by
+from twinloop.hold_back import HoldBack
 
 ANGLE, RATE = PENDULUM_SIGNALS.states
 SIGNALS = dataclasses.replace(
@@ -99,21 +100,23 @@ FAMILY = PENDULUM_CONTROLLER.bind(SIGNALS)
 
 @given(
     seed=st.integers(0, 1000), period=st.integers(0, 32), horizon=st.integers(1, 40), turning=st.booleans(),
-    excited=st.booleans(),
+    excited=st.booleans(), held=st.booleans(),
 )  # fmt: skip
 def test_looking_ahead_is_the_flight_that_the_members_would_make_of_it(
-    seed, period, horizon, turning, excited
+    seed, period, horizon, turning, excited, held
 ):
     random = np.random.default_rng(seed)
     steps, envelope = 30, np.array([[-0.9, 0.9], [-4.0, np.inf]])
     target = random.normal(size=(steps + 1, 2)) * [0.8, 0.0] if turning else np.array([0.8, 0.0])
     genes = FAMILY.from_unit(random.uniform(size=3))
     excitation = 0.2 * random.normal(size=(steps, 1)) if excited else None
-    test = tl.Test(FAMILY, genes, np.zeros(2), target, steps, excitation)
+    hold_back = HoldBack([[-0.1, 0.2], [-1.0, 1.0]], [[-0.5, 0.6], [-3.0, 3.0]]) if held else None
+    test = tl.Test(FAMILY, genes, np.zeros(2), target, steps, excitation, hold_back=hold_back)
     limits = tl.Twin(MEMBERS[0], SIGNALS).limits
     ahead = _core.LookAhead(
-        MEMBERS, limits.setting(FAMILY), genes, target, steps, envelope, excitation=excitation
-    )
+        MEMBERS, limits.setting(FAMILY), genes, target, steps, envelope, excitation=excitation,
+        hold_back=None if hold_back is None else hold_back.engine,
+    )  # fmt: skip
     for _ in range(2):
         ahead.reset()
         readings, commands = [], []

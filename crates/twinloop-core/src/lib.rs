@@ -10,6 +10,7 @@ mod difference;
 mod dynamics;
 mod error;
 mod evolution;
+mod excitation;
 mod flights;
 mod hidden;
 mod integrator;
@@ -44,6 +45,7 @@ pub use difference::Periods;
 pub use dynamics::{Dynamics, state_of};
 pub use error::{Error, Result};
 pub use evolution::{Problem, Search, Snapshot, Variation};
+pub use excitation::{Excitation, HoldBack};
 pub use flights::{
     Candidate, Disagreement, Draws, Envelope, Flights, Judged, Quality, QualityKind, disagreements, qualities,
 };

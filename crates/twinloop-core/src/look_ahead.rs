@@ -6,6 +6,7 @@ use crate::any_dynamics::{AnyDynamics, AnyWorkspace};
 use crate::controller::Controllers;
 use crate::dynamics::Dynamics;
 use crate::error::{Result, invalid};
+use crate::excitation::{Excitation, HoldBack};
 use crate::lanes::{Scalar, Vector};
 use crate::model::{Model, ModelWorkspace};
 use crate::rollout::{Commands, Midway, Seen, Start, Watch, resumed};
@@ -22,6 +23,8 @@ pub struct Ahead {
     pub target: Vec<f64>,
     /// What is added to the commands, n × n_u; empty for nothing.
     pub excitation: Vec<f64>,
+    /// What holds that back.
+    pub hold_back: Option<HoldBack>,
     /// Steps, n.
     pub steps: usize,
     /// Smallest and largest value of each state; infinite where a state has none.
@@ -45,6 +48,7 @@ pub struct LookAhead {
     parameters: Vec<Scalar>,
     target: Vec<Scalar>,
     excitation: Vec<Scalar>,
+    hold_back: Vec<Scalar>,
     controllers: Controllers<Scalar>,
     workspaces: Vec<ModelWorkspace<Scalar>>,
     period: usize,
@@ -53,7 +57,7 @@ pub struct LookAhead {
 impl LookAhead {
     /// At the start of a flight. The members are handed in at each call, always the same ones.
     pub fn new(members: &[Model<'_>], flight: Ahead) -> Result<Self> {
-        let Ahead { setting, parameters, target, excitation, steps, envelope } = &flight;
+        let Ahead { setting, parameters, target, excitation, hold_back, steps, envelope } = &flight;
         let (family, n_x, n_u) = (setting.family(), setting.signals().states(), setting.signals().commands());
         if family.is_foreign() {
             return invalid("look-ahead: expected a law of the engine, found one whose memory is its own");
@@ -70,11 +74,15 @@ impl LookAhead {
                  commands and {steps} steps, found others",
             ));
         }
+        if let Some(hold_back) = hold_back {
+            hold_back.check(n_x)?;
+        }
+        let hold_back = hold_back.as_ref().map_or_else(Vec::new, |found| lanes(found.lines()));
         let parameters = lanes(parameters);
         let controllers = family.start(&parameters);
         let (target, excitation) = (lanes(target), lanes(excitation));
         let workspaces = members.iter().map(Model::workspace).collect();
-        Ok(Self { parameters, target, excitation, controllers, workspaces, period: 0, flight })
+        Ok(Self { parameters, target, excitation, hold_back, controllers, workspaces, period: 0, flight })
     }
 
     /// Back to the start.
@@ -116,7 +124,10 @@ impl LookAhead {
                 family,
                 parameters: &self.parameters,
                 target: &self.target[self.target.len() - target..],
-                excitation: &self.excitation[self.excitation.len() - excitation..],
+                excitation: Excitation {
+                    rows: &self.excitation[self.excitation.len() - excitation..],
+                    hold_back: &self.hold_back,
+                },
             },
             initial: &model.state_of(&lanes(reading)),
             steps,

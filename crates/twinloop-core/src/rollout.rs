@@ -3,6 +3,7 @@
 use crate::any_dynamics::{AnyDynamics, AnyWorkspace};
 use crate::controller::{Controllers, Family};
 use crate::dynamics::{Dynamics, read_apart};
+use crate::excitation::Excitation;
 use crate::lanes::{Apart, Vector};
 use crate::task::target_at;
 
@@ -33,8 +34,8 @@ pub enum Commands<'a, V> {
         parameters: &'a [V],
         /// State that the controllers lead to: constant (n_x), or a row for each state ((n + 1) × n_x).
         target: &'a [V],
-        /// What is added to the commands before they are clipped to their bounds, n × n_u; empty for nothing.
-        excitation: &'a [V],
+        /// What is added to the commands before they are clipped to their bounds.
+        excitation: Excitation<'a, V>,
     },
     /// A record, n × n_u, sent as it is.
     Record(&'a [V]),
@@ -225,16 +226,16 @@ struct Send<'a, V> {
 impl<V: Vector> Apart for Send<'_, V> {
     #[inline(always)]
     fn run(self) {
-        let row = self.step * self.command.len();
         match (self.commands, self.controllers) {
             (Commands::Law { family, target, excitation, .. }, Some(controllers)) => {
                 let target = target_at(target, self.reading.len(), self.step);
                 family.command(controllers, self.reading, target, self.command);
-                if !excitation.is_empty() {
-                    family.excite(self.command, &excitation[row..]);
-                }
+                excitation.add(family, self.step, self.reading, self.command);
             }
-            (Commands::Record(rows), _) => self.command.copy_from_slice(&rows[row..][..self.command.len()]),
+            (Commands::Record(rows), _) => {
+                let width = self.command.len();
+                self.command.copy_from_slice(&rows[self.step * width..][..width]);
+            }
             (Commands::Law { .. }, None) => unreachable!("a law has its controllers"),
         }
     }

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::error::{Result, invalid};
+use crate::excitation::{HoldBack, side_by_side};
 use crate::lanes::{groups, interleave, lanes_for};
 use crate::setting::Setting;
 use crate::signals::Signals;
@@ -23,6 +24,8 @@ pub struct Experiment {
     /// What the test added to its controller's commands, a row of n_u for each step, as many as were recorded or
     /// more; empty for nothing.
     pub excitation: Vec<f64>,
+    /// What holds that back.
+    pub hold_back: Option<HoldBack>,
 }
 
 impl Experiment {
@@ -58,6 +61,8 @@ pub(crate) struct Loops {
     pub target: Vec<f64>,
     /// n × n_u × lanes, n that of the longest; empty if no test of the group has any.
     pub excitation: Vec<f64>,
+    /// Lines of what holds it back, side by side; empty if no test of the group has any.
+    pub hold_back: Vec<f64>,
     /// Commands to send, n × n_u × lanes, n that of the longest; empty where controllers give them.
     pub commands: Vec<f64>,
     /// Recorded states, (n + 1) × n_x × lanes, n that of the longest.
@@ -146,7 +151,7 @@ impl SelectedTests {
     }
 
     fn check(&self, experiment: &Experiment) -> Result<()> {
-        let Experiment { parameters, target, states, commands, excitation } = experiment;
+        let Experiment { parameters, target, states, commands, excitation, hold_back } = experiment;
         let (n_x, n_u) = (self.signals().states(), self.signals().commands());
         let parameters_of_family = self.setting.family().parameters().len();
         let steps = commands.len() / n_u;
@@ -179,6 +184,9 @@ impl SelectedTests {
                  {} numbers",
                 excitation.len()
             ));
+        }
+        if let Some(hold_back) = hold_back {
+            hold_back.check(n_x)?;
         }
         if ![parameters, target, states, commands, excitation].into_iter().flatten().all(|x| x.is_finite()) {
             return invalid(
@@ -226,6 +234,7 @@ fn loops(group: &[Arc<Experiment>], n_x: usize, n_u: usize) -> Loops {
     let sent: Vec<_> = sent.map(|experiment| resized(&experiment.commands, longest * n_u, 0.0)).collect();
     let target = if sent.is_empty() { targets(group, n_x, longest) } else { vec![vec![]; group.len()] };
     let excited = group.iter().any(|experiment| !experiment.excitation.is_empty());
+    let hold_back = side_by_side(group.iter().map(|experiment| experiment.hold_back.as_ref()), n_x);
     let initial: Vec<&[f64]> = group.iter().map(|experiment| &experiment.states[..n_x]).collect();
     Loops {
         tests: group.len(),
@@ -233,6 +242,7 @@ fn loops(group: &[Arc<Experiment>], n_x: usize, n_u: usize) -> Loops {
         initial: interleave(&initial, lanes),
         target: interleave(&target, lanes),
         excitation: if excited { interleave(&excitation.collect::<Vec<_>>(), lanes) } else { vec![] },
+        hold_back: hold_back.map_or_else(Vec::new, |lines| interleave(&lines, lanes)),
         commands: if sent.is_empty() { vec![] } else { interleave(&sent, lanes) },
         recorded: interleave(&recorded.collect::<Vec<_>>(), lanes),
         steps,

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::any_dynamics::AnyDynamics;
 use crate::controller::Family;
 use crate::dynamics::Dynamics;
+use crate::excitation::{Excitation, HoldBack};
 use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, scalars, with_test_lanes};
 use crate::rollout::{Commands, Seen, Start, Watch, closed, rollout};
 use crate::setting::{Limits, Setting};
@@ -32,6 +33,8 @@ pub struct Influences<'a> {
     pub noise: &'a [&'a [f64]],
     /// What is added to the commands before they are clipped, n × n_u a run.
     pub excitation: &'a [&'a [f64]],
+    /// What holds that back, in all runs alike.
+    pub hold_back: Option<&'a HoldBack>,
     /// What is added to the true state after each step, n × n_x a run.
     pub disturbance: &'a [&'a [f64]],
 }
@@ -43,6 +46,7 @@ impl<'a> Influences<'a> {
         Self {
             noise: part(self.noise),
             excitation: part(self.excitation),
+            hold_back: self.hold_back,
             disturbance: part(self.disturbance),
         }
     }
@@ -168,10 +172,13 @@ impl<'a> Runs<'a> {
             Source::Record(commands) => (&[], commands),
         };
         let (parameters, shared) = (pack::<V, _>(parameters), pack::<V, _>(&[shared]));
-        let excitation = pack::<V, _>(self.influences.excitation);
+        let rows = pack::<V, _>(self.influences.excitation);
+        let hold_back =
+            self.influences.hold_back.map_or_else(Vec::new, |found| pack::<V, _>(&[found.lines()]));
+        let excitation = Excitation { rows: &rows, hold_back: &hold_back };
         let commands = match self.source {
             Source::Law { family, .. } => {
-                Commands::Law { family, parameters: &parameters, target: &shared, excitation: &excitation }
+                Commands::Law { family, parameters: &parameters, target: &shared, excitation }
             }
             Source::Record(_) => Commands::Record(&shared),
         };

@@ -9,6 +9,7 @@ use twinloop_core::{AnyLaw, Axis, Controller, Family, Gain, Mixer, Outer, Pid, S
 
 use crate::arrays::{Matrix, Vector, optional_rows, rows, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
+use crate::excitation::PyHoldBack;
 use crate::law::{PythonLaw, raised};
 use crate::model::PySignals;
 
@@ -104,12 +105,17 @@ impl PyFamily {
         self.row_by_row(py, "places", &places, |row| self.0.parameters().at(row))
     }
 
-    #[pyo3(signature = (parameters, excitation = None))]
-    fn controller(&self, parameters: Vector<'_>, excitation: Option<Matrix<'_>>) -> Result<PyController> {
+    #[pyo3(signature = (parameters, excitation = None, hold_back = None))]
+    fn controller(
+        &self,
+        parameters: Vector<'_>,
+        excitation: Option<Matrix<'_>>,
+        hold_back: Option<&PyHoldBack>,
+    ) -> Result<PyController> {
         let controller = Controller::new(self.0.clone(), vector(&parameters))?;
         raised()?;
         let excitation = optional_rows("excitation", excitation, self.0.commands())?.concat();
-        Ok(PyController(Mutex::new(controller.excited(&excitation)?)))
+        Ok(PyController(Mutex::new(controller.excited(&excitation, hold_back.map(|found| &found.0))?)))
     }
 }
 

@@ -12,6 +12,7 @@ use crate::arrays::{
     to_integer_rows, to_vector, vector, views,
 };
 use crate::error::{Result, misuse};
+use crate::excitation::PyHoldBack;
 use crate::law::flown;
 use crate::model::{PyModel, PySignals};
 use crate::objective::fitting;
@@ -27,7 +28,7 @@ pub struct PyFlights(Flights);
 impl PyFlights {
     #[new]
     #[pyo3(signature = (
-        setting, parameters, initial_states, target_states, steps, *, excitation = None
+        setting, parameters, initial_states, target_states, steps, *, excitation = None, hold_back = None
     ))]
     fn new(
         setting: &PySetting,
@@ -36,6 +37,7 @@ impl PyFlights {
         target_states: RowsOrBlocks<'_>,
         steps: usize,
         excitation: Option<Cube<'_>>,
+        hold_back: Option<&PyHoldBack>,
     ) -> Result<Self> {
         let (n_x, n_u) = (setting.0.signals().states(), setting.0.signals().commands());
         let parameters = rows("parameters", &parameters, setting.0.family().parameters().len())?;
@@ -63,7 +65,11 @@ impl PyFlights {
                 excitation,
             })
             .collect();
-        Ok(Self(Flights::new(setting.0.clone(), &candidates, steps)?))
+        let flights = Flights::new(setting.0.clone(), &candidates, steps)?;
+        Ok(Self(match hold_back {
+            Some(found) => flights.held_back(&found.0)?,
+            None => flights,
+        }))
     }
 
     #[getter]

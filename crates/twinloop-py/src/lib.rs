@@ -5,6 +5,7 @@ mod cmaes;
 mod controller;
 mod elementary;
 mod error;
+mod excitation;
 mod flights;
 mod law;
 mod look_ahead;
@@ -36,6 +37,8 @@ mod _core {
     use crate::controller::{PyController, PyFamily};
     #[pymodule_export]
     use crate::elementary::{cos, exp, log, power, sin, tanh};
+    #[pymodule_export]
+    use crate::excitation::PyHoldBack;
     #[pymodule_export]
     use crate::flights::{PyFlights, PyQuality, disagreements, qualities, usages};
     #[pymodule_export]

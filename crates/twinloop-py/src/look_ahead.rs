@@ -9,6 +9,7 @@ use twinloop_core::{Ahead, Frame, Learnt, LookAhead, Model};
 
 use crate::arrays::{Matrix, Vector, VectorOrRows, optional_rows, rows, to_vector, vector};
 use crate::error::{Result, misuse};
+use crate::excitation::PyHoldBack;
 use crate::model::PyModel;
 use crate::setting::PySetting;
 
@@ -25,7 +26,7 @@ pub struct PyLookAhead {
 impl PyLookAhead {
     #[new]
     #[pyo3(signature = (
-        members, setting, parameters, target, steps, envelope, *, excitation = None
+        members, setting, parameters, target, steps, envelope, *, excitation = None, hold_back = None
     ))]
     fn new(
         members: Vec<PyRef<'_, PyModel>>,
@@ -35,6 +36,7 @@ impl PyLookAhead {
         steps: usize,
         envelope: Matrix<'_>,
         excitation: Option<Matrix<'_>>,
+        hold_back: Option<&PyHoldBack>,
     ) -> Result<Self> {
         let signals = setting.0.signals();
         for member in &members {
@@ -46,6 +48,7 @@ impl PyLookAhead {
             parameters: vector(&parameters),
             target: target.numbers(),
             excitation: optional_rows("excitation", excitation, signals.commands())?.concat(),
+            hold_back: hold_back.map(|found| found.0.clone()),
             steps,
             envelope: bounds.iter().map(|row| (row[0], row[1])).collect(),
         };

@@ -13,6 +13,7 @@ use crate::arrays::{
     Cube, Matrix, Vector, VectorOrRows, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
 };
 use crate::error::{Result, misuse};
+use crate::excitation::PyHoldBack;
 use crate::law::{flown, raised};
 use crate::model::PyModel;
 use crate::plant::PyQuadrotor;
@@ -90,7 +91,7 @@ impl PyRuns {
 /// Closes the loop of each controller around the dynamics.
 #[pyfunction]
 #[pyo3(signature = (
-    dynamics, setting, parameters, task, *, noise = None, excitation = None, disturbance = None, workers = None
+    dynamics, setting, parameters, task, *, noise = None, excitation = None, hold_back = None, disturbance = None, workers = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "what a roll-out needs, named by keyword in Python")]
 pub fn rollout(
@@ -101,6 +102,7 @@ pub fn rollout(
     task: &PyTask,
     noise: Option<Cube<'_>>,
     excitation: Option<Cube<'_>>,
+    hold_back: Option<&PyHoldBack>,
     disturbance: Option<Cube<'_>>,
     workers: Option<&PyWorkers>,
 ) -> PyResult<PyRuns> {
@@ -119,7 +121,10 @@ pub fn rollout(
     }
     let (parameters, noise) = (views(&parameters), views(&noise));
     let (excitation, disturbance) = (views(&excitation), views(&disturbance));
-    let influences = Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
+    let hold_back = hold_back.map(|found| &found.0);
+    hold_back.map_or(Ok(()), |found| found.check(states)).map_err(crate::error::CoreError::from)?;
+    let influences =
+        Influences { noise: &noise, excitation: &excitation, hold_back, disturbance: &disturbance };
     let width = workers.width();
     let runs = if let Some(known) = known(dynamics, signals)? {
         flown(py, || record(known, setting, &parameters, task, influences, width))?
@@ -175,7 +180,8 @@ pub fn replay(
     };
     let commands = commands.concat();
     let (noise, disturbance) = (views(&noise), views(&disturbance));
-    let influences = Influences { noise: &noise, excitation: &[], disturbance: &disturbance };
+    let influences =
+        Influences { noise: &noise, excitation: &[], hold_back: None, disturbance: &disturbance };
     let fly = || twinloop_core::replay(dynamics, limits, &initial, &commands, influences, width_of_lanes);
     Ok(PyRuns { runs: py.detach(fly), steps, states, commands: width })
 }

@@ -7,6 +7,7 @@ use twinloop_core::{Experiment, SelectedTests};
 
 use crate::arrays::{Matrix, Vector, VectorOrRows, optional_rows, rows, vector};
 use crate::error::Result;
+use crate::excitation::PyHoldBack;
 use crate::setting::PySetting;
 
 /// The tests that were run on the system, with their trajectories.
@@ -20,7 +21,7 @@ impl PySelectedTests {
         Self(Arc::new(SelectedTests::new(setting.0.clone())))
     }
 
-    #[pyo3(signature = (parameters, target, states, commands, excitation = None))]
+    #[pyo3(signature = (parameters, target, states, commands, excitation = None, hold_back = None))]
     fn with_test(
         &self,
         parameters: Vector<'_>,
@@ -28,6 +29,7 @@ impl PySelectedTests {
         states: Matrix<'_>,
         commands: Matrix<'_>,
         excitation: Option<Matrix<'_>>,
+        hold_back: Option<&PyHoldBack>,
     ) -> Result<Self> {
         let signals = self.0.signals();
         let experiment = Experiment {
@@ -36,6 +38,7 @@ impl PySelectedTests {
             states: rows("states", &states, signals.states())?.concat(),
             commands: rows("commands", &commands, signals.commands())?.concat(),
             excitation: optional_rows("excitation", excitation, signals.commands())?.concat(),
+            hold_back: hold_back.map(|found| found.0.clone()),
         };
         Ok(Self(Arc::new(self.0.with_test(experiment)?)))
     }
@@ -50,6 +53,7 @@ impl PySelectedTests {
             states: rows("states", &states, signals.states())?.concat(),
             commands: rows("commands", &commands, signals.commands())?.concat(),
             excitation,
+            hold_back: None,
         };
         Ok(Self(Arc::new(self.0.with_test(experiment)?)))
     }

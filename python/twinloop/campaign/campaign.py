@@ -163,7 +163,7 @@ class Campaign(Shown, Lasting, kind="campaign"):
             gains: all gains by name, or (size,) in order; in their units and bounds.
             excitation: what is added to the controller's commands (steps, n_u), in their units; the sum is
                 clipped to the commands' bounds. None: nothing. By default the preset's own, a gentle one that
-                fades out; the preset "paper" has none.
+                fades out and is held back by what the states do; the preset "paper" has none.
 
         Returns:
             The test, to be flown and told.
@@ -171,20 +171,20 @@ class Campaign(Shown, Lasting, kind="campaign"):
         Raises:
             InvalidInput: gains or an excitation that cannot be used.
         """
-        genes = self.family.genes(gains)
+        genes, hold_back = self.family.genes(gains), None
         if isinstance(excitation, str):
             if excitation != GENTLE:
                 raise InvalidInput(
                     f"Campaign.test, excitation: expected an array, None or {GENTLE!r}, found {excitation!r}."
                 )
-            added = self._method.first_excitation(len(self._book.tests), genes)
+            added, hold_back = self._method.first_excitation(len(self._book.tests), genes)
         elif excitation is not None:
             shape = (self.setup.steps, self.signals.n_u)
             added = floats("Campaign.test, excitation (steps, commands)", excitation, shape)
         else:
             added = None
         with self._entering():
-            return self._book.new_test(genes, excitation=added)
+            return self._book.new_test(genes, excitation=added, hold_back=hold_back)
 
     def ask(self, last: bool = False) -> Test:
         """Learns from all that was told, then picks the test on which the best models disagree.

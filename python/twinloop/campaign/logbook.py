@@ -15,6 +15,7 @@ from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, TestLoop
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, engine_input
+from twinloop.hold_back import HoldBack
 from twinloop.objectives import frozen_error
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.replay import Replay
@@ -148,6 +149,7 @@ class Logbook(Recorded, kind="logbook"):
         reason: str = "",
         initial_state: Floats | None = None,
         target_state: Floats | None = None,
+        hold_back: HoldBack | None = None,
     ) -> Test:
         """Enters a test.
 
@@ -160,6 +162,7 @@ class Logbook(Recorded, kind="logbook"):
             reason: why this test.
             initial_state: where it starts (n_x,); None: where the campaign does.
             target_state: where it leads (n_x,); None: where the campaign does.
+            hold_back: what holds the excitation back while it flies; None: nothing does.
 
         Returns:
             The test, under the next number.
@@ -177,6 +180,7 @@ class Logbook(Recorded, kind="logbook"):
             spread=spread,
             risk=risk,
             reason=reason,
+            hold_back=hold_back,
         )
         self.tests.append(test)
         return test
@@ -494,7 +498,10 @@ def _with_run(selected: _core.SelectedTests, test: Test | Replay, run: Trajector
     with engine_input():
         if isinstance(test, Replay):
             return selected.with_record(run.states, run.commands)
-        return selected.with_test(test.genes, test.target_state, run.states, run.commands, test.excitation)
+        held = None if test.hold_back is None else test.hold_back.engine
+        return selected.with_test(
+            test.genes, test.target_state, run.states, run.commands, test.excitation, held
+        )
 
 
 def _check_first_reading(trajectory: Trajectory, test: Test) -> None:

@@ -10,6 +10,7 @@ from twinloop.arrays import Floats
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Iteration, Lesson
 from twinloop.campaign.logbook import Logbook
+from twinloop.hold_back import HoldBack
 from twinloop.law.twin import Twin
 from twinloop.records import Record
 from twinloop.test import Test
@@ -69,8 +70,11 @@ class Method(Protocol):
         """The controller to fly; everything told is learnt."""
         ...
 
-    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
-        """What is added to the commands of a test with gains of the user's own, where nothing else is asked for."""
+    def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
+        """What is added to the commands of a test with gains of the user's own, where nothing else is asked for.
+
+        And what holds that back.
+        """
         ...
 
     def twin(self, book: Logbook) -> Twin:

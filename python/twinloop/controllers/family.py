@@ -14,6 +14,7 @@ from twinloop import _core
 from twinloop.arrays import Floats, floats, number
 from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.hold_back import HoldBack
 from twinloop.signals import Signals
 
 AT_A_BOUND = 0.01
@@ -186,13 +187,16 @@ class Family:
             )
         return mapped(values.reshape(-1, self.size)).reshape(values.shape)
 
-    def controller(self, genes: ArrayLike, excitation: ArrayLike | None = None) -> Controller:
+    def controller(
+        self, genes: ArrayLike, excitation: ArrayLike | None = None, hold_back: HoldBack | None = None
+    ) -> Controller:
         """One controller of the family, reset.
 
         Args:
             genes: (size,), in the units of the gains.
             excitation: what is added to its commands, a row a period (n, n_u), in the units of the commands;
                 nothing after the last row. None: nothing.
+            hold_back: what holds that back while it flies; None: nothing does.
 
         Returns:
             A controller with a memory of its own.
@@ -202,7 +206,7 @@ class Family:
         """
         if excitation is not None:
             excitation = floats("Excitation (periods, commands)", excitation, (None, self.signals.n_u))
-        return Controller(self, floats("Genes", genes, (self.size,)), excitation)
+        return Controller(self, floats("Genes", genes, (self.size,)), excitation, hold_back)
 
 
 class Controller:
@@ -212,14 +216,22 @@ class Controller:
         family: what it is one of.
         genes: its gains (size,), in their units.
         excitation: what is added to its commands, a row a period (n, n_u); None: nothing.
+        hold_back: what holds that back; None: nothing does.
     """
 
-    def __init__(self, family: Family, genes: Floats, excitation: Floats | None = None) -> None:
+    def __init__(
+        self,
+        family: Family,
+        genes: Floats,
+        excitation: Floats | None = None,
+        hold_back: HoldBack | None = None,
+    ) -> None:
         self.family = family
         self.genes = genes
         self.excitation = excitation
         with engine_input():
-            self._law = family.engine.controller(genes, excitation)
+            held = None if hold_back is None else hold_back.engine
+            self._law = family.engine.controller(genes, excitation, held)
         self.reset()
 
     @property

@@ -52,6 +52,8 @@ def settings(
                 f"Chirp settings: expected [autopilot.sweep] and one of {', '.join(AXES)}, which sweep one axis by"
                 " themselves; send the table of commands."
             )
+    if asked.excitation is not None and asked.hold_back is not None:
+        said += " The excitation is to be held back as the test sheet says; the table has the whole of it."
     columns = _columns(campaign, asked)
     output.mkdir(parents=True, exist_ok=True)
     for file, text in texts.items():
@@ -60,7 +62,7 @@ def settings(
     write_columns(table, columns)
     click.echo(
         f"Wrote {', '.join(str(output / file) for file in [*texts, table.name])}."
-        + (f" {said}" if said else "")
+        + (f" {said.strip()}" if said else "")
     )
 
 

@@ -75,12 +75,37 @@ def facts(test: Test, file: Path) -> dict[str, object]:
         "steps": test.steps,
         "dt": signals.dt,
         "excited": test.excitation is not None,
+        "hold_back": None if test.hold_back is None else test.hold_back.ranges(test.family.signals),
         "predicted": test.predicted,
         "spread": test.spread,
         "risk": test.risk,
         "why": test.reason,
         "file": str(file),
     }
+
+
+def _held_back(test: Test, file: str) -> list[str]:
+    """How a person's own program holds the excitation back; nothing where nothing does."""
+    if test.excitation is None or test.hold_back is None:
+        return []
+    units = {state.name: state.unit for state in test.family.signals.states}
+    rows = [
+        [name, _range(ranges["full"]), _range(ranges["none"]), units[name]]
+        for name, ranges in test.hold_back.ranges(test.family.signals).items()
+    ]
+    return [
+        "",
+        f"Hold it back each period, by the reading: all of the row while every state is in its inner range, nothing"
+        f" once one has left its outer range, in between in proportion to what is left; the state with the least"
+        f" decides. {file} has the whole of it.",
+        "",
+        table(["state", "inner range", "outer range", "unit"], rows),
+    ]
+
+
+def _range(ends: list[float | None]) -> str:
+    low, high = ("any" if end is None else f"{end:.4g}" for end in ends)
+    return f"{low} to {high}"
 
 
 def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quality: Quality) -> str:
@@ -106,6 +131,7 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quali
         table(["state", "start", "target", "unit"], states),
         "",
         f"Excitation of the commands: {added}.",
+        *_held_back(test, file),
     ]
     if test.predicted is not None and predicted is not None:
         spread = "" if test.spread is None else f" ± {test.spread:.3g}"

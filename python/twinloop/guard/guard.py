@@ -253,6 +253,7 @@ def _look_ahead(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> _c
             test.steps,
             np.array(bounds),
             excitation=test.excitation,
+            hold_back=None if test.hold_back is None else test.hold_back.engine,
         )
     except ValueError as reason:
         if "expected a law of the engine" not in str(reason):

@@ -80,4 +80,4 @@ def led_by(law: Law, test: Test) -> Test:
     gains = [gain.engine for gain in family.law_gains]
     with engine_input():
         engine = _core.Family.python(family.signals.engine, lambda values: law, gains)
-    return dataclasses.replace(test, family=Family(family.signals, family.law_gains, engine), excitation=None)
+    return dataclasses.replace(test.quiet(), family=Family(family.signals, family.law_gains, engine))

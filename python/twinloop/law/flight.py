@@ -86,6 +86,7 @@ def drawn_runs(
         return _core.rollout(
             dynamics, limits.setting(test.family), np.tile(test.genes, (count, 1)), test.task,
             noise=noise, excitation=excitation, disturbance=disturbance, workers=workers,
+            hold_back=None if test.hold_back is None else test.hold_back.engine,
         )  # fmt: skip
 
 

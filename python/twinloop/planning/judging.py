@@ -12,6 +12,7 @@ from twinloop.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.envelope import outside
 from twinloop.flights import candidates, qualities
+from twinloop.hold_back import HoldBack
 from twinloop.limits import Limits
 from twinloop.planning.quality import Quality
 from twinloop.streams import Unit
@@ -142,18 +143,20 @@ class Judge:
         ends: Ends | None = None,
         measured: bool = False,
         off: Floats | None = None,
+        hold_back: HoldBack | None = None,
     ) -> Judged:
         """Flies candidates on members under noise.
 
         Qualities are those of the true states, which gains are chosen by, or, `measured`, those that a record of the
         flight would give. Where `off` is given flights begin elsewhere, as far as it says (n_x,), drawn like noise.
+        Excitations are held back as `hold_back` says.
         """
         noise = self.noise(sds, draws)
         offsets = (
             None if off is None else off * self.unit.part(0).stream("off_start").normals(draws, len(off))
         )
         values, usages = qualities(
-            members, self.flights(genes, excitation, ends), self.quality.engine, self.signals,
+            members, self.flights(genes, excitation, ends, hold_back), self.quality.engine, self.signals,
             noise=noise, offsets=offsets, measured=measured, workers=self.workers,
         )  # fmt: skip
         return Judged(values, usages)
@@ -177,12 +180,18 @@ class Judge:
         stream = self.unit.part(0).stream("sensors")
         return sds * stream.normals(draws, self.task.steps + 1, self.signals.n_x)
 
-    def flights(self, genes: Floats, excitation: Floats | None, ends: Ends | None) -> _core.Flights:
+    def flights(
+        self,
+        genes: Floats,
+        excitation: Floats | None,
+        ends: Ends | None,
+        hold_back: HoldBack | None = None,
+    ) -> _core.Flights:
         """Candidates laid out for the engine; those of the campaign's own task where no ends are given."""
         initial, target = ends or (self.task.initial_state, self.task.target_state)
         if ends is None and target.ndim == 2:
             target = np.tile(target, (len(genes), 1, 1))
         return candidates(
             self.family, genes, initial, target, self.task.steps,
-            excitation=excitation, limits=self.limits,
+            excitation=excitation, hold_back=hold_back, limits=self.limits,
         )  # fmt: skip

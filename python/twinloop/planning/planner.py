@@ -14,6 +14,7 @@ from twinloop.controllers import Family
 from twinloop.elementary import log
 from twinloop.envelope import outside
 from twinloop.flights import disagreements
+from twinloop.hold_back import HoldBack
 from twinloop.limits import Limits
 from twinloop.planning.candidates import Candidates, candidates
 from twinloop.planning.excitation import binary, chirps, first_chirps
@@ -169,16 +170,22 @@ class Planner(Judge):
 
     # Proposing
 
-    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
-        """The gentle excitation of a test with gains of the user's own (size,); None where it is switched off."""
+    def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
+        """The gentle excitation of a test with gains of the user's own (size,), and what holds it back.
+
+        None where they are switched off.
+        """
         options = self.options
         if options.excitation <= 0.0:
-            return None
+            return None, None
         stream = self.unit.part(number).stream("excitation")
         target = np.atleast_2d(self.task.target_state)[0]
-        return first_chirps(
+        added = first_chirps(
             self.family, genes, target, self.task.steps, options.excitation, options.fade, stream
         )
+        if not options.hold_back:
+            return added, None
+        return added, HoldBack.between(self.signals, self.task.initial_state, self.task.target_state)
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""

@@ -15,6 +15,8 @@ class PlanningOptions:
         tests: "ask": where the committee disagrees; "random": random gains, gently excited; "chirp" and "prbs": the
             first controller with a chirp or a binary sequence of the largest excitation.
         excitation: amplitude of the first test's excitation, in units of each command's scale; 0: none.
+        hold_back: whether the first test's excitation is held back while it flies, the more the nearer the states
+            come to the ends of their envelopes.
         excitation_most: largest amplitude of a later test.
         fade: share of a flight, at its end, over which excitation fades out.
         initial_range: how far from the campaign's initial state a test may start, either way (n_x,), in the states'
@@ -45,6 +47,7 @@ class PlanningOptions:
 
     tests: str = "ask"
     excitation: float = 0.02
+    hold_back: bool = True
     excitation_most: float = 0.08
     fade: float = 0.25
     initial_range: tuple[float, ...] = ()

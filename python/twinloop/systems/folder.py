@@ -25,11 +25,11 @@ LONGEST_REASON = 10_000
 class Folder(System):
     """Writes `test-0003.json` and waits for the log of test 3, `flight-0003.csv` or `flight-0003.npz`.
 
-    The sheet holds gains, start, target, steps, period and excitation by name. The log is as `twinloop.load` reads it,
-    a row for each state; a log that a rig still writes is left alone until it has not changed for `settled` seconds. If
-    the run was stopped, `flight-0003.txt` says why, in a sentence, and is there before the log; then the log may be
-    shorter. Nothing in the folder is ever removed or overwritten: a log that is there when its test is asked for again,
-    after a crash or once it was mended, is read then. A test has one log; to repeat one, make
+    The sheet holds gains, start, target, steps, period, excitation and what holds that back, by name. The log is as
+    `twinloop.load` reads it, a row for each state; a log that a rig still writes is left alone until it has not changed
+    for `settled` seconds. If the run was stopped, `flight-0003.txt` says why, in a sentence, and is there before the
+    log; then the log may be shorter. Nothing in the folder is ever removed or overwritten: a log that is there when its
+    test is asked for again, after a crash or once it was mended, is read then. A test has one log; to repeat one, make
     another test of its gains.
 
     Args:
@@ -180,4 +180,6 @@ def sheet_of(test: Test) -> dict[str, object]:
         "excitation": None
         if excitation is None
         else dict(zip(signals.command_names, excitation.T.tolist(), strict=True)),
+        # Inner and outer range of each state that holds the excitation back; an end that is open is null.
+        "hold_back": None if test.hold_back is None else test.hold_back.ranges(signals),
     }

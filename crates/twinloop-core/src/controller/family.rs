@@ -172,11 +172,11 @@ impl Family {
         }
     }
 
-    /// Adds an excitation (n_u) to what the law commanded (n_u), and clips the sum to the bounds of the commands.
+    /// Adds as many numbers to what the law commanded (n_u), and clips the sum to the bounds of the commands.
     #[inline(always)]
-    pub fn excite<V: Vector>(&self, command: &mut [V], excitation: &[V]) {
-        for ((command, excitation), &(low, high)) in command.iter_mut().zip(excitation).zip(&self.bounds) {
-            *command = (*command + *excitation).clamp(low, high);
+    pub fn excite<V: Vector>(&self, command: &mut [V], added: impl Iterator<Item = V>) {
+        for ((command, added), &(low, high)) in command.iter_mut().zip(added).zip(&self.bounds) {
+            *command = (*command + added).clamp(low, high);
         }
     }
 

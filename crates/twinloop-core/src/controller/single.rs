@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Controllers, Family};
 use crate::error::{Result, invalid};
+use crate::excitation::{Excitation, HoldBack};
 use crate::lanes::{Scalar, Vector};
 
 /// Parameters and memory; the law is the family's, the same that the search runs on lanes.
@@ -13,6 +14,8 @@ pub struct Controller {
     running: Controllers<Scalar>,
     /// What is added to the commands, n × n_u; nothing after the last row.
     excitation: Vec<Scalar>,
+    /// Lines of what holds it back; empty for nothing.
+    hold_back: Vec<Scalar>,
     /// Commands given since the start of the run.
     period: usize,
 }
@@ -27,11 +30,13 @@ impl Controller {
             ));
         }
         let parameters = lanes(&parameters);
-        Ok(Self { running: family.start(&parameters), parameters, excitation: vec![], period: 0, family })
+        let (running, excitation, hold_back) = (family.start(&parameters), vec![], vec![]);
+        Ok(Self { running, parameters, excitation, hold_back, period: 0, family })
     }
 
     /// The same with an excitation (n × n_u): a row is added to the command of each period, then the bounds clip it.
-    pub fn excited(self, excitation: &[f64]) -> Result<Self> {
+    /// What is read may hold it back.
+    pub fn excited(self, excitation: &[f64], hold_back: Option<&HoldBack>) -> Result<Self> {
         let commands = self.family.commands();
         if !excitation.len().is_multiple_of(commands) || !excitation.iter().all(|x| x.is_finite()) {
             return invalid(format!(
@@ -40,7 +45,9 @@ impl Controller {
                 excitation.len()
             ));
         }
-        Ok(Self { excitation: lanes(excitation), ..self })
+        hold_back.map_or(Ok(()), |found| found.check(self.family.states()))?;
+        let hold_back = hold_back.map_or_else(Vec::new, |found| lanes(found.lines()));
+        Ok(Self { excitation: lanes(excitation), hold_back, ..self })
     }
 
     /// The parameter vector (size).
@@ -69,10 +76,10 @@ impl Controller {
             );
         }
         let mut command = vec![Scalar::splat(0.0); self.family.commands()];
-        self.family.command(&mut self.running, &lanes(state), &lanes(target), &mut command);
-        if let Some(row) = self.excitation.chunks_exact(command.len()).nth(self.period) {
-            self.family.excite(&mut command, row);
-        }
+        let reading = lanes(state);
+        self.family.command(&mut self.running, &reading, &lanes(target), &mut command);
+        let excitation = Excitation { rows: &self.excitation, hold_back: &self.hold_back };
+        excitation.add(&self.family, self.period, &reading, &mut command);
         self.period += 1;
         Ok(command.iter().map(|lane| lane.lane(0)).collect())
     }

@@ -14,6 +14,7 @@ pub use quality::{Quality, QualityKind};
 use std::sync::Arc;
 
 use crate::error::{Result, invalid};
+use crate::excitation::{Excitation, HoldBack};
 use crate::lanes::{Vector, groups, interleave, lanes_for, vectors};
 use crate::rollout::{Commands, Start};
 use crate::setting::Setting;
@@ -78,6 +79,15 @@ impl Flights {
         Ok(Self { setting, steps, groups })
     }
 
+    /// The same with excitations that are held back, all of them alike.
+    pub fn held_back(mut self, hold_back: &HoldBack) -> Result<Self> {
+        hold_back.check(self.signals().states())?;
+        for group in &mut self.groups {
+            group.hold_back = hold_back.lines().to_vec();
+        }
+        Ok(self)
+    }
+
     /// Number of candidates, K.
     pub fn len(&self) -> usize {
         self.groups.iter().map(|group| group.candidates).sum()
@@ -106,7 +116,7 @@ impl Flights {
                 family: self.setting.family(),
                 parameters: &lanes.parameters,
                 target: &lanes.target,
-                excitation: &lanes.excitation,
+                excitation: Excitation { rows: &lanes.excitation, hold_back: &lanes.hold_back },
             },
             initial: &lanes.initial,
             steps: self.steps,
@@ -130,6 +140,8 @@ struct Group {
     target: Vec<f64>,
     /// n × n_u × lanes, or empty.
     excitation: Vec<f64>,
+    /// Lines of what holds it back, the same in all lanes; empty for nothing.
+    hold_back: Vec<f64>,
 }
 
 impl Group {
@@ -144,12 +156,14 @@ impl Group {
             initial: part(|candidate| &candidate.initial),
             target: part(|candidate| &candidate.target),
             excitation: part(|candidate| &candidate.excitation),
+            hold_back: vec![],
         }
     }
 
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> GroupLanes<V> {
         GroupLanes {
+            hold_back: self.hold_back.iter().map(|&number| V::splat(number)).collect(),
             parameters: vectors(&self.parameters),
             initial: vectors(&self.initial),
             target: vectors(&self.target),
@@ -164,4 +178,5 @@ struct GroupLanes<V> {
     initial: Vec<V>,
     target: Vec<V>,
     excitation: Vec<V>,
+    hold_back: Vec<V>,
 }

@@ -4,6 +4,7 @@
 use super::Outcome;
 use crate::difference::Periods;
 use crate::dynamics::Dynamics;
+use crate::excitation::Excitation;
 use crate::lanes::{Isa, Kernel, Vector, vectors, with_test_lanes};
 use crate::model::Model;
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
@@ -32,14 +33,14 @@ impl ClosedLoop<'_> {
     #[inline(always)]
     fn of_group<V: Vector>(&self, loops: &Loops, outcomes: &mut Vec<Outcome>) {
         let states = self.selected.signals().states();
-        let [parameters, target, excitation, sent] =
-            [&loops.parameters, &loops.target, &loops.excitation, &loops.commands]
+        let [parameters, target, rows, hold_back, sent] =
+            [&loops.parameters, &loops.target, &loops.excitation, &loops.hold_back, &loops.commands]
                 .map(|part| vectors::<V>(part));
         let law = Commands::Law {
             family: self.selected.setting().family(),
             parameters: &parameters,
             target: &target,
-            excitation: &excitation,
+            excitation: Excitation { rows: &rows, hold_back: &hold_back },
         };
         let start = Start {
             commands: if sent.is_empty() { law } else { Commands::Record(&sent) },

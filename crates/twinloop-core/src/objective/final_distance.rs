@@ -1,6 +1,7 @@
 //! Final distance: how far from its target a closed loop ends, δ = ‖η_n − η_d‖.
 
 use crate::difference::Periods;
+use crate::excitation::Excitation;
 use crate::lanes::{Isa, Kernel, Vector, dispatch, groups, pack, with_test_lanes};
 use crate::model::Model;
 use crate::rollout::{Commands, Seen, Start, Watch, rollout};
@@ -51,7 +52,7 @@ impl OfGroup<'_> {
                 family: self.setting.family(),
                 parameters: &pack::<V, _>(self.parameters),
                 target: &target,
-                excitation: &[],
+                excitation: Excitation::NONE,
             },
             initial: &pack::<V, _>(&[initial]),
             steps: *steps,

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Code, Frame, Influences, Model, Outcome, Task, Trajectory, Width, Workers, closed_loops, final_distances,
-    open_loops, record, run_rows, step_rows,
+    Code, Frame, HoldBack, Influences, Model, Outcome, Task, Trajectory, Width, Workers, closed_loops,
+    final_distances, open_loops, record, run_rows, step_rows,
 };
 
 use crate::oracle::{all_same, evaluate};
@@ -75,8 +75,9 @@ proptest! {
         let (noise, excitation, disturbance) =
             (rows(3 * (steps + 1), 0.1), rows(2 * steps, 0.3), rows(3 * steps, -0.02));
         let (noise, excitation, disturbance) = (slices(&noise), slices(&excitation), slices(&disturbance));
-        let influences =
-            Influences { noise: &noise, excitation: &excitation, disturbance: &disturbance };
+        let hold_back = HoldBack::new(&[(-0.2, 0.2); 3], &[(-0.6, 0.9); 3]).unwrap();
+        let hold_back = Some(&hold_back);
+        let influences = Influences { noise: &noise, excitation: &excitation, hold_back, disturbance: &disturbance };
         let runs = |width| record(model.into(), &setting, &slices(&gains), &task, influences, width);
         let equal = |a: &[Trajectory], b: &[Trajectory]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same_run(a, b))

@@ -43,7 +43,7 @@ fn selected(count: usize) -> SelectedTests {
         let steps = 15 + 5 * (i % 3);
         let run = run(step, Pids::new(&world, &gains), [&[0.0; 3], &target], steps, &[1e9; 3], &[]);
         let (states, commands) = (run.states.concat(), run.commands.concat());
-        Experiment { states, commands, parameters: gains, target, excitation: vec![] }
+        Experiment { states, commands, parameters: gains, target, excitation: vec![], hold_back: None }
     };
     world.selected(&(0..count).map(experiment).collect::<Vec<_>>())
 }

@@ -60,6 +60,7 @@ fn still(steps: usize) -> Experiment {
         states: vec![0.0; (steps + 1) * STATES],
         commands: vec![0.0; steps * COMMANDS],
         excitation: vec![],
+        hold_back: None,
     }
 }
 
@@ -132,8 +133,14 @@ fn a_model_that_is_right_has_no_error() {
     let target = [0.5, 0.0, -0.5];
     let run = run(step, Pids::new(&world, &gains), [&[0.0; 3], &target], 50, &[1e9; 3], &[]);
     let (states, commands) = (run.states.concat(), run.commands.concat());
-    let experiment =
-        Experiment { parameters: gains, target: target.to_vec(), states, commands, excitation: vec![] };
+    let experiment = Experiment {
+        parameters: gains,
+        target: target.to_vec(),
+        states,
+        commands,
+        excitation: vec![],
+        hold_back: None,
+    };
     for objective in objectives(Form::Increment, &program, &world.selected(&[experiment])) {
         assert!(objective[0] < 1e-28, "{objective:?}");
     }

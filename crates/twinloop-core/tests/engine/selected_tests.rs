@@ -13,6 +13,7 @@ fn experiment(steps: usize) -> Experiment {
         states: vec![0.0; (steps + 1) * STATES],
         commands: vec![0.0; steps * COMMANDS],
         excitation: vec![0.0; steps * COMMANDS],
+        hold_back: None,
     }
 }
 

@@ -162,6 +162,7 @@ pub fn experiment(steps: Range<usize>) -> impl Strategy<Value = Experiment> {
             states,
             commands,
             excitation: vec![],
+            hold_back: None,
         })
     })
 }

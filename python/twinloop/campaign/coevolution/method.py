@@ -18,6 +18,7 @@ from twinloop.campaign.history import Iteration, Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
+from twinloop.hold_back import HoldBack
 from twinloop.law.twin import Twin
 from twinloop.objectives import final_distances
 from twinloop.records import Record
@@ -126,9 +127,9 @@ class Coevolution:
         best = best.quiet()
         return best.judged(self._predicted(best.genes), book.measured(best.number))
 
-    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
+    def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
         """None: the paper adds none."""
-        return None
+        return None, None
 
     def twin(self, book: Logbook) -> Twin:
         """The best trade-off."""

@@ -134,8 +134,9 @@ class Choice:
         ends = flown.initial_state[np.newaxis], flown.target_state[np.newaxis]
         excitation = None if flown.excitation is None else flown.excitation[np.newaxis]
         again = self.planner.judge(
-            members, flown.genes[np.newaxis], self.committee.sds, self.draws, excitation, ends, measured=True
-        )
+            members, flown.genes[np.newaxis], self.committee.sds, self.draws, excitation, ends,
+            measured=True, hold_back=flown.hold_back,
+        )  # fmt: skip
         least = 1.01 * measured + DOUBT * again.scatter
         return bool(recorded[:, :, 0].mean() > least and again.mean[0] > least)
 

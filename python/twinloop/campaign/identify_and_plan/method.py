@@ -30,6 +30,7 @@ from twinloop.controllers import lqr_gains
 from twinloop.controllers.state_feedback import FeedbackFamily
 from twinloop.elementary import log
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
+from twinloop.hold_back import HoldBack
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
@@ -270,8 +271,8 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, best=(book.revision, answer))
         return answer
 
-    def first_excitation(self, number: int, genes: Floats) -> Floats | None:
-        """A gentle chirp that fades out."""
+    def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
+        """A gentle chirp that fades out, held back by what the states do."""
         return self.planner.first_excitation(number, genes)
 
     def twin(self, book: Logbook) -> Twin:
