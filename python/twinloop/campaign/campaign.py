@@ -193,7 +193,8 @@ class Campaign(Shown, Lasting, kind="campaign"):
 
         Args:
             last: whether no other test will be asked for. The preset "default" then flies the best gains that it
-                knows as they are, unless its option `exploit_last` is off; to "paper" it means nothing.
+                knows, without excitation, unless its option `exploit_last` is off or `tests` asks no committee; to
+                "paper", whose tests have no excitation, it means nothing.
 
         Returns:
             The test, to be flown and told, with its predicted quality, its risk and the reason for it.

@@ -28,6 +28,11 @@ class Candidates:
     ends: Ends
     repeats: int
 
+    def quiet(self) -> Candidates:
+        """The same without excitation, all of them on the task of the first."""
+        ends = tuple(np.repeat(states[:1], len(states), axis=0) for states in self.ends)
+        return Candidates(self.genes, np.zeros_like(self.excitation), (ends[0], ends[1]), self.repeats)
+
     def some(self, chosen: list[int]) -> Candidates:
         """Those of some numbers, in their order."""
         ends = self.ends[0][chosen], self.ends[1][chosen]

@@ -206,6 +206,7 @@ class Planner(Judge):
         goal: str,
         number: int,
         exploit: bool,
+        last: bool = False,
     ) -> Proposal:
         """The next test.
 
@@ -216,12 +217,31 @@ class Planner(Judge):
             goal: "both", "model" or "control".
             number: of the test, for its stream.
             exploit: whether the tuned gains are flown as they are.
+            last: whether nothing else is: where the tuned gains cannot be, those that promise most of all that can,
+                without excitation.
 
         Returns:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
         drafts = candidates(self, self.options, tuned, flown.best, goal, number)
         self.watch("candidates")
+        found = self._best_of(drafts, committee, tuned, flown, goal, number, exploit)
+        if last and found.genes.tobytes() != tuned.tobytes():
+            return self._best_of(drafts.quiet(), committee, tuned, flown, goal, number, exploit, plain=True)
+        return found
+
+    def _best_of(
+        self,
+        drafts: Candidates,
+        committee: Committee,
+        tuned: Floats,
+        flown: Flown,
+        goal: str,
+        number: int,
+        exploit: bool,
+        plain: bool = False,
+    ) -> Proposal:
+        """The draft that tells most of those that may be flown; `plain`: the one that promises most."""
         # A member that blows up whatever is flown is no member (E-SINDy).
         members = self.lasting(committee.members, drafts.genes, drafts.excitation, drafts.ends)
         quiet = self.judge(members, drafts.genes, committee.sds, 1, drafts.excitation, drafts.ends)
@@ -259,7 +279,7 @@ class Planner(Judge):
             others = keeps & (exploit | (np.arange(len(keeps)) > 0))
             allowed = others & (quiet.mean <= worst)
             wanted = [0] if exploit and allowed[0] else []
-            wanted += _first(allowed, -tells)
+            wanted += _first(allowed, quiet.mean if plain else -tells)
             found = _first_that_lasts(wanted, noisy, worst + by_noise + 2.0 * scatter)
             if found is None:
                 # None that tells much lasts under noise: the one that promises most, if it is no worse than was flown.
@@ -292,6 +312,7 @@ class Planner(Judge):
                 committee.trusted,
                 flown.kept,
                 exploit and chosen == 0,
+                plain,
                 repeats,
                 safe,
                 disagreement,
@@ -350,6 +371,7 @@ class Planner(Judge):
         trusted: bool,
         known: bool,
         exploits: bool,
+        plain: bool,
         repeats: bool,
         safe: bool,
         value: float,
@@ -358,7 +380,9 @@ class Planner(Judge):
         """Why this test; `where`: step, state and the two members that are the furthest apart."""
         row, state, high, low = where
         sentences = []
-        if repeats:
+        if repeats and plain:
+            sentences.append(f"The best gains flown, again{': they are known to fly' * known}.")
+        elif repeats:
             change = "a stronger excitation" if self.options.excitation > 0.0 else "a small variation"
             sentences.append(
                 f"The best gains flown, again, with {change}{': they are known to fly' * known}."
@@ -369,6 +393,9 @@ class Planner(Judge):
             )
         elif exploits:
             sentences.append("The best gains that the twin knows, flown as they are.")
+        elif plain:
+            promise = "The gains that promise most of those that may be flown, as they are."
+            sentences += [] if repeats else [promise]
         elif value > 0.0 and high != low:
             sentences.append(
                 f"Models {high} and {low} disagree most on {self.signals.state_names[state]},"

@@ -235,6 +235,7 @@ class IdentifyAndPlan:
             self.setup.goal,
             number,
             self._exploits(book, tuned, last),
+            last and self.options.exploit_last,
         )
         found = replace(found, spread=calibrated(found.spread, found.predicted, book.experiments))
         test = book.new_test(
