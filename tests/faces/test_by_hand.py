@@ -85,6 +85,28 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     assert json.loads(run("ask", "rig.db", "--again", "--json").stdout)["test"] == 2
 
 
+def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_said(folder):
+    run("ask", "rig.db")
+    early = run("learn", "rig.db")
+    assert early.exit_code == 2 and "at least one experiment" in early.stderr
+    flown(look().tests[0])
+    run("tell", "rig.db", "0", "flight.csv")
+    shown = run("show", "rig.db")
+    assert "Not learnt yet: 1 experiment; to learn now: twinloop learn rig.db." in shown.stdout
+    assert json.loads(run("show", "rig.db", "--json").stdout)["store"]["learnt"] == 0
+    assert "Learnt from 1 experiment" in run("learn", "rig.db").stdout
+    shown = run("show", "rig.db")
+    assert "Not learnt" not in shown.stdout and "learnt from 1 experiment" in shown.stdout
+    flown(look().tests[0])
+    assert len(look().tests) == 1  # nothing was asked for
+    # What was learnt so is what the next question learns.
+    other = read_file("rig.toml").campaign(threads=1)
+    test = other.test(read_file("rig.toml").first)
+    other.tell(test, look().experiments[0].trajectory)
+    run("ask", "rig.db")
+    assert same([look().tests[1].genes], [other.ask().genes])
+
+
 def test_a_batch_is_flown_in_any_order_and_what_is_abandoned_counts_nothing(folder):
     assert "fly the first test" in run("ask", "rig.db", "--batch", "3").stderr
     run("ask", "rig.db")

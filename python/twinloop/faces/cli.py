@@ -26,7 +26,7 @@ from twinloop.faces.from_logs import identify
 from twinloop.faces.log_check import check
 from twinloop.faces.report.command import compare, report
 from twinloop.faces.settings import settings
-from twinloop.faces.stored import resume, show
+from twinloop.faces.stored import learn, resume, show
 from twinloop.faces.terminal import prepared
 from twinloop.faces.working import answers, check_answer, work
 from twinloop.planning.planner import GOALS
@@ -208,6 +208,7 @@ for command in (new, ask, tell, attach, abandon):
 main.add_command(check)
 main.add_command(identify)
 main.add_command(resume)
+main.add_command(learn)
 main.add_command(show)
 main.add_command(report)
 main.add_command(compare)

@@ -1,8 +1,9 @@
-"""The commands for campaigns in a store: `twinloop resume` and `twinloop show`."""
+"""The commands for campaigns in a store: `twinloop resume`, `twinloop learn` and `twinloop show`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,22 @@ def resume(
     watch = Watch(campaign.options, budget, "quadrotor")
     campaign.progress = watch
     context.exit(work(campaign, rig, watch, budget, output, plot, as_json))
+
+
+@click.command()
+@click.argument("store")
+@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
+    """Learn from all that was told to a campaign of STORE, as the next ask would, and ask for nothing."""
+    with closing(Campaign.load(store, name, threads=threads)) as campaign:
+        _ = campaign.twin
+        with suppress(NotAvailable):  # there may be no controller to fly yet
+            _ = campaign.best_test
+        told = len(campaign.experiments)
+        text = f"Learnt from {told} experiment{'' if told == 1 else 's'}: twinloop show {shown_name(store)}\n"
+        _print({"learnt": told}, text, as_json)
 
 
 @click.command()
@@ -143,6 +160,7 @@ def _facts(held: Kept, campaign: Campaign) -> dict[str, object]:
         "seed": campaign.setup.seed,
         "tests": len(held.logbook["tests"]),
         "told": len(campaign.experiments),
+        "learnt": len(campaign.history[-1].tests) if campaign.history else 0,
         "experiments": held.experiments,
         "waiting": [test.number for test in campaign.waiting],
         "failed": [failure.test.number for failure in campaign.failures],
@@ -158,6 +176,12 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
         f"Preset {facts['preset']}, seed {facts['seed']}.",
         f"Experiments told: {facts['told']}{of}. Tests made: {facts['tests']}.",
     ]
+    missing = facts["told"] - facts["learnt"]
+    if missing:
+        lines.append(
+            f"Not learnt yet: {missing} experiment{'' if missing == 1 else 's'}; to learn now:"
+            f" twinloop learn {shown_name(store)}."
+        )
     for key, words in (("waiting", "waiting to be flown"), ("failed", "failed"), ("abandoned", "abandoned")):
         if facts[key]:
             numbers = ", ".join(str(number) for number in facts[key])
