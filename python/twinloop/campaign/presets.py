@@ -93,7 +93,7 @@ class Options:
     test_mutation_step: float = 0.1
 
     @property
-    def identifies(self) -> bool:
+    def identifies(self) -> Literal[False]:
         """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
         return False
 
@@ -137,7 +137,7 @@ class DefaultOptions(PlanningOptions, IdentificationOptions):
     """
 
     @property
-    def identifies(self) -> bool:
+    def identifies(self) -> Literal[True]:
         """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
         return True
 

@@ -186,9 +186,9 @@ class Watch:
         self._name, self._campaigns = name, campaigns
         self._in_steps = options.identifies
         self._estimate: Remaining = (
-            Estimate(options, experiments, campaigns - 1)
-            if isinstance(options, Options)
-            else StepEstimate(experiments, campaigns - 1)
+            StepEstimate(experiments, campaigns - 1)
+            if options.identifies is True
+            else Estimate(options, experiments, campaigns - 1)
         )
         self._console = Console(stderr=True)
         self._lock = threading.Lock()
