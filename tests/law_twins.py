@@ -14,6 +14,15 @@ SIGNALS = tl.Signals(
 )
 PENDULUM = ["r4 = sin(r0)", "r4 = r4 * -9.0", "r5 = r1 * 0.4", "r4 = r4 - r5", "r5 = r2 * 11.0", "r4 = r4 + r5",
             "r5 = r3 * r3", "r5 = r5 * r0", "r4 = r4 + r5"]  # fmt: skip
+SWINGING = [
+    "r3 = sin(r0)",
+    "r3 = r3 * -9.0",
+    "r4 = r1 * 0.4",
+    "r3 = r3 - r4",
+    "r4 = r2 * 5.0",
+    "r3 = r3 + r4",
+]
+"""The pendulum with a torque alone."""
 FILLED = ["r5 = r4 * 3.0", "r6 = r2 * 11.0", "r5 = r5 + r6", "r6 = r3 * r0", "r5 = r5 - r6", "r6 = abs(r1)",
           "r6 = sqrt(r6)", "r6 = r1 / r6", "r5 = r5 - r6", "r7 = tanh(r1)", "r7 = max(r7, r2)",
           "r5 = r5 - r7"]  # fmt: skip

@@ -159,3 +159,15 @@ def flown(campaign, pendulum):
     first = campaign.test(pendulum.default_gains)
     campaign.tell(first, pendulum.run(first))
     return campaign
+
+
+class StopAt:
+    """A progress callback that is Ctrl-C at its n-th call."""
+
+    def __init__(self, call):
+        self.calls = call
+
+    def __call__(self, progress):
+        self.calls -= 1
+        if self.calls == 0:
+            raise KeyboardInterrupt

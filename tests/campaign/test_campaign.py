@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from lives import StopAt
 from oracles import final_distance, same_bits
 from twinloop import pareto
 from twinloop.objectives import closed_loop, frozen_error, open_loop, selected_tests
@@ -354,18 +355,6 @@ def test_a_test_of_another_campaign_is_refused(new_campaign, pendulum):
 
 
 # Interruption
-
-
-class StopAt:
-    """A progress callback that is Ctrl-C at its n-th call."""
-
-    def __init__(self, call):
-        self.left = call
-
-    def __call__(self, progress):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize("call", [1, 2, 3, 4, 6, 9, 12, 15])

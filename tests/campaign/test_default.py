@@ -7,7 +7,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
-from lives import CONTROLLER, SIGNALS, THOROUGH
+from lives import CONTROLLER, SIGNALS, THOROUGH, StopAt
 from oracles import rk4, same_bits
 from twinloop.campaign import controller_to_fly
 from twinloop.campaign.logbook import _check_first_reading
@@ -81,18 +81,6 @@ def test_nothing_depends_on_numpys_global_random_state(begin, pendulum):
     one = outcome(begin().run(pendulum, 2))
     np.random.seed(2)
     assert outcome(begin().run(pendulum, 2)) == one
-
-
-class StopAt:
-    """A progress callback that is Ctrl-C at its n-th call."""
-
-    def __init__(self, call):
-        self.left = call
-
-    def __call__(self, progress):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 @pytest.fixture(scope="module")

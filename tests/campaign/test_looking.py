@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
-from lives import FULL_LIFE, LIFE, PLANT, lived, new, outcome
+from lives import FULL_LIFE, LIFE, PLANT, StopAt, lived, new, outcome
 from twinloop.faces.result import summary
 
 LOOKS = {
@@ -110,15 +110,6 @@ def test_a_copy_shares_nothing(copied):
 
 
 def test_a_look_that_was_interrupted_changes_nothing():
-    class StopAt:
-        def __init__(self, call):
-            self.left = call
-
-        def __call__(self, progress):
-            self.left -= 1
-            if self.left == 0:
-                raise KeyboardInterrupt
-
     for preset, call in (("paper", 1), ("paper", 3), ("default", 2), ("default", 6)):
 
         def look(campaign, step, call=call):

@@ -8,7 +8,7 @@ import pytest
 import twinloop as tl
 from late_sensors import BODY, DT, PENDULUM
 from law_twins import BODY as TURNING_BODY
-from law_twins import twin_of
+from law_twins import SWINGING, twin_of
 from strategies import program_text
 from twinloop import _core
 from twinloop.law.exports import python_source as written
@@ -21,14 +21,6 @@ from twinloop.law.exports.checks import (
     python_simulation,
 )
 
-SWINGING = [
-    "r3 = sin(r0)",
-    "r3 = r3 * -9.0",
-    "r4 = r1 * 0.4",
-    "r3 = r3 - r4",
-    "r4 = r2 * 5.0",
-    "r3 = r3 + r4",
-]
 TUMBLING = [
     "r9 = r6 * 3.0", "r9 = r9 - r3", "r10 = r7 * 2.0", "r10 = r10 - r4", "r11 = r8 * 2.0", "r11 = r11 - r5",
     "r12 = r3 * r4", "r12 = r12 * 0.5", "r11 = r11 + r12",

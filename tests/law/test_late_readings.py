@@ -5,6 +5,7 @@ import pytest
 
 import twinloop as tl
 from late_sensors import BODY, DT, PENDULUM, flown, loop_of, swinging, turning
+from law_twins import SWINGING
 from oracles import same_bits
 from strategies import program_text
 from twinloop import _core
@@ -13,14 +14,6 @@ from twinloop.law.law import Law
 from twinloop.law.linear.margins import closed_loops, margins_of
 from twinloop.limits import Limits
 
-SWINGING = [
-    "r3 = sin(r0)",
-    "r3 = r3 * -9.0",
-    "r4 = r1 * 0.4",
-    "r3 = r3 - r4",
-    "r4 = r2 * 5.0",
-    "r3 = r3 + r4",
-]
 TURNING = [
     "r9 = r6 * 3.0", "r9 = r9 - r3",
     "r10 = r7 * 2.0", "r10 = r10 - r4", "r12 = r1 * 3.0", "r10 = r10 - r12",

@@ -74,14 +74,20 @@ def python_simulation(source: str) -> Simulation:
     Args:
         source: of the module, written by us.
     """
-    names: dict[str, Any] = {}
-    exec(compile(source, "exported twin", "exec"), names)
+    names = _module(source)
 
     def simulate(state: Floats, commands: Floats) -> Floats:
         states = names["simulate"](state.tolist(), commands.tolist())
         return np.hstack([states, names["readings"](states)]) if "OFFSETS" in names else np.array(states)
 
     return simulate
+
+
+def _module(source: str) -> dict[str, Any]:
+    """What a module defines that was written by us."""
+    names: dict[str, Any] = {}
+    exec(compile(source, "exported module", "exec"), names)
+    return names
 
 
 def casadi_simulation(source: str) -> Simulation:
@@ -107,8 +113,7 @@ def control_simulation(source: str) -> Simulation:
         NotAvailable: python-control is missing.
     """
     control = _needed("control", "control")
-    names: dict[str, Any] = {}
-    exec(compile(source, "exported twin", "exec"), names)
+    names = _module(source)
     system = names["system"]
 
     def simulate(state: Floats, commands: Floats) -> Floats:
@@ -138,8 +143,7 @@ def gymnasium_simulation(source: str) -> Simulation:
     """
     _needed("gymnasium", "gymnasium")
     checker = import_module("gymnasium.utils.env_checker")
-    names: dict[str, Any] = {}
-    exec(compile(source, "exported twin", "exec"), names)
+    names = _module(source)
     with warnings.catch_warnings():
         # Its advice is for those who train: commands in their own units, angles without an end.
         warnings.simplefilter("ignore")
@@ -334,8 +338,7 @@ def python_controller(source: str) -> Commanding:
     Args:
         source: of the module, written by us.
     """
-    names: dict[str, Any] = {}
-    exec(compile(source, "exported controller", "exec"), names)
+    names = _module(source)
 
     def commands(states: Floats, target: Floats) -> Floats:
         controller = names["Controller"]()
