@@ -418,8 +418,8 @@ class Logbook(Recorded, kind="logbook"):
     def made(self) -> Test | None:
         """Before there is a run of any test: the last one that was made, and neither failed nor was abandoned."""
         done = self.flown | set(self.abandoned)
-        left = [test for test in self.tests if test.number not in done]
-        return left[-1] if left and self.first_flown() is None else None
+        undone = [test for test in self.tests if test.number not in done]
+        return undone[-1] if undone and self.first_flown() is None else None
 
     def with_plans(self, records: Sequence[Lesson]) -> tuple[Lesson, ...]:
         """Lessons with the tests that were planned after each.

@@ -80,8 +80,8 @@ class Estimate:
         if not rates:
             return None
         return sum(
-            left * (self._seconds[phase] / self._work[phase] if self._work[phase] > 0.0 else max(rates))
-            for phase, left in self._left(progress).items()
+            work * (self._seconds[phase] / self._work[phase] if self._work[phase] > 0.0 else max(rates))
+            for phase, work in self._work_ahead(progress).items()
         )
 
     def _weight(self, phase: str, iteration: int) -> float:
@@ -91,20 +91,20 @@ class Estimate:
             return 2.0 * options.model_population * max(1, iteration)
         return float(options.test_population * (options.committee_size + options.mutants))
 
-    def _left(self, progress: Progress) -> dict[str, float]:
-        left = {"models": 0.0, "tests": 0.0}
+    def _work_ahead(self, progress: Progress) -> dict[str, float]:
+        ahead = {"models": 0.0, "tests": 0.0}
         for iteration in range(progress.iteration + 1, self.experiments + 1):
-            left["models"] += self.options.model_generations * self._weight("models", iteration)
+            ahead["models"] += self.options.model_generations * self._weight("models", iteration)
         loops = self.experiments - 1 - progress.iteration + (progress.phase == "models")
-        left["tests"] += max(0, loops) * self.options.generations_of_tests * self._weight("tests", 0)
-        if progress.phase in left:
+        ahead["tests"] += max(0, loops) * self.options.generations_of_tests * self._weight("tests", 0)
+        if progress.phase in ahead:
             missing = progress.generations - progress.generation
-            left[progress.phase] += missing * self._weight(progress.phase, progress.iteration)
+            ahead[progress.phase] += missing * self._weight(progress.phase, progress.iteration)
         for iteration in range(1, self.experiments + 1):
-            left["models"] += self.later * self.options.model_generations * self._weight("models", iteration)
+            ahead["models"] += self.later * self.options.model_generations * self._weight("models", iteration)
         loops = self.later * (self.experiments - 1)
-        left["tests"] += loops * self.options.generations_of_tests * self._weight("tests", 0)
-        return left
+        ahead["tests"] += loops * self.options.generations_of_tests * self._weight("tests", 0)
+        return ahead
 
 
 class StepEstimate:
@@ -146,23 +146,23 @@ class StepEstimate:
             step: self._seconds[step] / work if work > 0.0 else pace * STEPS[step][1]
             for step, work in self._work.items()
         }
-        return max(0.0, self._left(progress, rates, now - self._since))
+        return max(0.0, self._seconds_ahead(progress, rates, now - self._since))
 
-    def _left(self, progress: Progress, rates: dict[str, float], running: float) -> float:
+    def _seconds_ahead(self, progress: Progress, rates: dict[str, float], running: float) -> float:
         names = list(STEPS)
-        left = 0.0
+        seconds = 0.0
         for told in range(1, self.experiments + 1):
             last = told == self.experiments
             steps = [name for name in names if not (last and name == "candidates")]
             whole = sum(rates[step] for step in steps) * _work(told)
-            left += whole * self.later
+            seconds += whole * self.later
             if told > progress.told:
-                left += whole
+                seconds += whole
             elif told == progress.told and progress.phase in steps:
                 after = steps[names.index(progress.phase) + 1 :]
-                left += max(0.0, rates[progress.phase] * _work(told) - running)
-                left += sum(rates[step] for step in after) * _work(told)
-        return left
+                seconds += max(0.0, rates[progress.phase] * _work(told) - running)
+                seconds += sum(rates[step] for step in after) * _work(told)
+        return seconds
 
 
 def _work(told: int) -> float:
@@ -234,28 +234,30 @@ class Watch:
         rate = (progress.evaluations - self._phase_start[1]) / elapsed if elapsed > 0.0 else None
         with self._lock:
             self._seen = progress
-            left = self._estimate.remaining(progress)
+            remaining = self._estimate.remaining(progress)
         if self._live is not None:
             if not self._in_steps:
-                self._live.update(self._table(progress, rate, left), refresh=True)
+                self._live.update(self._table(progress, rate, remaining), refresh=True)
         elif now - self._last_line >= LINE_SECONDS:
             self._last_line = now
             self._console.print(
-                self._line(progress, rate, left), highlight=False, soft_wrap=True, markup=False
+                self._line(progress, rate, remaining), highlight=False, soft_wrap=True, markup=False
             )
 
     def _now(self) -> Table:
         """The table as it is at this moment; called from the thread that redraws it."""
         with self._lock:
             progress = self._seen
-            left = None if progress is None else self._estimate.remaining(progress)
+            remaining = None if progress is None else self._estimate.remaining(progress)
         if progress is None:
             table = Table.grid()
             table.add_row(self.label, style="bold")
             return table
-        return self._table(progress, None, left)
+        return self._table(progress, None, remaining)
 
-    def _headline(self, progress: Progress, rate: float | None, left: float | None) -> list[tuple[str, str]]:
+    def _headline(
+        self, progress: Progress, rate: float | None, remaining: float | None
+    ) -> list[tuple[str, str]]:
         if progress.phase == "experiment":
             return [("flying experiment", f"{progress.told + 1} of {self.experiments}")]
         facts = [("experiments", f"{progress.told} of {self.experiments}")]
@@ -273,22 +275,22 @@ class Watch:
                 ("non-dominated", str(progress.archive_size)),
                 ("evaluations/s", "–" if rate is None else f"{rate:.0f}"),
             ]
-        return [*facts, ("left", "–" if left is None else duration(left))]
+        return [*facts, ("left", "–" if remaining is None else duration(remaining))]
 
-    def _line(self, progress: Progress, rate: float | None, left: float | None) -> str:
+    def _line(self, progress: Progress, rate: float | None, remaining: float | None) -> str:
         errors = ", ".join(
             f"{test}: {free:.3g}" for test, free in zip(progress.tests, progress.closed_loop, strict=False)
         )
-        parts = [f"{name} {value}" for name, value in self._headline(progress, rate, left)]
+        parts = [f"{name} {value}" for name, value in self._headline(progress, rate, remaining)]
         if errors:
             parts.append(f"closed loop of test {errors}")
         return f"{self.label}: {'; '.join(parts)}"
 
-    def _table(self, progress: Progress, rate: float | None, left: float | None) -> Table:
+    def _table(self, progress: Progress, rate: float | None, remaining: float | None) -> Table:
         outer = Table.grid(padding=(0, 3))
         facts = Table.grid(padding=(0, 2))
         facts.add_row(self.label, style="bold")
-        for name, value in self._headline(progress, rate, left):
+        for name, value in self._headline(progress, rate, remaining):
             facts.add_row(name, value)
         if not progress.closed_loop:
             outer.add_row(facts)

@@ -22,7 +22,7 @@ class Learning:
         selected: the tests that it learns.
         experiments: the same, with what is known about each.
         iteration: that is running, or was the last.
-        left: generations of it that are still to be run.
+        ahead: generations of it that are still to be run.
         capped_before: generations before it in which the non-dominated set was pruned.
         finished: records of the iterations before.
     """
@@ -31,7 +31,7 @@ class Learning:
     selected: _core.SelectedTests
     experiments: tuple[Experiment, ...]
     iteration: int
-    left: int
+    ahead: int
     capped_before: int
     finished: tuple[Iteration, ...]
 
@@ -46,8 +46,8 @@ class Learning:
         Args:
             generations: of a whole iteration.
         """
-        done = generations - self.left
-        return self.finished if self.left == 0 or done == 0 else (*self.finished, self.record(done))
+        done = generations - self.ahead
+        return self.finished if self.ahead == 0 or done == 0 else (*self.finished, self.record(done))
 
     def record(self, generations: int) -> Iteration:
         """Of the iteration that is running.
@@ -99,7 +99,9 @@ class Learner:
         """
         models = start_models(self.options, self.signals, self.seed, selected, self.workers)
         random = Learning(models, selected, tuple(experiments), 0, 0, 0, ())
-        return replace(random, iteration=1, left=self.options.model_generations, finished=(random.record(0),))
+        return replace(
+            random, iteration=1, ahead=self.options.model_generations, finished=(random.record(0),)
+        )
 
     def renewed(
         self, known: Learning, selected: _core.SelectedTests, experiments: Sequence[Experiment]
@@ -118,7 +120,7 @@ class Learner:
             selected=selected,
             experiments=tuple(experiments),
             iteration=known.iteration + 1,
-            left=self.options.model_generations,
+            ahead=self.options.model_generations,
             capped_before=models.capped_generations,
         )
 
@@ -132,11 +134,11 @@ class Learner:
             What is known after each chunk of work.
         """
         selected = known.selected
-        for models, left in chunks(
-            known.models, lambda search, n: search.advance(selected, n, self.workers), known.left
+        for models, ahead in chunks(
+            known.models, lambda search, n: search.advance(selected, n, self.workers), known.ahead
         ):
-            known = replace(known, models=models, left=left)
-            if left == 0:
+            known = replace(known, models=models, ahead=ahead)
+            if ahead == 0:
                 record = known.record(self.options.model_generations)
                 known = replace(known, finished=(*known.finished, record))
             yield known

@@ -112,9 +112,9 @@ class Coevolution:
             workers=self.workers,
         )
         total = self.options.generations_of_tests
-        for moved, left in chunks(search, lambda s, n: s.advance(n, self.workers), total):
+        for moved, ahead in chunks(search, lambda s, n: s.advance(n, self.workers), total):
             search = moved
-            self._report("tests", total - left, total, search.archive_size, search.evaluations)
+            self._report("tests", total - ahead, total, search.archive_size, search.evaluations)
         test = book.new_test(search.best_genes, predicted=self._predicted(search.best_genes))
         book.enter_loop(self.iteration, test, search)
         self.memory = replace(self.memory, asked=self.memory.latest)
@@ -184,7 +184,7 @@ class Coevolution:
 
     def _watch_models(self, latest: Learning) -> None:
         models, total = latest.models, self.options.model_generations
-        self._report("models", total - latest.left, total, models.archive_size, models.evaluations)
+        self._report("models", total - latest.ahead, total, models.archive_size, models.evaluations)
 
     def _report(
         self, phase: str, generation: int, generations: int, archive_size: int, evaluations: int

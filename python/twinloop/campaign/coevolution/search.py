@@ -32,14 +32,14 @@ def chunks(
     Yields:
         The search after each chunk, and the generations that are left.
     """
-    left, size = generations, 1
-    while left > 0:
-        size = min(size, left)
+    ahead, size = generations, 1
+    while ahead > 0:
+        size = min(size, ahead)
         start = time.monotonic()
         search = advance(search, size)
         elapsed = time.monotonic() - start
-        left -= size
-        yield search, left
+        ahead -= size
+        yield search, ahead
         # At most four times longer than the last: the first chunks say little.
         size = max(1, min(4 * size, int(size * CHUNK_SECONDS / max(elapsed, 1e-6))))
 

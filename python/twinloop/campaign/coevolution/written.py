@@ -39,7 +39,7 @@ class WrittenLearning(Recorded, kind="model_loop"):
             ModelSnapshot.of(learning.models),
             len(learning.experiments),
             learning.iteration,
-            learning.left,
+            learning.ahead,
             learning.capped_before,
             learning.finished,
         )

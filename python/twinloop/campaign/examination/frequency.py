@@ -70,11 +70,11 @@ def frequency_responses(
     given, seen = (np.stack([row[i] for row in rows], axis=1) for i in (0, 1))  # (f, segments, columns)
     given, seen = given[1:-1], seen[1:-1]
     gains = np.linalg.pinv(given, rcond=1e-6) @ seen
-    left = np.square(np.abs(seen - given @ gains)).sum(axis=1)
+    residual = np.square(np.abs(seen - given @ gains)).sum(axis=1)
     total = np.square(np.abs(seen)).sum(axis=1)
-    explained = np.divide(left, total, out=np.ones_like(total), where=total > 0.0)
+    unexplained = np.divide(residual, total, out=np.ones_like(total), where=total > 0.0)
     # As many inputs explain their share of any segments: degrees of freedom are put right.
-    coherence = np.clip(1.0 - explained * count / (count - width), 0.0, 1.0)
+    coherence = np.clip(1.0 - unexplained * count / (count - width), 0.0, 1.0)
     if sensors is not None:
         noise = np.square(sensors) * float(np.square(window).sum()) * count
         share = np.divide(noise, total, out=np.ones_like(total), where=total > 0.0)

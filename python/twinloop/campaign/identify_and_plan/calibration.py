@@ -93,7 +93,7 @@ def calibrated(spread: float, predicted: float, flights: Iterable[Experiment]) -
     return max(spread, share * abs(predicted)) if isfinite(predicted) else spread
 
 
-def left_of_flights(model: _core.Model, flights: Iterable[Experiment], limits: Limits) -> Floats:
+def residuals_of_flights(model: _core.Model, flights: Iterable[Experiment], limits: Limits) -> Floats:
     """What free runs of a model leave of flights that it was learnt from.
 
     From one reading to the next, exact readings leave their own rounding; over a flight, that of the twin adds up, and
@@ -108,12 +108,12 @@ def left_of_flights(model: _core.Model, flights: Iterable[Experiment], limits: L
         Standard deviations (n_x,) of normal numbers, nine of ten of which would be as small as nine of ten errors of a
         flight, median over flights.
     """
-    left = []
+    quantiles = []
     for flight in flights:
         states = flight.trajectory.states
         test = dataclasses.replace(flight.replayed, initial_state=model.states_of(states[:1])[0])
         free = fly(model, test, limits=limits).states
         rows = min(len(states), len(free))
         errors = test.signals.difference(states[:rows], free[:rows])
-        left.append(np.quantile(np.abs(errors), 0.9, axis=0))
-    return np.asarray(np.median(left, axis=0) / NINE_OF_TEN, dtype=np.float64)
+        quantiles.append(np.quantile(np.abs(errors), 0.9, axis=0))
+    return np.asarray(np.median(quantiles, axis=0) / NINE_OF_TEN, dtype=np.float64)

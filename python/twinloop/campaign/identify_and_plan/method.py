@@ -16,8 +16,8 @@ from twinloop.campaign.identify_and_plan.calibration import (
     OF_PARTS,
     calibrated,
     factor,
-    left_of_flights,
     needed_factor,
+    residuals_of_flights,
 )
 from twinloop.campaign.identify_and_plan.choice import Choice
 from twinloop.campaign.identify_and_plan.diagnostics import doubts, other_commands
@@ -287,8 +287,8 @@ class IdentifyAndPlan:
         inflation = OF_PARTS if found.of_parts else factor(known.needed)
         if found.exact:
             # What follows exact readings to rounding is the law: its members are too sure of nothing.
-            left = left_of_flights(found.model, book.experiments[: known.told], self.setup.limits)
-            noise, inflation = replace(noise, sensors=left), 1.0
+            residuals = residuals_of_flights(found.model, book.experiments[: known.told], self.setup.limits)
+            noise, inflation = replace(noise, sensors=residuals), 1.0
         return Twin(
             found.model,
             self.setup.signals,
