@@ -2,6 +2,6 @@
 
 from twinloop.campaign.campaign import Campaign, controller_to_fly
 from twinloop.campaign.from_logs import identify
-from twinloop.campaign.lasting import available_threads
+from twinloop.campaign.persistence import available_threads
 
 __all__ = ["Campaign", "available_threads", "controller_to_fly", "identify"]

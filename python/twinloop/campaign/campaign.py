@@ -16,16 +16,16 @@ from twinloop.arrays import Floats, floats, share, whole
 from twinloop.campaign.assessment import Advice, advice, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
-from twinloop.campaign.errors import free_runs
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Earlier, Examination
 from twinloop.campaign.examination.loops import loops_around
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, Progress
-from twinloop.campaign.lasting import Lasting
+from twinloop.campaign.persistence import Persistent
 from twinloop.campaign.presets import AnyOptions
 from twinloop.campaign.ranking import ranked
 from twinloop.campaign.setup import checked, refuse_arguments
+from twinloop.campaign.twin_errors import free_runs
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
 from twinloop.guard import Guard, Guarded
@@ -64,7 +64,7 @@ GENTLE = "gentle"
 """The excitation of a first test where nothing else is asked for: the preset's own."""
 
 
-class Campaign(Shown, Lasting, kind="campaign"):
+class Campaign(Shown, Persistent, kind="campaign"):
     """Learns a twin and a controller from as few experiments as possible.
 
     Args:

@@ -12,12 +12,12 @@ from twinloop.arrays import Floats
 from twinloop.campaign.coevolution.learning import Learner, Learning
 from twinloop.campaign.coevolution.search import chunks, committee, start_tests
 from twinloop.campaign.coevolution.written import WrittenMemory
-from twinloop.campaign.errors import errors
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Iteration, Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
+from twinloop.campaign.twin_errors import errors_of
 from twinloop.hold_back import HoldBack
 from twinloop.law.twin import Twin
 from twinloop.objectives import final_distances
@@ -134,7 +134,7 @@ class Coevolution:
     def twin(self, book: Logbook) -> Twin:
         """The best trade-off."""
         model = self.models.best_model
-        rows = errors(model, book, self.workers)
+        rows = errors_of(model, book, self.workers)
         flights = [run.trajectory for run in book.experiments]
         return Twin(model, self.setup.signals, rows, self.options.divergence_factor, flights=flights)
 

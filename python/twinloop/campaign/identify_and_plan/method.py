@@ -9,7 +9,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.campaign.errors import errors, free_runs
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.calibration import (
@@ -26,6 +25,7 @@ from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
+from twinloop.campaign.twin_errors import errors_of, free_runs
 from twinloop.controllers import lqr_gains
 from twinloop.controllers.state_feedback import FeedbackFamily
 from twinloop.elementary import log
@@ -279,7 +279,7 @@ class IdentifyAndPlan:
     def twin(self, book: Logbook) -> Twin:
         """The best model, with the committee and the sensors' noise for its band."""
         latest = self._latest()
-        return self._twin(latest, book, errors(latest.identified.model, book, self.workers))
+        return self._twin(latest, book, errors_of(latest.identified.model, book, self.workers))
 
     def _twin(self, known: Learnt, book: Logbook, rows: Sequence[TestErrors]) -> Twin:
         found = known.identified

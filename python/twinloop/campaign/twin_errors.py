@@ -13,7 +13,7 @@ from twinloop.objectives import closed_loop, normalised_error, open_loop
 Objective = Callable[[Sequence[_core.Model], _core.SelectedTests, _core.Workers], Floats]
 
 
-def errors(model: _core.Model, book: Logbook, workers: _core.Workers) -> list[TestErrors]:
+def errors_of(model: _core.Model, book: Logbook, workers: _core.Workers) -> list[TestErrors]:
     """How well a model follows each run.
 
     Args:

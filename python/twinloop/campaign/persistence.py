@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-class Lasting(Recorded):
+class Persistent(Recorded):
     """The parts of a campaign that stay: its setup, its logbook, what its method remembers; and where they are kept."""
 
     def _begin(self, setup: Setup, threads: int | None, progress: Callable[[Progress], None] | None) -> None:
