@@ -63,10 +63,10 @@ class Persistent(Recorded):
         # A campaign that nobody holds any more writes no more; the end of the process is one of those.
         weakref.finalize(self, keeping.close)
 
-    def _recall(self, kept: Kept) -> None:
-        self._book = Logbook.from_record(kept.logbook, self.setup)
-        if kept.memory is not None:
-            self._method.restore(kept.memory, self._book)
+    def _recall(self, held: Kept) -> None:
+        self._book = Logbook.from_record(held.logbook, self.setup)
+        if held.memory is not None:
+            self._method.restore(held.memory, self._book)
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
@@ -190,9 +190,9 @@ class Persistent(Recorded):
         """
         campaign = object.__new__(cls)
         if read_only:
-            kept = look(where, name, read_only)
-            campaign._begin(Setup.from_record(kept.setup), threads, progress)
-            campaign._recall(kept)
+            held = look(where, name, read_only)
+            campaign._begin(Setup.from_record(held.setup), threads, progress)
+            campaign._recall(held)
         else:
             known, setup = heading(where, name)
             campaign._begin(Setup.from_record(setup), threads, progress)

@@ -311,13 +311,13 @@ def _check_inside(what: str, values: Floats, signals: Signals, margin: float) ->
     for value, state in zip(values, signals.states, strict=True):
         if state.envelope is not None:
             low, high = state.envelope
-            kept = 0.5 * margin * (high - low)
+            room = 0.5 * margin * (high - low)
             if state.period is not None:
                 middle = 0.5 * (low + high)
                 value -= round((value - middle) / state.period) * state.period
-            if not low + kept <= value <= high - kept:
+            if not low + room <= value <= high - room:
                 raise InvalidInput(
-                    f"{what}: expected {state.name} within {low + kept:g} to {high - kept:g} {state.unit}, its envelope"
+                    f"{what}: expected {state.name} within {low + room:g} to {high - room:g} {state.unit}, its envelope"
                     f" less the margin of {margin:g}, found {value:g}; declare a wider envelope, or move it."
                 )
 

@@ -57,8 +57,8 @@ def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | N
             test = next(iter(campaign.tests), None) or campaign.test(_first(store))
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
-        text, known = _shown(store, campaign, test)
-        click.echo(to_json(known) if as_json else text, nl=False)
+        text, described = _shown(store, campaign, test)
+        click.echo(to_json(described) if as_json else text, nl=False)
 
 
 def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json: bool) -> None:
@@ -75,7 +75,7 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
             )
         shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]
         if as_json:
-            click.echo(to_json({"tests": [known for _, known in shown]}), nl=False)
+            click.echo(to_json({"tests": [described for _, described in shown]}), nl=False)
             return
         click.echo(
             f"{len(shown)} alternatives, the one most worth flying first. Fly them in any order, tell each; a test"
@@ -112,10 +112,10 @@ def tell(store: str, test: int, flight: Path | None, failed: str | None, aborted
         )
     with closing(_campaign(store)) as campaign:
         if failed is not None:
-            known = tell_failed(campaign, test, failed, flight)
+            asked = tell_failed(campaign, test, failed, flight)
         else:
             assert flight is not None  # refused above
-            known = tell_flight(
+            asked = tell_flight(
                 campaign,
                 test,
                 flight,
@@ -123,7 +123,7 @@ def tell(store: str, test: int, flight: Path | None, failed: str | None, aborted
                 otherwise="say why it was stopped: --aborted REASON",
             )
         click.echo(
-            f"Kept: test {test} {campaign.status(known)}{_as_expected(campaign, known)}; {_count(campaign)} in"
+            f"Kept: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
             f" {shown_name(store)}."
         )
 

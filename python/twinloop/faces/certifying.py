@@ -40,16 +40,16 @@ def certify(
     found = campaign.certificate()
     texts = _parameter_files(found, autopilot)
     names = {key: file for key, (file, _) in texts.items()}
-    known = facts(campaign, found, shown_name(store), given.name, autopilot, names)
+    certified = facts(campaign, found, shown_name(store), given.name, autopilot, names)
     signals = campaign.signals
-    html = page(known, signals.state_names, [state.unit for state in signals.states])
+    html = page(certified, signals.state_names, [state.unit for state in signals.states])
     output.mkdir(parents=True, exist_ok=True)
     for suffix in {form.suffix for form in FORMATS.values()}:
         (output / f"gains{suffix}").unlink(missing_ok=True)
     # What takes the gains back is there before what sets them, whatever happens between.
     for file, text in texts.values():
         write_text(output / file, text)
-    write_text(output / "certificate.json", to_json(known))
+    write_text(output / "certificate.json", to_json(certified))
     write_text(output / "certificate.html", html)
     files = ", ".join(str(output / file) for file, _ in texts.values())
     if found.granted:

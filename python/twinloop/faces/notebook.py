@@ -54,12 +54,12 @@ def _twin(twin: Twin) -> str:
 
 def _test(test: Test) -> str:
     gains = [[name, value] for name, value in test.parameters.items()]
-    told = (
+    predicted = (
         "" if test.predicted is None else f", quality {cell(test.predicted)} ± {cell(test.spread)} predicted"
     )
     flown = "" if test.measured is None else f", {cell(test.measured)} flown"
     excited = ", excited" if test.excitation is not None else ""
-    words = f"Test {test.number}: {test.steps} steps{excited}{told}{flown}. {test.reason}".strip()
+    words = f"Test {test.number}: {test.steps} steps{excited}{predicted}{flown}. {test.reason}".strip()
     return f"<p>{escape(words)}</p>" + _table(["gain", "value"], gains)
 
 

@@ -400,8 +400,8 @@ def _advice(result: Mapping[str, Any]) -> str:
     size = None if scatter is None else _with_unit(scatter, unit)
     if advice["gain"] == 0.0:
         stop = " For the controller, stop." if advice["stop"] else ""
-        told = "" if size is None else f"\nThe scatter of one measurement is {size}."
-        return f"{words} not have improved\nthe quality.{stop}{told}"
+        scattered = "" if size is None else f"\nThe scatter of one measurement is {size}."
+        return f"{words} not have improved\nthe quality.{stop}{scattered}"
     words += f" have improved the quality\nby {_with_unit(advice['gain'], unit)}{share}."
     if size is None:
         return words

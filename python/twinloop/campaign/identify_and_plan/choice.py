@@ -67,21 +67,21 @@ class Choice:
                 )
             reason = "Tuned on the twin, which sees them keep the envelope; none is known to fly to the end."
             return self._tuned(tuned, judged, recorded, reason)
-        known = self.book.flies(flown.number)
+        flies = self.book.flies(flown.number)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < old).mean())
-        if known and not refused:
+        if flies and not refused:
             refused = self._not_preferred(members, recorded, tuned, flown, better)
         if not refused:
             share = f"{100 * better:.3g} %"
             reason = f"Tuned on the twin, which prefers them to the best flown in {share} of its predictions."
-            if not known:
+            if not flies:
                 reason = (
                     "Tuned on the twin: no model sees them leave the envelope, as the best gains flown did."
                 )
             return self._tuned(tuned, judged, recorded, reason)
         reason = f"The best gains flown: {refused}."
-        if not known:
+        if not flies:
             reason += " They left the envelope when they flew."
         return self._flown(flown, judged, recorded, reason)
 
@@ -141,9 +141,9 @@ class Choice:
         return bool(recorded[:, :, 0].mean() > least and again.mean[0] > least)
 
     def _tuned(self, genes: Floats, judged: Judged, recorded: Floats, reason: str) -> Test:
-        known = next((test for test in self.book.tests if test.genes.tobytes() == genes.tobytes()), None)
-        quiet = known is not None and known.excitation is None and self.book.on_task(known)
-        number = len(self.book.tests) if known is None else known.number
+        same = next((test for test in self.book.tests if test.genes.tobytes() == genes.tobytes()), None)
+        quiet = same is not None and same.excitation is None and self.book.on_task(same)
+        number = len(self.book.tests) if same is None else same.number
         measured = self.book.measured(number) if quiet else None
         return self._answer(self.book.of_task(genes, number), measured, judged, recorded, 0, reason)
 

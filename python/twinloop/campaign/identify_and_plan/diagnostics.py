@@ -145,17 +145,17 @@ def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Ite
             continue
         j = signals.state_names.index(rate.derivative_of)
         pairs = [_moved(run.states[:, j], run.states[:, i], signals.dt) for run in runs]
-        moved, said = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-        size, told, both = (
-            float(values.sum()) for values in (np.square(moved), np.square(said), moved * said)
+        moved, declared = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+        size, declared_size, product = (
+            float(values.sum()) for values in (np.square(moved), np.square(declared), moved * declared)
         )
-        if size <= len(moved) * MOVED * MOVED * noise[j] or told == 0.0:
+        if size <= len(moved) * MOVED * MOVED * noise[j] or declared_size == 0.0:
             continue
         how = ""
-        if both * both < ALIKE * ALIKE * size * told:
+        if product * product < ALIKE * ALIKE * size * declared_size:
             how = "does not change as"
-        elif not AS_FAST[0] * told < both < AS_FAST[1] * told:
-            how = f"changes {both / told:.3g} times as fast as"
+        elif not AS_FAST[0] * declared_size < product < AS_FAST[1] * declared_size:
+            how = f"changes {product / declared_size:.3g} times as fast as"
         if how:
             yield serious(
                 "derivative",

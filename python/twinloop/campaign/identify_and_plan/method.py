@@ -168,8 +168,8 @@ class IdentifyAndPlan:
         self.memory = Memory(asked=self.memory.asked, latest=self._learnt(book))
 
     def _learnt(self, book: Logbook) -> Learnt:
-        known, told = self.memory.asked, len(book.experiments)
-        needed = () if known is None else self._calibrated(known, book)
+        asked, told = self.memory.asked, len(book.experiments)
+        needed = () if asked is None else self._calibrated(asked, book)
         flights = learnt_from(book.experiments, self.options.most_readings)
         runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights]
         identified = identify_runs(
@@ -179,7 +179,7 @@ class IdentifyAndPlan:
             rests=self._rests(),
             seed=self.setup.seed,
             iteration=told,
-            known=None if known is None else known.identified,
+            known=None if asked is None else asked.identified,
             workers=self.workers,
             watch=self._watch,
         )
@@ -188,9 +188,11 @@ class IdentifyAndPlan:
         # A member that cannot follow the flights that it was learnt from is no member (E-SINDy's stability filter).
         wrong = (free > np.maximum(WRONG * frozen, 4.0 * free[0])).any(axis=1)
         # Where hardly any can, the ones that go wrong least still show where more must be known.
-        kept = {0, *np.flatnonzero(~wrong).tolist()}
-        kept |= set([i for i in followed.order() if i not in kept][: max(0, FEWEST - len(kept))])
-        believed = [identified.members[i] for i in sorted(kept)]
+        followers = {0, *np.flatnonzero(~wrong).tolist()}
+        followers |= set(
+            [i for i in followed.order() if i not in followers][: max(0, FEWEST - len(followers))]
+        )
+        believed = [identified.members[i] for i in sorted(followers)]
         follows = self._can_follow(identified, free[0], frozen)
         errors_of_best = free_runs(identified.members[:1], book, self.workers)[0]
         noise = identified.noise(self.setup.signals)
@@ -198,8 +200,8 @@ class IdentifyAndPlan:
         off = foretold(identified.members[0], book.experiments, noise, unit, self.setup.limits, self.workers)
         missed = unexplained(free[0], frozen, off)
         lesson = self._lesson(identified, follows, book, errors_of_best.tolist(), missed)
-        before = () if known is None else known.lessons
-        earlier = () if known is None else known.models
+        before = () if asked is None else asked.lessons
+        earlier = () if asked is None else asked.models
         models = (*earlier, identified.model)
         return Learnt(told, identified, believed, follows, needed, (*before, lesson), models=models)
 
@@ -281,35 +283,37 @@ class IdentifyAndPlan:
         latest = self._latest()
         return self._twin(latest, book, errors_of(latest.identified.model, book, self.workers))
 
-    def _twin(self, known: Learnt, book: Logbook, rows: Sequence[TestErrors]) -> Twin:
-        found = known.identified
+    def _twin(self, learnt: Learnt, book: Logbook, rows: Sequence[TestErrors]) -> Twin:
+        found = learnt.identified
         noise = found.noise(self.setup.signals)
-        inflation = OF_PARTS if found.of_parts else factor(known.needed)
+        inflation = OF_PARTS if found.of_parts else factor(learnt.needed)
         if found.exact:
             # What follows exact readings to rounding is the law: its members are too sure of nothing.
-            residuals = residuals_of_flights(found.model, book.experiments[: known.told], self.setup.limits)
+            residuals = residuals_of_flights(found.model, book.experiments[: learnt.told], self.setup.limits)
             noise, inflation = replace(noise, sensors=residuals), 1.0
         return Twin(
             found.model,
             self.setup.signals,
             rows,
             self.options.divergence_factor,
-            members=known.believed,
+            members=learnt.believed,
             noise=noise,
             seed=self.setup.seed,
             inflation=inflation,
-            remarks=known.lessons[-1].remarks,
+            remarks=learnt.lessons[-1].remarks,
             flights=[run.trajectory for run in book.experiments],
         )
 
-    def _calibrated(self, known: Learnt, book: Logbook) -> tuple[float, ...]:
+    def _calibrated(self, learnt: Learnt, book: Logbook) -> tuple[float, ...]:
         """Factors that the flights told since would have needed, after those before them."""
         # A committee with parts in it says nothing of those that come after it.
-        if known.identified.of_parts:
-            return known.needed
-        twin = self._twin(known, book, [])
-        needed = [needed_factor(twin, run.replayed, run.trajectory) for run in book.experiments[known.told :]]
-        return (*known.needed, *(found for found in needed if found is not None))
+        if learnt.identified.of_parts:
+            return learnt.needed
+        twin = self._twin(learnt, book, [])
+        needed = [
+            needed_factor(twin, run.replayed, run.trajectory) for run in book.experiments[learnt.told :]
+        ]
+        return (*learnt.needed, *(found for found in needed if found is not None))
 
     @property
     def asked_model(self) -> _core.Model | None:
@@ -352,15 +356,15 @@ class IdentifyAndPlan:
 
     def rivals(self) -> tuple[Rival, ...]:
         """Subsets of terms that annealing has found nearly as good."""
-        known, signals = self._latest().identified, self.setup.signals
+        identified, signals = self._latest().identified, self.setup.signals
         symbols = symbols_of(signals)
         return tuple(
             Rival(
                 signals.state_names[found.chain.states[0]],
-                tuple(sorted(known.pool.text(node, symbols) for node in subset)),
+                tuple(sorted(identified.pool.text(node, symbols) for node in subset)),
                 above,
             )
-            for found in known.sums
+            for found in identified.sums
             for subset, above in ((tuple(found.weights), 0.0), *found.others)
             if above > 0.0 or subset == tuple(found.weights)
         )
@@ -384,12 +388,12 @@ class IdentifyAndPlan:
         sensors = latest.identified.sensors(self.setup.signals.n_x)
         return Committee(latest.believed, sensors, latest.follows)
 
-    def _can_follow(self, known: Identified, free: Floats, frozen: Floats) -> bool:
+    def _can_follow(self, identified: Identified, free: Floats, frozen: Floats) -> bool:
         """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from."""
         scales = np.array([state.scale for state in self.setup.signals.states])
-        noise = float(np.square(known.sensors(len(scales)) / scales).mean())
+        noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
         lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
-        return bool(np.isfinite(known.left)) and 2 * int(lost.sum()) <= len(lost)
+        return bool(np.isfinite(identified.left)) and 2 * int(lost.sum()) <= len(lost)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
         """Whether the tuned gains are flown as they are, unless that is what a test that is waiting does."""
@@ -450,37 +454,37 @@ class IdentifyAndPlan:
         return [family.controller(middle).command(target, target)]
 
     def _lesson(
-        self, known: Identified, follows: bool, book: Logbook, free: list[float], missed: Floats
+        self, identified: Identified, follows: bool, book: Logbook, free: list[float], missed: Floats
     ) -> Lesson:
         return Lesson(
             iteration=len(book.experiments),
             tests=self._told,
-            form=known.model.form,
-            terms=known.terms,
-            misfit=known.misfit,
-            readings=known.readings,
-            ignored=known.ignored,
-            sensors=tuple(known.sensors(self.setup.signals.n_x).tolist()),
-            lags=tuple(actuator.lag for actuator in known.actuation.actuators),
-            delays=tuple(actuator.delay for actuator in known.actuation.actuators),
+            form=identified.model.form,
+            terms=identified.terms,
+            misfit=identified.misfit,
+            readings=identified.readings,
+            ignored=identified.ignored,
+            sensors=tuple(identified.sensors(self.setup.signals.n_x).tolist()),
+            lags=tuple(actuator.lag for actuator in identified.actuation.actuators),
+            delays=tuple(actuator.delay for actuator in identified.actuation.actuators),
             hidden=tuple(
                 (hidden.commands, hidden.squared, hidden.rest, hidden.time)
-                for hidden in known.actuation.hidden
+                for hidden in identified.actuation.hidden
             ),
-            offsets=tuple(known.offsets.tolist()),
+            offsets=tuple(identified.offsets.tolist()),
             closed_loop=tuple(free),
             normalised=tuple(
                 normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)
             ),
             follows=follows,
             remarks=(
-                *known.remarks,
+                *identified.remarks,
                 *doubts(
                     book.experiments,
                     self.setup.signals,
-                    follows or not np.isfinite(known.left),  # of one that diverges it is said already
+                    follows or not np.isfinite(identified.left),  # of one that diverges it is said already
                     self.setup.steps,
-                    missed.tolist() if np.isfinite(known.left) else (),
+                    missed.tolist() if np.isfinite(identified.left) else (),
                     () if follows else other_commands(book.experiments),
                 ),
             ),

@@ -38,12 +38,12 @@ def learnt_from(experiments: Sequence[Experiment], most: int) -> list[Experiment
     numbers = range(len(runs))
     surprising = sorted(numbers, key=lambda i: _surprise(runs[i]), reverse=True)
     pairs = zip_longest(reversed(numbers), surprising)
-    kept, room = {numbers[-1]}, most - _readings(runs[-1])
+    chosen, room = {numbers[-1]}, most - _readings(runs[-1])
     for i in chain.from_iterable(pairs):
-        if i not in kept and _readings(runs[i]) <= room:
-            kept.add(i)
+        if i not in chosen and _readings(runs[i]) <= room:
+            chosen.add(i)
             room -= _readings(runs[i])
-    return [runs[i] for i in sorted(kept)]
+    return [runs[i] for i in sorted(chosen)]
 
 
 def _readings(run: Experiment) -> int:

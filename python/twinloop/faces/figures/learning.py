@@ -17,13 +17,13 @@ LIGHTEST, DARKEST = -5.0, 0.0
 
 def errors(found: Examination) -> Figure:
     """Error of each twin on each flight; framed: before the flight was learnt (Figure 6 of the paper as a map)."""
-    known = found.errors
+    by_twin = found.errors
     with np.errstate(divide="ignore", invalid="ignore"):
-        decades = np.log10(known.values)
+        decades = np.log10(by_twin.values)
     shades = np.clip((decades - LIGHTEST) / (DARKEST - LIGHTEST), 0.0, 1.0)
-    shades[np.isinf(known.values)] = 1.0
-    texts = [[_said(value) for value in row] for row in known.values]
-    marked = [(i, j) for i, j in np.ndindex(known.values.shape) if texts[i][j] and not known.learnt[i, j]]
+    shades[np.isinf(by_twin.values)] = 1.0
+    texts = [[_said(value) for value in row] for row in by_twin.values]
+    marked = [(i, j) for i, j in np.ndindex(by_twin.values.shape) if texts[i][j] and not by_twin.learnt[i, j]]
     return Figure(
         "errors",
         "Error of the twin on each flight, experiment by experiment",
@@ -34,8 +34,8 @@ def errors(found: Examination) -> Figure:
                     Cells(
                         np.where(np.isnan(shades), 0.0, shades),
                         texts,
-                        [said(number) for number in known.tests],
-                        [str(number) for number in known.iterations],
+                        [said(number) for number in by_twin.tests],
+                        [str(number) for number in by_twin.iterations],
                         marked,
                     )
                 ],
@@ -58,24 +58,24 @@ def qualities(found: Examination) -> Figure | None:
     """Qualities as predicted, with what they were expected to scatter, and as flown."""
     numbered = [(run.test.number, run.quality, run.test) for run in found.experiments if run.test is not None]
     flown = [(number, quality) for number, quality, _ in numbered if quality is not None]
-    told = [
+    predictions = [
         (number, test.predicted, test.spread or 0.0)
         for number, _, test in numbered
         if test.predicted is not None and math.isfinite(test.predicted)
     ]
-    if not flown and not told:
+    if not flown and not predictions:
         return None
     marks: list[Mark] = [
         Line([n for n, _ in flown], [q for _, q in flown], "measured", "flown", dots=True),
         Spans(
-            [n + 0.1 for n, _, _ in told],
-            [q - 2 * s for _, q, s in told],
-            [q + 2 * s for _, q, s in told],
+            [n + 0.1 for n, _, _ in predictions],
+            [q - 2 * s for _, q, s in predictions],
+            [q + 2 * s for _, q, s in predictions],
             "twin",
         ),
         Line(
-            [n + 0.1 for n, _, _ in told],
-            [q for _, q, _ in told],
+            [n + 0.1 for n, _, _ in predictions],
+            [q for _, q, _ in predictions],
             "twin",
             "predicted ± 2 spreads",
             joined=False,
@@ -85,7 +85,7 @@ def qualities(found: Examination) -> Figure | None:
     predicted = None if best is None else foretold(best, found.experiments)[0]
     if predicted is not None and math.isfinite(predicted):
         marks.append(Level(predicted, "target", "controller to fly, predicted"))
-    most = max([q for _, q in flown] + [q + 2 * s for _, q, s in told] + [0.0])
+    most = max([q for _, q in flown] + [q + 2 * s for _, q, s in predictions] + [0.0])
     main = Panel(
         "Quality of each flight (less is better)",
         marks,
@@ -94,7 +94,7 @@ def qualities(found: Examination) -> Figure | None:
         y_range=(0.0, 1.1 * most or 1.0),
         whole=True,
     )
-    missed = [(n, (p - q) / s) for n, p, s in told for m, q in flown if m == n and s > 0.0]
+    missed = [(n, (p - q) / s) for n, p, s in predictions for m, q in flown if m == n and s > 0.0]
     panels = [main]
     if missed:
         values = [value for _, value in missed]

@@ -22,7 +22,7 @@ def coverage(found: Examination) -> Figure | None:
         return None
     states = np.concatenate([run.trajectory.states[:-1] for run in found.experiments])
     commands = np.concatenate([run.trajectory.commands for run in found.experiments])
-    kept = np.unique(np.linspace(0, len(states) - 1, DOTS).astype(int))
+    shown = np.unique(np.linspace(0, len(states) - 1, DOTS).astype(int))
     panels = []
     signals = found.signals
     for i in found.moved:
@@ -32,8 +32,8 @@ def coverage(found: Examination) -> Figure | None:
             low, high = signals.commands[j].bounds
             marks: list[Mark] = [
                 Line(
-                    x_factor * states[kept, i],
-                    y_factor * commands[kept, j],
+                    x_factor * states[shown, i],
+                    y_factor * commands[shown, j],
                     "measured",
                     "flown",
                     joined=False,
@@ -58,14 +58,14 @@ def coverage(found: Examination) -> Figure | None:
             )
     beyond = found.beyond
     share = f"{100.0 * (beyond or 0.0):.0f} % of the planned flight"
-    told = (
+    leaves = (
         "" if beyond is None else f" {share} lies beyond the range that was flown in some state or command."
     )
     return Figure(
         "coverage",
         "Where it was flown, and where the controller to fly will go",
         panels[:MOST],
-        f"Where the line leaves the dots the twin is asked about what nobody has seen.{told}",
+        f"Where the line leaves the dots the twin is asked about what nobody has seen.{leaves}",
     )
 
 

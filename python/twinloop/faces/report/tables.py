@@ -184,11 +184,11 @@ def gains(result: Mapping[str, Any]) -> Table | None:
 
 def margins(found: Examination) -> Table | None:
     """Margins of each loop, the worst over the committee first."""
-    known = found.margins
-    if known is None:
+    loops = found.margins
+    if loops is None:
         return None
     rows: list[list[object]] = []
-    for nominal, worst in zip(known.nominal, known.worst, strict=True):
+    for nominal, worst in zip(loops.nominal, loops.worst, strict=True):
         for which, loop in (("worst", worst), ("twin", nominal)):
             if not loop.stable:
                 rows.append([words(loop.loop), which, *[None] * 7, "NO"])
@@ -211,9 +211,9 @@ def margins(found: Examination) -> Table | None:
         "stable",
     ]
     note = (
-        f"Each loop broken at the {known.broken_at}, the others closed, at the target, with delays and lags; worst: the"
-        f" worst of each over {known.members} model{'s' * (known.members != 1)} of the committee, which need not be one"
-        " model's. A loop that is unstable on one of them has no margins."
+        f"Each loop broken at the {loops.broken_at}, the others closed, at the target, with delays and lags; worst:"
+        f" the worst of each over {loops.members} model{'s' * (loops.members != 1)} of the committee, which need not"
+        " be one model's. A loop that is unstable on one of them has no margins."
     )
     return _table("margins", "Margins", head, rows, note)
 

@@ -138,22 +138,27 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
         return Sentence("Controller", "None to fly", False, found.no_controller, (("checks", "all checks"),))
     measure = result["quality"]
     quality = quality_words(measure["kind"], measure["unit"]).rstrip(")")
-    told = f"{quality}{'; ' if measure['unit'] else ' ('}less is better): {_predicted(found, best)}"
-    told += f", {shown_value(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
+    worth = f"{quality}{'; ' if measure['unit'] else ' ('}less is better): {_predicted(found, best)}"
+    worth += f", {shown_value(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
     if first is not None and first["measured"] is not None:
-        told += f"; the first gains had {shown_value(first['measured'])}"
+        worth += f"; the first gains had {shown_value(first['measured'])}"
     margins = _margins(found)
     if failed:
         return Sentence(
-            "Controller", "Do not fly it", False, f"{failed[0].sentence} {_capital(told)}.", _links(failed)
+            "Controller",
+            "Do not fly it",
+            False,
+            f"{failed[0].sentence} {_capital(worth)}.",
+            _links(failed),
         )
     if not checks.twin_passed:
-        text = f"{_capital(told)}. What is predicted rests on a twin that is not to be trusted: believe what was flown."
+        rests = "What is predicted rests on a twin that is not to be trusted: believe what was flown."
+        text = f"{_capital(worth)}. {rests}"
         return Sentence(
             "Controller", "Not on this twin's word", False, text, (("step", "step"), ("qualities", "flights"))
         )
     return Sentence(
-        "Controller", "Fly it" if best["measured"] is None else "Keep it", True, f"{_capital(told)}.{margins}",
+        "Controller", "Fly it" if best["measured"] is None else "Keep it", True, f"{_capital(worth)}.{margins}",
         (("step", "step"), ("margins", "margins"), ("gains-table", "gains")),
     )  # fmt: skip
 
