@@ -31,7 +31,9 @@ def chosen(
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
 
-    def judge(members, genes, sds, draws, excitation=None, ends=None, measured=False, off=None):
+    def judge(
+        members, genes, sds, draws, excitation=None, ends=None, measured=False, off=None, hold_back=None
+    ):
         if ends is not None:
             return Judged(np.full((1, 4, 1), again), np.zeros((1, 4, 1)))
         values = np.full((1, 4, len(genes)), old)
