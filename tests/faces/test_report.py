@@ -287,3 +287,11 @@ def test_a_campaign_of_the_preset_paper_has_a_report():
     campaign = lives.new("paper").run(lives.PLANT, 2)
     page = report_page(campaign, "paper", {"name": "a pendulum"}, {})
     assert "preset paper" in page and "You decide" in page
+
+
+def test_bands_that_are_forgotten_are_said_to_be(good):
+    found = good.examine()
+    bare = [each for each in found.unseen if each.inside is None]
+    assert len(found.unseen) == 3 and len(bare) == 2 and found.unseen[-1].inside is not None
+    caption = FIGURES["unseen"](found).caption
+    assert "Of 2 earlier such flights the band is not known any more." in caption

@@ -214,6 +214,14 @@ def test_units_that_would_break_the_description_do_not(tmp_path):
         assert units["angle"] == 'rad" causality="input' and units["rate"] == "</Unit> */ #error \\"
 
 
+def test_fmu_alone_is_the_newer_version(tmp_path):
+    twin = twin_of(["r4 = r2 * 11.0"])
+    (path,) = twin.export(tmp_path / "twin.fmu", kind="fmu")
+    assert fmpy.read_model_description(path).fmiVersion == "3.0"
+    with pytest.raises(tl.InvalidInput, match="name a file"):
+        twin.export("fmu")
+
+
 def test_an_fmu_needs_a_path_a_compiler_and_double_precision(tmp_path, monkeypatch):
     twin = twin_of(["r4 = r2 * 11.0"])
     with pytest.raises(tl.InvalidInput, match="name a file"):

@@ -20,7 +20,9 @@ WHAT = ("twin", "controller")
 @click.argument("source")
 @click.argument("what", default="twin")
 @click.option("--to", "kind", help=f"Kind: {', '.join(SUFFIXES)}; for a controller python or c.")
-@click.option("--output", type=click.Path(path_type=Path), help="File to write; without it, standard output.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="File to write; without it, standard output."
+)
 @click.option("--name", help="Of the campaign, where the store holds several.")
 @click.option("--precision", default="double", show_default=True, help=f"Of C: {' or '.join(PRECISIONS)}.")
 @click.option(

@@ -35,13 +35,18 @@ def unseen(found: Examination) -> Figure | None:
         if last.inside is None
         else f" {100.0 * last.inside:.0f} % of the readings are inside the 90 % band."
     )
+    # Of the questions before the last one the models are remembered, their committees are not.
+    bare = 0 if last.inside is None else sum(each.inside is None for each in found.unseen[:-1])
+    others = (
+        f" Of {bare} earlier such flight{'s' * (bare != 1)} the band is not known any more." if bare else ""
+    )
     how = "its recorded commands" if last.number is None else "the test's own controller"
     return Figure(
         "unseen",
         f"The twin against {said(last.number)}, which it had not learnt",
         panels,
         f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under"
-        f" {how}; no reading after the first was used.{band}",
+        f" {how}; no reading after the first was used.{band}{others}",
     )
 
 

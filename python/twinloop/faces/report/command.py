@@ -42,9 +42,12 @@ def report(campaign: str, name: str | None, output: Path | None, form: str | Non
 def _figures(campaign: str, name: str | None, folder: Path, form: str) -> None:
     check_format(form)
     if not folder.is_dir():
-        raise InvalidInput(
-            f"Folder {str(folder)!r}: expected a folder for the figures, found none; make it first."
-        )
+        if folder.exists() or not folder.parent.is_dir():
+            raise InvalidInput(
+                f"Folder {str(folder)!r}: expected a folder for the figures, or a place to make it in, found none; name"
+                " another one."
+            )
+        folder.mkdir()
     examined = source(campaign, name).campaign.examine()
     for figure_name, drawn in FIGURES.items():
         figure = drawn(examined)

@@ -53,6 +53,8 @@ SUFFIXES = {
 """Kinds of exports, with the suffix of their files."""
 Contents = dict[str, str] | dict[str, bytes]
 """Of files, by their suffixes."""
+OTHER_NAMES = {"fmu": "fmu3"}
+"""What a kind is called, too."""
 FMUS = {"fmu3": 3, "fmu2": 2}
 """Versions of FMI."""
 UNFIT = frozenset("\"'<>\\")
@@ -104,6 +106,8 @@ def asked(to: str | Path, kind: str | None) -> tuple[str, Path | None]:
     Raises:
         InvalidInput: no such kind, no such suffix, or no such folder.
     """
+    to = OTHER_NAMES.get(str(to), to)
+    kind = None if kind is None else OTHER_NAMES.get(kind, kind)
     if isinstance(to, str) and to in SUFFIXES and kind is None:
         if to in FMUS:
             raise InvalidInput(

@@ -1,0 +1,150 @@
+"""Whatever flew, all of it can be seen and taken away: the quadrotor, one of Gymnasium, one of RotorPy."""
+
+import json
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from command import invoke
+from lives import SMALL
+from twinloop.faces.figures.catalogue import FIGURES
+from twinloop.law.exports.export import SUFFIXES
+
+pytest.importorskip("jinja2", reason="needs pip install 'twinloop[report,store]'")
+pytest.importorskip("sqlalchemy", reason="needs pip install 'twinloop[report,store]'")
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+
+
+def quadrotor():
+    return tl.systems.Quadrotor(noise=1e-3), {}
+
+
+def gymnasium():
+    pytest.importorskip("gymnasium", reason="needs pip install 'twinloop[gymnasium]'")
+    system = tl.systems.Gymnasium(
+        "Pendulum-v1", noise={"angle": 0.002, "rate": 0.01},
+        default_gains={"angle.kp": 12.0, "angle.ki": 1.0, "angle.kd": 3.0},
+    )  # fmt: skip
+    controller = tl.controllers.PID(
+        axes=[("angle", "rate")],
+        gains={"angle.kp": (0.0, 60.0), "angle.ki": (0.0, 20.0), "angle.kd": (0.0, 10.0)},
+    )
+    return system, {
+        "controller": controller, "initial_state": [0.3, 0.0], "target_state": [0.0, 0.0], "duration": 2.0,
+    }  # fmt: skip
+
+
+def rotorpy():
+    pytest.importorskip("rotorpy", reason='needs pip install --no-deps "rotorpy>=3,<4"')
+    return tl.systems.RotorPy("crazyflie", noise=1e-3), {"options": {**SMALL, "lags": True}}  # its motors lag
+
+
+@pytest.fixture(scope="module", params=[quadrotor, gymnasium, rotorpy], ids=lambda made: made.__name__)
+def flown(request, tmp_path_factory):
+    """A campaign of two experiments, and the store that keeps it."""
+    system, changes = request.param()
+    task = ("controller", "initial_state", "target_state", "duration")
+    arguments = {name: changes[name] if name in changes else getattr(system, name) for name in task}
+    store = tmp_path_factory.mktemp(request.param.__name__) / "flown.db"
+    campaign = tl.Campaign(
+        system.signals, **arguments, options=changes.get("options", SMALL), threads=1, store=store
+    )
+    campaign.run(system, experiments=2)
+    return campaign, store
+
+
+class Tags(HTMLParser):
+    """How often each tag stands on a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.found = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.found.append(tag)
+
+
+def test_a_report_with_its_figures(flown, tmp_path):
+    campaign, store = flown
+    page = tmp_path / "report.html"
+    assert invoke("report", str(store), "-o", str(page)).exit_code == 0
+    assert Tags(page.read_text()).found.count("svg") > campaign.signals.n_x
+    assert page.stat().st_size < 6_000_000
+    done = invoke("report", str(store), "-o", str(tmp_path / "figures"), "--format", "svg")
+    assert done.exit_code == 0
+    assert {file.stem for file in (tmp_path / "figures").iterdir()} <= set(FIGURES)
+    assert len(list((tmp_path / "figures").iterdir())) > 5
+
+
+def test_a_certificate_or_the_reason_why_there_is_none(flown, tmp_path):
+    campaign, store = flown
+    done = invoke("certify", str(store), "-o", str(tmp_path / "cert"))
+    found = json.loads((tmp_path / "cert" / "certificate.json").read_text())
+    assert done.exit_code == (0 if found["granted"] else 1)
+    assert found["granted"] == (not campaign.certificate().refusals)
+    assert "Gain certificate" in (tmp_path / "cert" / "certificate.html").read_text()
+
+
+def test_settings_of_the_next_flight(flown, tmp_path):
+    campaign, store = flown
+    number = campaign.tests[-1].number
+    assert invoke("settings", str(store), str(number), "-o", str(tmp_path / "sheet")).exit_code == 0
+    rows = (tmp_path / "sheet" / f"test-{number}-commands.csv").read_text().splitlines()
+    assert len(rows) >= campaign.tests[-1].steps
+
+
+@pytest.mark.parametrize("kind", SUFFIXES)
+def test_the_twin_in_every_kind_compared_with_its_flights(flown, kind, tmp_path):
+    packages = {
+        "fmu3": "fmpy",
+        "fmu2": "fmpy",
+        "casadi": "casadi",
+        "control": "control",
+        "gymnasium": "gymnasium",
+    }
+    pytest.importorskip(packages.get(kind, "math"))
+    campaign, _ = flown
+    path = tmp_path / f"taken{SUFFIXES[kind]}"
+    made = campaign.twin.export(path, kind=kind)
+    assert path in made and all(file.stat().st_size > 0 for file in made)
+    if kind == "json":
+        again = tl.load_twin(path)
+        run = campaign.experiments[0].trajectory
+        expected = campaign.twin.simulate_commands(run.states[0], run.commands).states
+        assert again.simulate_commands(run.states[0], run.commands).states.tobytes() == expected.tobytes()
+    if kind == "python":
+        code = "import taken; print(len(taken.simulate([0.1] * len(taken.STATES), [[0.0] * len(taken.COMMANDS)] * 3)))"
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.strip() == "4"
+
+
+@pytest.mark.parametrize("kind", ["python", "c"])
+def test_the_controller_compared_on_its_flights(flown, kind, tmp_path):
+    campaign, _ = flown
+    assert campaign.export_controller(tmp_path / f"loop{SUFFIXES[kind]}")
+
+
+def test_in_a_notebook_everything_shows_itself(flown):
+    campaign, _ = flown
+    run = campaign.experiments[0]
+    for shown in (campaign, campaign.twin, run.trajectory, run.test):
+        text = shown._repr_html_()
+        assert "<" in text and "nan" not in text.lower().replace("nanometre", "")
+
+
+def test_the_environment_of_the_file_is_that_of_the_campaign(flown):
+    pytest.importorskip("gymnasium")
+    campaign, names = flown[0], {}
+    exec(campaign.export_twin("gymnasium", force=True), names)
+    env = names["TwinEnv"]()
+    first, known = env.reset()
+    np.testing.assert_array_equal(known["state"], campaign.setup.initial_state)
+    assert env.steps == campaign.setup.steps and first.shape == (campaign.signals.n_x,)
