@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from twinloop.campaign import Campaign, controller_to_fly
+from twinloop.campaign.assessment import disturbances
 from twinloop.campaign.history import Lesson
 from twinloop.errors import RemarkWarning, SystemFailure, TwinloopError
 from twinloop.test import Test
@@ -150,7 +151,7 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
     lesson = [record for record in campaign.history if isinstance(record, Lesson)][-1]
     error, diverged = judge.judged(twin)
     best = controller_to_fly(campaign)[0]
-    structures = honesty.found(twin, lesson)
+    structures, felt = honesty.found(twin, lesson), disturbances(twin, lesson)
     return _plain(
         {
             "best_test": None if best is None else plant.true_quality(best.genes),
@@ -161,6 +162,9 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
             "lags": list(lesson.lags),
             "delays": list(lesson.delays),
             "offsets": list(lesson.offsets),
+            "hidden": [list(each) for each in lesson.hidden],
+            "sensors": list(lesson.sensors),
+            "disturbances": [[each.name, each.white, each.lasting, each.memory] for each in felt],
             "empty": honesty.empty_equations(twin, flown),
             "missed": honesty.misses(plant, twin, flown),
             "serious": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if one.serious}),
