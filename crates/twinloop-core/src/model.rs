@@ -71,6 +71,18 @@ enum Slope {
     Turn,
 }
 
+/// Where the derivative of each state comes from.
+fn slopes(signals: &Signals) -> impl Iterator<Item = Slope> {
+    let mut outputs = 0..;
+    (0..signals.states()).map(move |state| {
+        match signals.derivative_of.iter().position(|&of| of == Some(state)) {
+            Some(rate) => Slope::State(rate),
+            None if signals.is_given(state) => Slope::Turn,
+            None => Slope::Output(outputs.next().expect("endless")),
+        }
+    })
+}
+
 /// How the outputs of programs become dynamics; shared by all models of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -91,15 +103,7 @@ pub struct Frame {
 impl Frame {
     /// The frame of a form for these signals.
     pub fn new(form: Form, signals: &Signals) -> Self {
-        let mut outputs = 0..;
-        let slopes = (0..signals.states()).map(|state| {
-            match signals.derivative_of.iter().position(|&of| of == Some(state)) {
-                Some(rate) => Slope::State(rate),
-                None if signals.is_given(state) => Slope::Turn,
-                None => Slope::Output(outputs.next().expect("endless")),
-            }
-        });
-        let slopes = slopes.collect();
+        let slopes = slopes(signals).collect();
         let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
         let (commands, actuation) = (factors.len(), Actuation::default());
         let (body, periods) = (signals.kinematics, signals.periods.clone());
@@ -138,10 +142,12 @@ impl Frame {
 
     /// Whether these signals have the states, commands, period and derivatives of the frame.
     pub fn fits(&self, signals: &Signals) -> bool {
-        let plain = Self::new(self.form, signals);
-        let own = self.clone();
-        self.factors.starts_with(&plain.factors)
-            && *self == Self { actuation: own.actuation, factors: own.factors, sensors: own.sensors, ..plain }
+        let factors = signals.command_scales.iter().map(|scale| 1.0 / scale);
+        self.dt == signals.dt
+            && self.body == signals.kinematics
+            && self.periods == signals.periods
+            && factors.eq(self.factors.iter().copied().take(self.commands))
+            && slopes(signals).eq(self.slopes.iter().copied())
     }
 
     fn states(&self) -> usize {
@@ -216,11 +222,10 @@ impl<'a> Model<'a> {
             Some(line) => [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]],
         };
         match self.frame.form {
-            Form::Absolute => state.copy_from_slice(self.outputs(bank, state, effects[1])),
-            Form::Increment => {
-                let increments = self.outputs(bank, state, effects[1]);
-                for (state, increment) in state.iter_mut().zip(increments) {
-                    *state = *state + *increment;
+            form @ (Form::Absolute | Form::Increment) => {
+                let outputs = self.outputs(bank, state, effects[1]);
+                for (state, output) in state.iter_mut().zip(outputs) {
+                    *state = if form == Form::Absolute { *output } else { *state + *output };
                 }
             }
             Form::Acceleration => {
@@ -228,7 +233,7 @@ impl<'a> Model<'a> {
                 let before = body.map(|body| body.angles.map(|angle| state[angle]));
                 if let Some(before) = before {
                     turned[..state.len()].copy_from_slice(state);
-                    turned[state.len()..].copy_from_slice(&quaternion(before));
+                    set_attitude(&mut turned[state.len()..], before);
                 }
                 let held = Held { model: self, bank, effects, stage: 0, before, seen };
                 rk4(if body.is_some() { turned } else { state }, self.frame.dt, stages, held);
@@ -397,18 +402,38 @@ impl<V: Vector> Field<V> for Held<'_, V> {
             };
         }
         if let Some(body) = &frame.body {
-            let attitude = std::array::from_fn(|i| attitude[i]);
-            let rates = body.rates.map(|rate| states[rate]);
-            slope[states.len()..].copy_from_slice(&turning(attitude, rates));
+            set_turning(&mut slope[states.len()..], attitude, body.rates.map(|rate| states[rate]));
         }
+    }
+}
+
+// An attitude is worked on a register after another: code that does so for many lanes at once is long, and no faster.
+
+/// Writes the quaternion of a rigid body's angles.
+#[inline(always)]
+fn set_attitude<V: Vector>(attitude: &mut [V], angles: [V; 3]) {
+    for piece in 0..V::PIECES {
+        let found = quaternion(angles.map(|angle| angle.piece(piece)));
+        attitude.iter_mut().zip(found).for_each(|(part, found)| part.set_piece(piece, found));
+    }
+}
+
+/// Writes how body rates turn a quaternion.
+#[inline(always)]
+fn set_turning<V: Vector>(slope: &mut [V], attitude: &[V], rates: [V; 3]) {
+    for piece in 0..V::PIECES {
+        let attitude = std::array::from_fn(|i| attitude[i].piece(piece));
+        let found = turning(attitude, rates.map(|rate| rate.piece(piece)));
+        slope.iter_mut().zip(found).for_each(|(part, found)| part.set_piece(piece, found));
     }
 }
 
 /// Writes the angles of a quaternion into the states of a rigid body.
 #[inline(always)]
 fn set_angles<V: Vector>(state: &mut [V], body: &RigidBody, attitude: &[V], before: [V; 3]) {
-    let found = angles(std::array::from_fn(|i| attitude[i]), before);
-    for (&at, angle) in body.angles.iter().zip(found) {
-        state[at] = angle;
+    for piece in 0..V::PIECES {
+        let attitude = std::array::from_fn(|i| attitude[i].piece(piece));
+        let found = angles(attitude, before.map(|angle| angle.piece(piece)));
+        body.angles.iter().zip(found).for_each(|(&at, angle)| state[at].set_piece(piece, angle));
     }
 }

@@ -1,7 +1,7 @@
 //! The interpreter: runs steps over a bank of registers, one vector register after another.
 
 use super::operation::Operation;
-use crate::lanes::{Apart, Vector};
+use crate::lanes::Vector;
 
 /// One step: constants are registers behind those of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,32 +20,17 @@ pub(super) struct Step {
 #[inline(always)]
 #[allow(unsafe_code)]
 pub(super) unsafe fn interpret<V: Vector>(steps: &[Step], bank: &mut [V]) {
-    V::apart(Interpretation { steps, bank });
-}
-
-/// The interpreter as a function of its own: of all code it is the largest, and every form and stage of a model runs it.
-/// Only [`interpret`] makes one, and the promise that it was given holds for the steps and the bank.
-struct Interpretation<'a, V> {
-    steps: &'a [Step],
-    bank: &'a mut [V],
-}
-
-impl<V: Vector> Apart for Interpretation<'_, V> {
-    #[inline(always)]
-    #[allow(unsafe_code)]
-    fn run(self) {
-        for step in self.steps {
-            macro_rules! arms {
-                ($($operation:ident)*) => {
-                    // The operation is constant in each arm, which leaves only its own instructions there.
-                    match step.operation {
-                        // SAFETY: as `interpret` was promised.
-                        $(Operation::$operation => unsafe { apply(Operation::$operation, step, self.bank) },)*
-                    }
-                };
-            }
-            arms!(Add Sub Mul Div Min Max Sin Cos Tanh Exp Sqrt Abs);
+    for step in steps {
+        macro_rules! arms {
+            ($($operation:ident)*) => {
+                // The operation is constant in each arm, which leaves only its own instructions there.
+                match step.operation {
+                    // SAFETY: the caller's promise is passed on.
+                    $(Operation::$operation => unsafe { apply(Operation::$operation, step, bank) },)*
+                }
+            };
         }
+        arms!(Add Sub Mul Div Min Max Sin Cos Tanh Exp Sqrt Abs);
     }
 }
 
