@@ -3,7 +3,7 @@
 
 use crate::error::{Result, invalid};
 use crate::hidden::{Filling, Hidden};
-use crate::lanes::Vector;
+use crate::lanes::{Vector, numbers, vectors};
 
 /// The way from one command to its effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,7 +99,7 @@ pub struct Line<V> {
     actuators: Vec<Actuator>,
     hidden: Vec<Filling<V>>,
     factors: Vec<f64>,
-    /// e^(−dt / 2 lag) of each command.
+    /// e^(−dt / 2 time) of each command's lag, then of each hidden state.
     halves: Vec<V>,
     memory: Vec<V>,
     /// Commands on their way, the oldest first, for each command.
@@ -114,17 +114,22 @@ impl<V: Vector> Line<V> {
     /// where they are given.
     pub fn new(actuation: &Actuation, factors: &[f64], dt: f64, times: Option<&[V]>) -> Self {
         let Actuation { actuators, hidden } = actuation;
-        let own = actuation.times();
-        let time = |i: usize| times.map_or_else(|| V::splat(own[i]), |times| times[i]);
         let commands = actuators.len();
+        // Lane by lane: there is one line a run, and arithmetic on vectors would be compiled for each of them.
+        let lanes: Vec<f64> = match times {
+            Some(times) => numbers(times),
+            None => actuation.times().into_iter().flat_map(|time| vec![time; V::LANES]).collect(),
+        };
+        let (kept, gains) = fading(&lanes, dt);
+        let (kept, gains): (Vec<V>, Vec<V>) = (vectors(&kept), vectors(&gains));
         let zeros = |size: usize| vec![V::splat(0.0); size];
-        let effects = || zeros(commands + hidden.len());
+        let effects = zeros(kept.len());
         Self {
-            halves: (0..commands).map(|i| time(i).map(|lag| decay(lag, dt))).collect(),
             memory: zeros(commands),
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
-            effects: [effects(), effects(), effects()],
-            hidden: (0..hidden.len()).map(|j| Filling::new(&hidden[j], dt, time(commands + j))).collect(),
+            effects: [effects.clone(), effects.clone(), effects],
+            hidden: (commands..).zip(hidden).map(|(i, one)| Filling::new(one, kept[i], gains[i])).collect(),
+            halves: kept,
             factors: factors.to_vec(),
             actuators: actuators.clone(),
             started: false,
@@ -169,9 +174,10 @@ impl<V: Vector> Line<V> {
     }
 }
 
-/// e^(−dt / 2 lag), 0 where there is no lag.
-fn decay(lag: f64, dt: f64) -> f64 {
-    if lag > 0.0 { libm::exp(-0.5 * dt / lag) } else { 0.0 }
+/// Of each time: e^(−dt / 2 time), 0 where there is none, and what half a period adds to what fades so.
+fn fading(times: &[f64], dt: f64) -> (Vec<f64>, Vec<f64>) {
+    let kept = |&time: &f64| if time > 0.0 { libm::exp(-0.5 * dt / time) } else { 0.0 };
+    times.iter().map(|time| (kept(time), time * (1.0 - kept(time)))).unzip()
 }
 
 /// Effects of recorded commands (n × n_u), then the states that they fill, at the start, the middle and the end of each

@@ -1,7 +1,7 @@
 //! The one difference of states: plain, or the short way round where a state is periodic.
 
 use crate::error::{Result, invalid};
-use crate::lanes::Vector;
+use crate::lanes::{Apart, Vector};
 
 /// The period of each state that has one: 2π of an angle in radians that wraps.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,11 +38,11 @@ impl Periods {
     /// `a - b` of a state: at most half a period in either direction where it has one.
     #[inline(always)]
     pub fn difference<V: Vector>(&self, state: usize, a: V, b: V) -> V {
-        let difference = a - b;
-        match self.of(state) {
-            None => difference,
-            Some(period) => difference - (difference / period).map(libm::rint) * period,
+        let mut difference = a - b;
+        if let Some(period) = self.of(state) {
+            V::apart(Shortest { difference: &mut difference, period });
         }
+        difference
     }
 
     /// Brings every periodic state (n_x) within half a period of 0.
@@ -80,6 +80,20 @@ impl Periods {
             sum += difference * difference;
         }
         sum.sqrt()
+    }
+}
+
+/// The short way, as a function of its own: few states are periodic, and every loop takes differences.
+struct Shortest<'a, V> {
+    difference: &'a mut V,
+    period: f64,
+}
+
+impl<V: Vector> Apart for Shortest<'_, V> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { difference, period } = self;
+        *difference = *difference - (*difference / period).map(libm::rint) * period;
     }
 }
 

@@ -51,10 +51,8 @@ pub(crate) struct Filling<V> {
 }
 
 impl<V: Vector> Filling<V> {
-    /// An empty one, that is forgotten after `time`.
-    pub fn new(hidden: &Hidden, dt: f64, time: V) -> Self {
-        let kept = time.map(|time| libm::exp(-0.5 * dt / time));
-        let gain = time * (V::splat(1.0) - kept);
+    /// An empty one, of which half a period leaves the share `kept`, and adds `gain` for each unit of what fills it.
+    pub fn new(hidden: &Hidden, kept: V, gain: V) -> Self {
         let rest = hidden.rest.map(V::splat);
         Self { hidden: hidden.clone(), kept, gain, rest, now: V::splat(0.0) }
     }

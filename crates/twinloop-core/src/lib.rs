@@ -37,42 +37,57 @@ mod trajectory;
 mod tuning;
 mod workers;
 
-pub use actuators::{Actuation, Actuator, effects};
-pub use any_dynamics::{AnyDynamics, AnyWorkspace};
+// The two loops, and the tuning of gains.
 pub use cmaes::CmaEs;
-pub use controller::*;
-pub use difference::Periods;
-pub use dynamics::{Dynamics, state_of};
-pub use error::{Error, Result};
 pub use evolution::{Problem, Search, Snapshot, Variation};
-pub use excitation::{Excitation, HoldBack};
-pub use flights::{
-    Candidate, Disagreement, Draws, Envelope, Flights, Judged, Quality, QualityKind, disagreements, qualities,
-};
-pub use hidden::Hidden;
-pub use integrator::{Field, Stages, rk4};
-pub use lanes::{Apart, Isa, Kernel, Scalar, Vector, Width, dispatch};
-pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Operand, Operation, Page, Program, Shape};
-pub use linear_algebra::{Cholesky, Eigen};
-pub use look_ahead::{Ahead, Leaving, LookAhead};
-pub use model::{Form, Frame, Model};
-pub use model_loop::{Learnt, ModelSearch};
-pub use objective::{
-    Outcome, closed_loops, discrimination, final_distances, instability, k_steps, of_model, open_loops,
-};
-pub use plants::{Gyroscopic, Quadrotor};
+pub use model_loop::ModelSearch;
+pub use test_loop::{TestSearch, TestSettings};
+
+// Identification.
 pub use regression::{
     Annealing, Chain, Choices, Found, Gram, Noise, Record, Solution, likelihood, most_likely_noise, search,
 };
-pub use rng::{Purpose, Stream, Unit};
+pub use tuning::{Observed, Recorded, Tuned, Tuning};
+
+// Judgement.
+pub use flights::{
+    Candidate, Disagreement, Draws, Envelope, Flights, Judged, Quality, QualityKind, disagreements, qualities,
+};
+pub use objective::{
+    Outcome, closed_loops, discrimination, final_distances, instability, k_steps, of_model, open_loops,
+};
+
+// Programs and what they are made of.
+pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Learnt, Operand, Operation, Page, Program, Shape};
+
+// Dynamics: models, plants, and what stands between them and the world.
+pub use actuators::{Actuation, Actuator, effects};
+pub use any_dynamics::{AnyDynamics, AnyWorkspace};
+pub use dynamics::{Dynamics, state_of};
+pub use hidden::Hidden;
+pub use integrator::{Field, Stages, rk4};
+pub use model::{Form, Frame, Model};
+pub use plants::{Gyroscopic, Quadrotor};
+pub use sensors::Sensors;
+
+// Runs: controllers, the loop, records.
+pub use controller::*;
+pub use excitation::{Excitation, HoldBack};
+pub use look_ahead::{Ahead, Leaving, LookAhead};
 pub use rollout::{Commands, Seen, Start, Watch, rollout};
 pub use rows::{run_rows, step_rows};
 pub use selected::{Experiment, SelectedTests};
-pub use sensors::Sensors;
 pub use setting::{Limits, Setting};
-pub use signals::{RigidBody, Signals};
 pub use task::Task;
-pub use test_loop::{TestSearch, TestSettings};
 pub use trajectory::{Influences, Trajectory, record, record_one, replay};
-pub use tuning::{Observed, Recorded, Tuned, Tuning};
+
+// Signals.
+pub use difference::Periods;
+pub use signals::{RigidBody, Signals};
+
+// The ground.
+pub use error::{Error, Result};
+pub use lanes::{Apart, Isa, Kernel, Scalar, Vector, Width, dispatch};
+pub use linear_algebra::{Cholesky, Eigen};
+pub use rng::{Purpose, Stream, Unit};
 pub use workers::Workers;

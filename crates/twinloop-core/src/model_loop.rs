@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::error::{Result, invalid};
 use crate::evolution::{Problem, Search, Snapshot, Variation};
-use crate::lgp::{Code, Grammar, Program};
+use crate::lgp::{Grammar, Learnt, Program};
 use crate::model::{Form, Frame, Model};
 use crate::objective::of_model;
 use crate::pareto::{crowding_distances, order};
@@ -12,23 +12,6 @@ use crate::rng::{Purpose, Stream};
 use crate::selected::SelectedTests;
 use crate::signals::Signals;
 use crate::workers::Workers;
-
-/// A program and its effective part, found once.
-#[derive(Debug)]
-pub struct Learnt {
-    /// What is varied.
-    pub program: Program,
-    /// What is run.
-    pub code: Code,
-}
-
-impl Learnt {
-    /// A program with its introns found.
-    pub fn new(program: Program) -> Self {
-        let code = Code::new(&program);
-        Self { program, code }
-    }
-}
 
 struct Models<'a> {
     grammar: &'a Grammar,

@@ -69,8 +69,21 @@ pub fn rollout<V: Vector>(
     start: &Start<'_, V>,
     watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
+    let (mut lasted, mut aside) = (vec![], Aside(watch));
+    let watch: &mut dyn Watch<V> = &mut aside;
+    V::apart(Run { dynamics, midway: None, start, watch, lasted: &mut lasted });
+    lasted
+}
+
+/// The same with a loop of its own: for what is run more than all else.
+#[inline(always)]
+pub(crate) fn own_rollout<V: Vector>(
+    dynamics: AnyDynamics<'_>,
+    start: &Start<'_, V>,
+    watch: &mut impl Watch<V>,
+) -> Vec<usize> {
     let mut lasted = vec![];
-    V::apart(Run { dynamics, midway: None, start, watch: &mut Aside(watch), lasted: &mut lasted });
+    V::apart(Run { dynamics, midway: None, start, watch, lasted: &mut lasted });
     lasted
 }
 
@@ -90,22 +103,23 @@ pub(crate) fn resumed<'a, V: Vector>(
     start: &Start<'_, V>,
     watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
-    let mut lasted = vec![];
-    V::apart(Run { dynamics, midway: Some(midway), start, watch: &mut Aside(watch), lasted: &mut lasted });
+    let (mut lasted, mut aside) = (vec![], Aside(watch));
+    let watch: &mut dyn Watch<V> = &mut aside;
+    V::apart(Run { dynamics, midway: Some(midway), start, watch, lasted: &mut lasted });
     lasted
 }
 
-/// The roll-out as a function of its own: it is compiled once for each vector, whatever looks on.
-struct Run<'a, 'd, V: Vector> {
+/// The roll-out as a function of its own: it is compiled once for each vector, whatever looks on by a pointer.
+struct Run<'a, 'd, V: Vector, W: ?Sized> {
     dynamics: AnyDynamics<'d>,
     /// Where the run is; none at its beginning.
     midway: Option<Midway<AnyWorkspace<'d, V>, V>>,
     start: &'a Start<'a, V>,
-    watch: &'a mut dyn Watch<V>,
+    watch: &'a mut W,
     lasted: &'a mut Vec<usize>,
 }
 
-impl<V: Vector> Apart for Run<'_, '_, V> {
+impl<V: Vector, W: Watch<V> + ?Sized> Apart for Run<'_, '_, V, W> {
     #[inline(always)]
     fn run(self) {
         *self.lasted = looped(&self.dynamics, self.midway, self.start, self.watch);
@@ -148,7 +162,7 @@ fn looped<D: Dynamics, V: Vector>(
     dynamics: &D,
     midway: Option<Midway<D::Workspace<V>, V>>,
     start: &Start<'_, V>,
-    watch: &mut dyn Watch<V>,
+    watch: &mut (impl Watch<V> + ?Sized),
 ) -> Vec<usize> {
     let Start { commands, initial, steps, limits, noise, disturbance } = *start;
     let states = initial.len();

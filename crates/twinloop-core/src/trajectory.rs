@@ -6,7 +6,7 @@ use crate::any_dynamics::AnyDynamics;
 use crate::controller::Family;
 use crate::dynamics::Dynamics;
 use crate::excitation::{Excitation, HoldBack};
-use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, scalars, with_test_lanes};
+use crate::lanes::{Isa, Kernel, Scalar, Vector, Width, dispatch, groups, pack, scalars, with_flight_lanes};
 use crate::rollout::{Commands, Seen, Start, Watch, closed, rollout};
 use crate::setting::{Limits, Setting};
 use crate::task::Task;
@@ -135,7 +135,7 @@ impl Kernel for OfGroup<'_> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Trajectory> {
-        with_test_lanes!(W, self.runs.count, self.lanes())
+        with_flight_lanes!(W, self.runs.count, self.lanes())
     }
 }
 

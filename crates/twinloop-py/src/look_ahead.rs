@@ -28,6 +28,7 @@ impl PyLookAhead {
     #[pyo3(signature = (
         members, setting, parameters, target, steps, envelope, *, excitation = None, hold_back = None
     ))]
+    #[expect(clippy::too_many_arguments, reason = "what a flight is, named by keyword in Python")]
     fn new(
         members: Vec<PyRef<'_, PyModel>>,
         setting: &PySetting,

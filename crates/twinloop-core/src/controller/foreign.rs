@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use crate::lanes::Vector;
+use crate::lanes::{Vector, numbers, vectors};
 
 /// A law whose controllers the engine only calls.
 pub trait ForeignLaw: Debug + Send + Sync {
@@ -25,8 +25,8 @@ pub trait ForeignController: Send {
 /// A controller for each lane.
 #[inline(never)]
 pub(super) fn start<V: Vector>(law: &dyn ForeignLaw, gains: &[V]) -> Vec<Box<dyn ForeignController>> {
-    let of_lane = |l: usize| gains.iter().map(|gain| gain.lane(l)).collect::<Vec<_>>();
-    (0..V::LANES).map(|l| law.start(&of_lane(l))).collect()
+    let gains = numbers(gains);
+    (0..V::LANES).map(|l| law.start(&lane(&gains, l, V::LANES))).collect()
 }
 
 /// Asks the controller of each lane for its command, and clips it to the bounds.
@@ -38,21 +38,34 @@ pub(super) fn ask<V: Vector>(
     target: &[V],
     command: &mut [V],
 ) {
-    let of_lane = |values: &[V], l: usize| values.iter().map(|value| value.lane(l)).collect::<Vec<_>>();
-    let mut commands = vec![f64::NAN; bounds.len() * V::LANES];
-    for (l, (controller, command)) in
-        controllers.iter_mut().zip(commands.chunks_mut(bounds.len())).enumerate()
-    {
-        let state = of_lane(state, l);
+    command.copy_from_slice(&vectors(&asked(controllers, bounds, &numbers(state), &numbers(target))));
+}
+
+/// The same of interleaved numbers: of code that is only called there is one copy.
+fn asked(
+    controllers: &mut [Box<dyn ForeignController>],
+    bounds: &[(f64, f64)],
+    state: &[f64],
+    target: &[f64],
+) -> Vec<f64> {
+    let lanes = controllers.len();
+    let mut commands = vec![f64::NAN; bounds.len() * lanes];
+    let mut own = vec![f64::NAN; bounds.len()];
+    for (l, controller) in controllers.iter_mut().enumerate() {
+        let state = lane(state, l, lanes);
+        own.fill(f64::NAN);
         // A lane that has diverged runs on without anybody looking: it asks no more.
         if state.iter().all(|x| x.is_finite()) {
-            controller.command(&state, &of_lane(target, l), command);
+            controller.command(&state, &lane(target, l, lanes), &mut own);
         }
-        for (command, &(low, high)) in command.iter_mut().zip(bounds) {
-            *command = command.clamp(low, high);
+        for (j, (&command, &(low, high))) in own.iter().zip(bounds).enumerate() {
+            commands[j * lanes + l] = command.clamp(low, high);
         }
     }
-    for (j, command) in command.iter_mut().enumerate() {
-        *command = V::load(&commands.iter().skip(j).step_by(bounds.len()).copied().collect::<Vec<_>>());
-    }
+    commands
+}
+
+/// Numbers of one of several lanes.
+fn lane(interleaved: &[f64], l: usize, lanes: usize) -> Vec<f64> {
+    interleaved.iter().skip(l).step_by(lanes).copied().collect()
 }

@@ -1,10 +1,10 @@
 //! Disagreement: how far apart the members of a committee predict a flight, as the information that it would give.
 
-use super::log_determinant::{log_determinant, place};
 use super::{Flights, Group};
 use crate::difference::Periods;
 use crate::error::{Result, invalid};
-use crate::lanes::{Isa, Kernel, Vector, dispatch, with_test_lanes};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, with_flight_lanes};
+use crate::linear_algebra::{log_determinant, place};
 use crate::model::Model;
 use crate::rollout::{Seen, Watch, rollout};
 use crate::workers::Workers;
@@ -78,7 +78,7 @@ impl Kernel for Fly<'_> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<f64> {
-        with_test_lanes!(W, self.group.candidates, self.lanes())
+        with_flight_lanes!(W, self.group.candidates, self.lanes())
     }
 }
 
@@ -131,7 +131,7 @@ impl Kernel for Compare<'_> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Disagreement> {
-        with_test_lanes!(W, self.candidates, self.lanes())
+        with_flight_lanes!(W, self.candidates, self.lanes())
     }
 }
 

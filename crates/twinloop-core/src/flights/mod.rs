@@ -2,7 +2,6 @@
 
 mod disagreement;
 mod envelope;
-mod log_determinant;
 mod qualities;
 mod quality;
 
@@ -15,7 +14,7 @@ use std::sync::Arc;
 
 use crate::error::{Result, invalid};
 use crate::excitation::{Excitation, HoldBack};
-use crate::lanes::{Vector, groups, interleave, lanes_for, vectors};
+use crate::lanes::{Vector, flight_lanes, groups, interleave, vectors};
 use crate::rollout::{Commands, Start};
 use crate::setting::Setting;
 use crate::signals::Signals;
@@ -146,7 +145,7 @@ struct Group {
 
 impl Group {
     fn new(candidates: &[Candidate]) -> Self {
-        let lanes = lanes_for(candidates.len());
+        let lanes = flight_lanes(candidates.len());
         let part = |of: fn(&Candidate) -> &Vec<f64>| {
             interleave(&candidates.iter().map(of).collect::<Vec<_>>(), lanes)
         };

@@ -5,7 +5,7 @@ use super::quality::{Quality, Tally};
 use super::{Flights, Group};
 use crate::any_dynamics::AnyDynamics;
 use crate::error::{Result, invalid};
-use crate::lanes::{Isa, Kernel, Vector, dispatch, with_test_lanes};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, with_flight_lanes};
 use crate::rollout::{Seen, Watch, rollout};
 use crate::workers::Workers;
 
@@ -102,7 +102,7 @@ impl Kernel for OfGroup<'_> {
 
     #[inline(always)]
     fn run<W: Isa>(self) -> Vec<Judged> {
-        with_test_lanes!(W, self.group.candidates, self.lanes())
+        with_flight_lanes!(W, self.group.candidates, self.lanes())
     }
 }
 

@@ -58,6 +58,30 @@ macro_rules! with_test_lanes {
 }
 pub(crate) use with_test_lanes;
 
+/// Lanes of the vector that [`with_flight_lanes!`] takes for a group.
+pub(crate) fn flight_lanes(count: usize) -> usize {
+    match count {
+        0..=1 => 1,
+        2..=8 => 8,
+        _ => 32,
+    }
+}
+
+/// The same for flights and variants, of which there are seldom from 2 to 4: a copy less of long code.
+macro_rules! with_flight_lanes {
+    ($width:ident, $count:expr, $this:ident.$method:ident($($argument:expr),*)) => {
+        match $count {
+            0..=1 => $this.$method::<$width::Of1>($($argument),*),
+            2..=8 => $this.$method::<$width::Of8>($($argument),*),
+            count => {
+                assert!(count <= 32, "a group has 32 flights at most, found {count}");
+                $this.$method::<$width::Of32>($($argument),*)
+            }
+        }
+    };
+}
+pub(crate) use with_flight_lanes;
+
 /// Rows of equal length side by side: number j of row l goes to place `j * lanes + l`. The last row fills what is left.
 pub(crate) fn interleave<R: AsRef<[f64]>>(rows: &[R], lanes: usize) -> Vec<f64> {
     let Some(last) = rows.last() else { return vec![] };
@@ -73,6 +97,15 @@ pub(crate) fn vectors<V: Vector>(interleaved: &[f64]) -> Vec<V> {
         *vector = V::load(values);
     }
     vectors
+}
+
+/// Vectors as interleaved numbers.
+pub(crate) fn numbers<V: Vector>(vectors: &[V]) -> Vec<f64> {
+    let mut numbers = vec![0.0; vectors.len() * V::LANES];
+    for (vector, values) in vectors.iter().zip(numbers.chunks_exact_mut(V::LANES)) {
+        vector.store(values);
+    }
+    numbers
 }
 
 /// Numbers, each in a vector of one lane.
@@ -92,14 +125,19 @@ mod tests {
     use crate::lanes::{Isa, Kernel, Width, dispatch};
     use proptest::prelude::*;
 
-    /// The lanes that [`with_lanes!`] takes for a group.
+    /// The lanes that [`with_lanes!`], [`with_test_lanes!`] and [`with_flight_lanes!`] take for a group.
     struct Lanes(usize);
 
     impl Kernel for Lanes {
-        type Output = usize;
+        type Output = [usize; 3];
         #[inline(always)]
-        fn run<W: Isa>(self) -> usize {
-            with_lanes!(W, self.0, self.of())
+        fn run<W: Isa>(self) -> [usize; 3] {
+            let tests = self.0.min(32);
+            [
+                with_lanes!(W, self.0, self.of()),
+                with_test_lanes!(W, tests, self.of()),
+                with_flight_lanes!(W, tests, self.of()),
+            ]
         }
     }
 
@@ -113,9 +151,11 @@ mod tests {
     #[test]
     fn every_group_gets_a_vector_with_a_lane_for_each_of_its_rows() {
         for size in 1..=64 {
-            assert!(lanes_for(size) >= size);
+            let tests = size.min(32);
+            let expected = [lanes_for(size), lanes_for(tests), flight_lanes(tests)];
+            assert!(expected[0] >= size && expected[2] >= tests);
             for width in Width::available() {
-                assert_eq!(dispatch(width, Lanes(size)), lanes_for(size), "{size} rows, {width:?}");
+                assert_eq!(dispatch(width, Lanes(size)), expected, "{size} rows, {width:?}");
             }
         }
     }

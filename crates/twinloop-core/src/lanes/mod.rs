@@ -18,7 +18,10 @@ mod piece;
 mod vector;
 mod width;
 
-pub(crate) use groups::{groups, interleave, lanes_for, pack, scalars, vectors, with_lanes, with_test_lanes};
+pub(crate) use groups::{
+    flight_lanes, groups, interleave, lanes_for, numbers, pack, scalars, vectors, with_flight_lanes,
+    with_lanes, with_test_lanes,
+};
 pub use piece::Apart;
 #[cfg(test)]
 pub(crate) use vector::Wide;

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::chain::{Chain, LONGEST, Noise, Whitening};
+use super::chain::{Chain, LONGEST};
+use super::noise::Noise;
+use super::whitening::Whitening;
 use crate::linear_algebra::Cholesky;
 use crate::workers::Workers;
 
@@ -113,8 +115,14 @@ impl Gram {
     /// Of all records.
     pub fn new(chain: &Chain, records: &[Record], features: usize, noise: &Noise, workers: &Workers) -> Self {
         let whitenings = Record::whitenings(chain, records, noise);
-        let parts =
-            workers.map(records.len(), |i| Self::of_record(chain, &records[i], features, &whitenings[i]));
+        // Loops of a known length are faster.
+        let of_record = match chain.states {
+            1 => Self::of_record::<1>,
+            2 => Self::of_record::<2>,
+            3 => Self::of_record::<3>,
+            _ => Self::of_record::<LONGEST>,
+        };
+        let parts = workers.map(records.len(), |i| of_record(chain, &records[i], features, &whitenings[i]));
         let width = features + 1;
         let mut sum = Self { features, products: vec![0.0; width * width], readings: 0 };
         for part in parts {
@@ -124,8 +132,13 @@ impl Gram {
         sum
     }
 
-    fn of_record(chain: &Chain, record: &Record, features: usize, whitening: &Whitening) -> Self {
-        let (d, p) = (chain.states, features);
+    fn of_record<const D: usize>(
+        chain: &Chain,
+        record: &Record,
+        features: usize,
+        whitening: &Whitening,
+    ) -> Self {
+        let (d, p) = (D, features);
         let width = p + 1;
         let mut products = vec![0.0; width * width];
         let inner = whitening.inner;
@@ -134,23 +147,23 @@ impl Gram {
         let mut rows: Vec<f64> = Vec::with_capacity(BLOCK * width);
         let steps = record.steps(chain);
         for k in 0..=steps {
-            let (gain, root) = (whitening.gain(k), whitening.root(k));
+            let reading = whitening.reading(k, D);
             let first = rows.len();
             rows.resize(first + d * width, 0.0);
             for j in 0..width {
                 let column = &mut state[j * inner..][..inner];
                 // A feature's own response, or the readings less their prediction.
-                let mut innovation = [0.0; LONGEST];
+                let mut innovation = [0.0; D];
                 for i in 0..d {
                     innovation[i] = if j < p { column[i] } else { record.measured[k * d + i] - column[i] };
                 }
                 let sign = if j < p { -1.0 } else { 1.0 };
+                let (mut white, mut correction) = ([0.0; D], [0.0; LONGEST + 1]);
+                reading.observe(&innovation, &mut white, &mut correction[..inner]);
                 for i in 0..d {
-                    rows[first + i * width + j] = (0..d).map(|l| root[i * d + l] * innovation[l]).sum();
+                    rows[first + i * width + j] = white[i];
                 }
-                for i in 0..inner {
-                    column[i] += sign * (0..d).map(|l| gain[i * d + l] * innovation[l]).sum::<f64>();
-                }
+                column.iter_mut().zip(&correction).for_each(|(state, by)| *state += sign * by);
                 chain.coast(column, whitening.kept);
                 if j < p && k < steps {
                     let increments = &record.increments[(k * p + j) * d..][..d];

@@ -1,30 +1,42 @@
 //! How likely residuals are under given noise, and the noise under which they are most likely.
 
-use super::chain::{Chain, LONGEST, Noise};
+use super::chain::{Chain, LONGEST};
 use super::gram::Record;
+use super::noise::Noise;
+use super::whitening::Whitening;
 
 /// −2 log of the likelihood, up to a constant, of the records' residuals ((n + 1) × states each) if only noise made them.
 pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noise: &Noise) -> f64 {
-    let d = chain.states;
+    // Loops of a known length are faster.
+    let squares = match chain.states {
+        1 => squares::<1>,
+        2 => squares::<2>,
+        3 => squares::<3>,
+        _ => squares::<LONGEST>,
+    };
     let mut total = 0.0;
     for (whitening, residual) in Record::whitenings(chain, records, noise).iter().zip(residuals) {
-        total += whitening.log_determinant;
-        let mut state = vec![0.0; whitening.inner];
-        for k in 0..residual.len() / d {
-            let (gain, root) = (whitening.gain(k), whitening.root(k));
-            let mut innovation = [0.0; LONGEST];
-            for i in 0..d {
-                innovation[i] = residual[k * d + i] - state[i];
-            }
-            for i in 0..d {
-                let white: f64 = (0..d).map(|l| root[i * d + l] * innovation[l]).sum();
-                total += white * white;
-            }
-            for (i, state) in state.iter_mut().enumerate() {
-                *state += (0..d).map(|l| gain[i * d + l] * innovation[l]).sum::<f64>();
-            }
-            chain.coast(&mut state, whitening.kept);
+        total = squares(chain, whitening, residual, total + whitening.log_determinant);
+    }
+    total
+}
+
+/// A sum and the squares of a record's whitened residuals.
+fn squares<const D: usize>(chain: &Chain, whitening: &Whitening, residual: &[f64], start: f64) -> f64 {
+    let mut total = start;
+    let mut state = vec![0.0; whitening.inner];
+    for (k, residual) in residual.as_chunks::<D>().0.iter().enumerate() {
+        let mut innovation = [0.0; D];
+        for i in 0..D {
+            innovation[i] = residual[i] - state[i];
         }
+        let (mut white, mut correction) = ([0.0; D], [0.0; LONGEST + 1]);
+        whitening.reading(k, D).observe(&innovation, &mut white, &mut correction[..whitening.inner]);
+        for white in white {
+            total += white * white;
+        }
+        state.iter_mut().zip(correction).for_each(|(state, by)| *state += by);
+        chain.coast(&mut state, whitening.kept);
     }
     total
 }

@@ -1,15 +1,17 @@
 //! Regression: which sums of features explain what the sensors saw, with sensor noise and process noise told apart.
 
-mod blocks;
 mod chain;
 mod gram;
-mod inverse;
 mod likelihood;
+mod noise;
 mod subset;
+mod whitening;
 
-pub use chain::{Chain, Noise};
+pub use chain::Chain;
 pub use gram::{Gram, Record, Solution};
 pub use likelihood::{likelihood, most_likely_noise};
+pub use noise::Noise;
 pub use subset::{Annealing, Choices, Found, search};
 
-pub(crate) use chain::Whitening;
+pub(crate) use chain::LONGEST;
+pub(crate) use whitening::Whitening;

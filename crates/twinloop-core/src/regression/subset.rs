@@ -4,9 +4,9 @@
 //! as well and predicts nothing. Annealing crosses between them (Kirkpatrick, Gelatt, Vecchi 1983).
 
 use super::gram::Gram;
-use super::inverse::{Inverse, Products};
 use crate::error::{Result, invalid};
 use crate::lanes::{Isa, Kernel, Vector, Width, dispatch};
+use crate::linear_algebra::{Inverse, Products};
 use crate::rng::Stream;
 
 /// How long and how hot.

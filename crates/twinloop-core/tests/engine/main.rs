@@ -2,6 +2,8 @@
 
 mod cmaes;
 mod controllers;
+mod dense;
+mod flights;
 mod grammar;
 mod integrator;
 mod lanes;
@@ -11,8 +13,10 @@ mod objectives;
 mod oracle;
 mod programs;
 mod quadrotor;
+mod regression;
 mod rollouts;
 mod selected_tests;
 mod test_search;
 mod text;
+mod tuning;
 mod worlds;

@@ -4,13 +4,13 @@ use crate::lanes::Vector;
 
 /// Place of the entry of a row and a column up to it, where the lower triangle lies row after row.
 #[inline(always)]
-pub(super) fn place(row: usize, column: usize) -> usize {
+pub(crate) fn place(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
 /// log det(I + G). `gram` is the lower triangle of G, positive semidefinite, and is overwritten.
 #[inline(always)]
-pub(super) fn log_determinant<V: Vector>(gram: &mut [V], size: usize) -> V {
+pub(crate) fn log_determinant<V: Vector>(gram: &mut [V], size: usize) -> V {
     let mut total = V::splat(0.0);
     for row in 0..size {
         for column in 0..=row {

@@ -4,7 +4,7 @@ use super::blocks::Blocks;
 use crate::lanes::Vector;
 
 /// Symmetric up to rounding. Every sum is taken in the order of the members, so the width of a vector never shows.
-pub(super) struct Inverse<V> {
+pub(crate) struct Inverse<V> {
     order: usize,
     /// Numbers from a column to the next, with room for a vector from the last member on. Nobody looks at what is there.
     stride: usize,
@@ -22,7 +22,7 @@ pub(super) struct Inverse<V> {
 
 /// A matrix that members are taken from.
 #[derive(Clone, Copy)]
-pub(super) struct Products<'a> {
+pub(crate) struct Products<'a> {
     /// Row after row.
     pub numbers: &'a [f64],
     /// Length of a row.

@@ -1,0 +1,109 @@
+//! A frame: what makes dynamics of a program's outputs.
+
+use super::form::Form;
+use crate::actuators::Actuation;
+use crate::difference::Periods;
+use crate::error::Result;
+use crate::sensors::Sensors;
+use crate::signals::{RigidBody, Signals};
+
+/// Where the derivative of a state comes from, in the form [`Form::Acceleration`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Slope {
+    State(usize),
+    Output(usize),
+    /// An angle of the rigid body, which goes on as a quaternion.
+    Turn,
+}
+
+/// Where the derivative of each state comes from.
+fn slopes(signals: &Signals) -> impl Iterator<Item = Slope> {
+    let mut outputs = 0..;
+    (0..signals.states()).map(move |state| {
+        match signals.derivative_of.iter().position(|&of| of == Some(state)) {
+            Some(rate) => Slope::State(rate),
+            None if signals.is_given(state) => Slope::Turn,
+            None => Slope::Output(outputs.next().expect("endless")),
+        }
+    })
+}
+
+/// How the outputs of programs become dynamics; shared by all models of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    pub(super) form: Form,
+    pub(super) dt: f64,
+    /// Commands of the signals.
+    commands: usize,
+    /// What the inputs of a program after the states are multiplied by: commands, then hidden states.
+    pub(super) factors: Vec<f64>,
+    pub(super) slopes: Vec<Slope>,
+    pub(super) body: Option<RigidBody>,
+    /// A model sees a periodic state within half a period of 0.
+    pub(super) periods: Periods,
+    pub(super) actuation: Actuation,
+    pub(super) sensors: Sensors,
+}
+
+impl Frame {
+    /// The frame of a form for these signals.
+    pub fn new(form: Form, signals: &Signals) -> Self {
+        let slopes = slopes(signals).collect();
+        let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
+        let (commands, actuation) = (factors.len(), Actuation::default());
+        let (body, periods) = (signals.kinematics, signals.periods.clone());
+        let (dt, sensors) = (signals.dt, Sensors::default());
+        Self { form, dt, commands, factors, slopes, body, periods, actuation, sensors }
+    }
+
+    /// The same with something between commands and model, an actuator for each command.
+    pub fn with_actuation(self, actuation: Actuation) -> Result<Self> {
+        let actuation = actuation.validated(self.commands)?;
+        let mut factors = self.factors;
+        // Hidden states are made of commands in units of their scales.
+        factors.resize(self.commands + actuation.hidden.len(), 1.0);
+        Ok(Self { actuation, factors, ..self })
+    }
+
+    /// The same, read by such sensors.
+    pub fn with_sensors(self, sensors: Sensors) -> Self {
+        Self { sensors, ..self }
+    }
+
+    /// What reads the states.
+    pub fn sensors(&self) -> &Sensors {
+        &self.sensors
+    }
+
+    /// What stands between commands and model.
+    pub fn actuation(&self) -> &Actuation {
+        &self.actuation
+    }
+
+    /// What the outputs mean.
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// Whether these signals have the states, commands, period and derivatives of the frame.
+    pub fn fits(&self, signals: &Signals) -> bool {
+        let factors = signals.command_scales.iter().map(|scale| 1.0 / scale);
+        self.dt == signals.dt
+            && self.body == signals.kinematics
+            && self.periods == signals.periods
+            && factors.eq(self.factors.iter().copied().take(self.commands))
+            && slopes(signals).eq(self.slopes.iter().copied())
+    }
+
+    pub(super) fn states(&self) -> usize {
+        self.slopes.len()
+    }
+
+    pub(crate) fn commands(&self) -> usize {
+        self.commands
+    }
+
+    pub(crate) fn periods(&self) -> &Periods {
+        &self.periods
+    }
+}

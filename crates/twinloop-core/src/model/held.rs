@@ -1,0 +1,33 @@
+//! A model within a period, whose commands are held.
+
+use super::Model;
+use super::frame::Slope;
+use crate::integrator::Field;
+use crate::lanes::Vector;
+use crate::lgp::Bank;
+
+/// A model in a period: the effect of the command is known at its start, middle and end.
+pub(super) struct Held<'a, V> {
+    pub model: &'a Model<'a>,
+    pub bank: &'a mut Bank<V>,
+    pub effects: [&'a [V]; 3],
+    pub stage: usize,
+}
+
+/// Which of the three effects each stage of the integrator sees.
+const STAGES: [usize; 4] = [0, 1, 1, 2];
+
+impl<V: Vector> Field<V> for Held<'_, V> {
+    #[inline(always)]
+    fn slope(&mut self, states: &[V], slope: &mut [V]) {
+        let outputs = self.model.outputs(self.bank, states, self.effects[STAGES[self.stage]]);
+        self.stage += 1;
+        for (slope, source) in slope.iter_mut().zip(&self.model.frame.slopes) {
+            *slope = match *source {
+                Slope::State(rate) => states[rate],
+                Slope::Output(output) => outputs[output],
+                Slope::Turn => V::splat(0.0),
+            };
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! A model: a program and the form that makes it dynamics (paper, section IV.A; specification, section 4).
+
+mod form;
+mod frame;
+mod held;
+mod inputs;
+mod turning;
+
+pub use form::Form;
+pub use frame::Frame;
+
+use std::borrow::Cow;
+
+use crate::actuators::Line;
+use crate::dynamics::{Dynamics, step_apart};
+use crate::error::{Result, invalid};
+use crate::integrator::{Stages, rk4};
+use crate::lanes::{Vector, vectors};
+use crate::lgp::{Bank, Code, Program};
+use crate::sensors::Recent;
+use crate::signals::Signals;
+use held::Held;
+use inputs::{Interleaved, StateAndCommand};
+use turning::turn;
+
+/// Code in a frame: dynamics that were learnt.
+#[derive(Clone, Copy)]
+pub struct Model<'a> {
+    /// The effective program.
+    pub code: &'a Code,
+    /// What makes it dynamics.
+    pub frame: &'a Frame,
+}
+
+impl<'a> Model<'a> {
+    /// Refuses a program whose inputs and outputs do not fit the form, with so many hidden states after the commands.
+    pub fn check(program: &Program, form: Form, signals: &Signals, hidden: usize) -> Result<()> {
+        let (inputs, outputs) = form.shape(signals);
+        let inputs = inputs + hidden;
+        let shape = program.shape();
+        if (shape.inputs, shape.outputs) != (inputs, outputs) {
+            return invalid(format!(
+                "model: expected a program of {inputs} inputs and {outputs} outputs for the form {}, found {} and {}",
+                form.name(),
+                shape.inputs,
+                shape.outputs
+            ));
+        }
+        Ok(())
+    }
+
+    /// The next states of interleaved states (n_x × lanes) under interleaved commands (n_u × lanes): what
+    /// [`step`](Dynamics::step) gives, with fewer copies where the outputs are the next state.
+    #[inline(always)]
+    pub(crate) fn predict<'w, V: Vector>(
+        &self,
+        workspace: &'w mut ModelWorkspace<V>,
+        state: &[f64],
+        command: &[f64],
+    ) -> Cow<'w, [V]> {
+        let Frame { form, actuation, periods, .. } = self.frame;
+        if *form == Form::Absolute && actuation.is_direct() && !periods.any() {
+            let inputs = Interleaved { state, command, factors: &self.frame.factors };
+            return Cow::Borrowed(self.code.run(&mut workspace.bank, &inputs));
+        }
+        let mut state = vectors(state);
+        step_apart(self, workspace, &mut state, &vectors::<V>(command));
+        Cow::Owned(state)
+    }
+
+    /// Moves the states of a run on by the period whose command is remembered already.
+    #[inline(always)]
+    pub(crate) fn advance<V: Vector>(
+        &self,
+        workspace: &mut ModelWorkspace<V>,
+        state: &mut [V],
+        command: &[V],
+    ) {
+        let ModelWorkspace { bank, stages, line, turned, seen, .. } = workspace;
+        let effects = match line {
+            None => [command; 3],
+            Some(line) => [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]],
+        };
+        match self.frame.form {
+            form @ (Form::Absolute | Form::Increment) => {
+                let outputs = self.outputs(bank, state, effects[1]);
+                for (state, output) in state.iter_mut().zip(outputs) {
+                    *state = if form == Form::Absolute { *output } else { *state + *output };
+                }
+            }
+            Form::Acceleration => {
+                let field = Held { model: self, bank, effects, stage: 0 };
+                match &self.frame.body {
+                    None => rk4(state, self.frame.dt, stages, field),
+                    Some(body) => turn(state, self.frame.dt, stages, field, body, turned, seen),
+                }
+            }
+        }
+    }
+
+    /// The code's outputs at a state, under a command.
+    #[inline(always)]
+    fn outputs<'b, V: Vector>(&self, bank: &'b mut Bank<V>, state: &[V], command: &[V]) -> &'b [V] {
+        let mut wrapped = Vec::new();
+        if self.frame.periods.any() {
+            wrapped.extend_from_slice(state);
+            self.frame.periods.wrap(&mut wrapped);
+        }
+        let state = if wrapped.is_empty() { state } else { &wrapped };
+        self.code.run(bank, &StateAndCommand { state, command, factors: &self.frame.factors })
+    }
+}
+
+/// Registers and integrator stages of a model's run.
+#[derive(Clone)]
+pub struct ModelWorkspace<V: Vector> {
+    bank: Bank<V>,
+    stages: Stages<V>,
+    /// What the actuators hold, where there are any.
+    line: Option<Line<V>>,
+    /// What sensors may read yet.
+    recent: Recent,
+    /// Of a rigid body: the states and the quaternion of its angles behind them; the states of a stage.
+    turned: Vec<V>,
+    seen: Vec<V>,
+}
+
+impl<'a> Model<'a> {
+    /// A workspace whose lanes are models of their own: constants of the code (each on lanes, in the code's order), and
+    /// times of the actuation.
+    pub(crate) fn variants<V: Vector>(&self, constants: &[V], times: &[V]) -> ModelWorkspace<V> {
+        self.workspace_of(self.code.bank_of(constants), self.line(Some(times)))
+    }
+
+    fn line<V: Vector>(&self, times: Option<&[V]>) -> Option<Line<V>> {
+        let Frame { actuation, factors, dt, .. } = self.frame;
+        (!actuation.is_direct()).then(|| Line::new(actuation, factors, *dt, times))
+    }
+
+    fn workspace_of<V: Vector>(&self, bank: Bank<V>, line: Option<Line<V>>) -> ModelWorkspace<V> {
+        let states = if self.frame.form == Form::Acceleration { self.frame.states() } else { 0 };
+        let body = if states > 0 && self.frame.body.is_some() { states } else { 0 };
+        let turned = vec![V::splat(0.0); if body > 0 { body + 4 } else { 0 }];
+        let (stages, seen) = (Stages::new(states.max(turned.len())), turned[..body].to_vec());
+        ModelWorkspace { bank, stages, line, recent: Recent::default(), turned, seen }
+    }
+}
+
+impl Dynamics for Model<'_> {
+    type Workspace<V: Vector> = ModelWorkspace<V>;
+
+    fn workspace<V: Vector>(&self) -> ModelWorkspace<V> {
+        self.workspace_of(self.code.bank(), self.line(None))
+    }
+
+    #[inline(always)]
+    fn remember<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, command: &[V]) {
+        if let Some(line) = &mut workspace.line {
+            line.pass(command);
+        }
+    }
+
+    #[inline(always)]
+    fn step<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &mut [V], command: &[V]) {
+        self.remember(workspace, command);
+        self.advance(workspace, state, command);
+    }
+
+    #[inline(always)]
+    fn in_time(&self) -> bool {
+        self.frame.sensors.in_time()
+    }
+
+    #[inline(always)]
+    fn read<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &[V], reading: &mut [V]) {
+        self.frame.sensors.read(&mut workspace.recent, state, reading);
+    }
+
+    #[inline(always)]
+    fn state_of<V: Vector>(&self, reading: &[V]) -> Vec<V> {
+        if self.in_time() { reading.to_vec() } else { self.frame.sensors.state_of(reading) }
+    }
+}

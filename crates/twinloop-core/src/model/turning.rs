@@ -1,0 +1,82 @@
+//! A rigid body in a period: its angles go on as a quaternion.
+
+use super::held::Held;
+use crate::attitude::{angles, quaternion, turning};
+use crate::integrator::{Field, Stages, rk4};
+use crate::lanes::Vector;
+use crate::signals::RigidBody;
+
+/// Moves the states of a rigid body on by a period. `turned` has room for the states and a quaternion, `seen` for the
+/// states.
+#[inline(always)]
+pub(super) fn turn<V: Vector>(
+    state: &mut [V],
+    dt: f64,
+    stages: &mut Stages<V>,
+    field: Held<'_, V>,
+    body: &RigidBody,
+    turned: &mut [V],
+    seen: &mut [V],
+) {
+    let before = body.angles.map(|angle| state[angle]);
+    let (states, attitude) = turned.split_at_mut(state.len());
+    states.copy_from_slice(state);
+    set_attitude(attitude, before);
+    rk4(turned, dt, stages, Turning { field, body, before, seen });
+    let (states, attitude) = turned.split_at(state.len());
+    state.copy_from_slice(states);
+    set_angles(state, body, attitude, before);
+}
+
+/// The slope of states, and of the quaternion of a rigid body's angles behind them.
+struct Turning<'a, V> {
+    field: Held<'a, V>,
+    body: &'a RigidBody,
+    /// Angles at the start of the period.
+    before: [V; 3],
+    /// The states of a stage.
+    seen: &'a mut [V],
+}
+
+impl<V: Vector> Field<V> for Turning<'_, V> {
+    #[inline(always)]
+    fn slope(&mut self, point: &[V], slope: &mut [V]) {
+        let (states, attitude) = point.split_at(self.seen.len());
+        self.seen.copy_from_slice(states);
+        set_angles(self.seen, self.body, attitude, self.before);
+        self.field.slope(self.seen, slope);
+        let rates = self.body.rates.map(|rate| states[rate]);
+        set_turning(&mut slope[states.len()..], attitude, rates);
+    }
+}
+
+// An attitude is worked on a register after another: code that does so for many lanes at once is long, and no faster.
+
+/// Writes the quaternion of a rigid body's angles.
+#[inline(always)]
+fn set_attitude<V: Vector>(attitude: &mut [V], angles: [V; 3]) {
+    for piece in 0..V::PIECES {
+        let found = quaternion(angles.map(|angle| angle.piece(piece)));
+        attitude.iter_mut().zip(found).for_each(|(part, found)| part.set_piece(piece, found));
+    }
+}
+
+/// Writes how body rates turn a quaternion.
+#[inline(always)]
+fn set_turning<V: Vector>(slope: &mut [V], attitude: &[V], rates: [V; 3]) {
+    for piece in 0..V::PIECES {
+        let attitude = std::array::from_fn(|i| attitude[i].piece(piece));
+        let found = turning(attitude, rates.map(|rate| rate.piece(piece)));
+        slope.iter_mut().zip(found).for_each(|(part, found)| part.set_piece(piece, found));
+    }
+}
+
+/// Writes the angles of a quaternion into the states of a rigid body.
+#[inline(always)]
+fn set_angles<V: Vector>(state: &mut [V], body: &RigidBody, attitude: &[V], before: [V; 3]) {
+    for piece in 0..V::PIECES {
+        let attitude = std::array::from_fn(|i| attitude[i].piece(piece));
+        let found = angles(attitude, before.map(|angle| angle.piece(piece)));
+        body.angles.iter().zip(found).for_each(|(&at, angle)| state[at].set_piece(piece, angle));
+    }
+}

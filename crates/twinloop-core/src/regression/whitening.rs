@@ -1,0 +1,199 @@
+//! Whitening: the filter that turns what the sensors of a chain read into white numbers.
+//!
+//! Summing features over time keeps sensor noise white, taking differences keeps process noise white. With both at
+//! once neither is right; the innovations of a Kalman filter are white for any share of the two, and because the filter
+//! is linear it can be run over each feature's own response as well as over the readings (Harvey 1989, chapter 3).
+
+use std::ops::{Add, Mul};
+
+use super::chain::{Chain, LONGEST};
+use super::noise::Noise;
+use crate::linear_algebra::{Small, congruent, inverse_root};
+
+/// Gains and whitening matrices of each reading of a record.
+#[derive(Clone, Debug)]
+pub(crate) struct Whitening {
+    /// States of the filter: those of the chain, and the lasting disturbance.
+    pub inner: usize,
+    /// Share of the lasting disturbance that is left after a period.
+    pub kept: f64,
+    /// K of each reading (inner × states).
+    gains: Vec<f64>,
+    /// L⁻¹ of each reading with L Lᵀ the covariance of its innovation (states × states).
+    roots: Vec<f64>,
+    /// Sum of log det of those covariances.
+    pub log_determinant: f64,
+    /// Readings that counted.
+    pub readings: usize,
+}
+
+/// Variance of a reading that is to be ignored, in variances of its innovation.
+const IGNORED: f64 = 1e12;
+
+impl Whitening {
+    /// For a record of which each reading has a weight: 1, or 0 to ignore it. `spread` is the sd of each first state.
+    pub fn new(chain: &Chain, noise: &Noise, weights: &[f64], spread: &[f64]) -> Self {
+        // Loops of a known length are several times faster.
+        let of_size = match (chain.states, noise.hidden()) {
+            (1, 0) => Self::of_size::<1, 1>,
+            (1, _) => Self::of_size::<1, 2>,
+            (2, 0) => Self::of_size::<2, 2>,
+            (2, _) => Self::of_size::<2, 3>,
+            (3, 0) => Self::of_size::<3, 3>,
+            (3, _) => Self::of_size::<3, 4>,
+            (LONGEST, 0) => Self::of_size::<LONGEST, LONGEST>,
+            (LONGEST, _) => Self::of_size::<LONGEST, { LONGEST + 1 }>,
+            (states, _) => unreachable!("a chain of {states} states"),
+        };
+        of_size(chain, noise, weights, spread)
+    }
+
+    /// For D states of a chain, and I of the filter.
+    fn of_size<const D: usize, const I: usize>(
+        chain: &Chain,
+        noise: &Noise,
+        weights: &[f64],
+        spread: &[f64],
+    ) -> Self {
+        let kept = noise.kept(chain.dt);
+        let disturbance = chain.disturbance(noise.process);
+        let mut transition: Small<I> = [[0.0; I]; I];
+        for j in 0..I {
+            let mut column = [0.0; I];
+            column[j] = 1.0;
+            chain.coast(&mut column, kept);
+            (0..I).for_each(|i| transition[i][j] = column[i]);
+        }
+        let mut covariance: Small<I> = [[0.0; I]; I];
+        for i in 0..I {
+            covariance[i][i] = if i < D { spread[i] * spread[i] } else { noise.gust };
+        }
+        let (weights, _) = weights.as_chunks::<D>();
+        let mut whitening = Self {
+            inner: I,
+            kept,
+            gains: Vec::with_capacity(weights.len() * I * D),
+            roots: Vec::with_capacity(weights.len() * D * D),
+            log_determinant: 0.0,
+            readings: weights.as_flattened().iter().filter(|&&w| w > 0.0).count(),
+        };
+        for weights in weights {
+            whitening.update::<D, I>(&mut covariance, &noise.sensors, weights);
+            covariance = congruent(&covariance, &transition);
+            for i in 0..D {
+                for j in 0..D {
+                    covariance[i][j] += disturbance[i * D + j];
+                }
+            }
+            for (i, row) in covariance.iter_mut().enumerate().skip(D) {
+                row[i] += noise.gust * (1.0 - kept * kept);
+            }
+        }
+        whitening
+    }
+
+    /// Takes in a reading: keeps its gain and its whitening matrix, and leaves what is not known yet once it is used.
+    fn update<const D: usize, const I: usize>(
+        &mut self,
+        covariance: &mut Small<I>,
+        sensors: &[f64],
+        weights: &[f64; D],
+    ) {
+        let noise: [f64; D] = std::array::from_fn(|i| {
+            if weights[i] > 0.0 { sensors[i] } else { IGNORED * (sensors[i] + covariance[i][i]) }
+        });
+        let mut innovation: Small<D> = [[0.0; D]; D];
+        for i in 0..D {
+            innovation[i].copy_from_slice(&covariance[i][..D]);
+            innovation[i][i] += noise[i];
+        }
+        let root = inverse_root(&innovation);
+        // W = P Hᵀ L⁻ᵀ: the gain K is W L⁻¹.
+        let mut told: Small<I, D> = [[0.0; D]; I];
+        for i in 0..I {
+            for j in 0..D {
+                told[i][j] = (0..D).map(|k| covariance[i][k] * root[j][k]).sum();
+            }
+        }
+        let mut gain: Small<I, D> = [[0.0; D]; I];
+        for (gain, told) in gain.iter_mut().zip(&told) {
+            *gain = std::array::from_fn(|j| (0..D).map(|k| told[k] * root[k][j]).sum());
+            self.gains.extend(gain.iter());
+        }
+        *covariance = unknown(covariance, &gain, &noise);
+        for i in 0..D {
+            // A reading that is ignored adds nothing to the sum of squares.
+            let counts = weights[i] > 0.0;
+            self.roots.extend(root[i].map(|value| if counts { value } else { 0.0 }));
+            if counts {
+                self.log_determinant -= 2.0 * libm::log(root[i][i]);
+            }
+        }
+    }
+
+    /// The k-th reading, to be observed.
+    #[inline(always)]
+    pub fn reading(&self, k: usize, states: usize) -> Reading<'_> {
+        let (root, gain) = (states * states, self.inner * states);
+        Reading { root: &self.roots[k * root..][..root], gain: &self.gains[k * gain..][..gain] }
+    }
+}
+
+/// What the filter makes of a reading.
+pub(crate) struct Reading<'a> {
+    root: &'a [f64],
+    gain: &'a [f64],
+}
+
+impl Reading<'_> {
+    /// From an innovation (states): the same, white and of variance 1 (states), and what it adds to the filter's states
+    /// (inner). It is the one step of every observer that runs the filter, be it over a feature's own response, over
+    /// residuals, or over the predictions of a model.
+    #[inline(always)]
+    pub fn observe<T: Linear>(&self, innovation: &[T], white: &mut [T], correction: &mut [T]) {
+        let d = innovation.len();
+        for (white, row) in white.iter_mut().zip(self.root.chunks_exact(d)) {
+            *white = product(row, innovation);
+        }
+        for (correction, row) in correction.iter_mut().zip(self.gain.chunks_exact(d)) {
+            *correction = product(row, innovation);
+        }
+    }
+}
+
+/// What the observer's step is linear in: a number, or one in each of several lanes.
+pub(crate) trait Linear: Copy + Add<Output = Self> + Mul<f64, Output = Self> {}
+impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Linear for T {}
+
+/// Sum of a row times a column, first entry first.
+#[inline(always)]
+fn product<T: Linear>(row: &[f64], column: &[T]) -> T {
+    let row = &row[..column.len()];
+    let mut sum = column[0] * row[0];
+    for l in 1..column.len() {
+        sum = sum + column[l] * row[l];
+    }
+    sum
+}
+
+/// What is not known yet once a reading was used, (1 − K H) P (1 − K H)ᵀ + K R Kᵀ (Joseph 1968): P − W Wᵀ loses what
+/// rounding leaves of P, which is more than a sensor leaves that is better than 1e-8 of its readings.
+fn unknown<const D: usize, const I: usize>(
+    covariance: &Small<I>,
+    gain: &Small<I, D>,
+    noise: &[f64; D],
+) -> Small<I> {
+    let mut left: Small<I> = [[0.0; I]; I];
+    for (i, row) in left.iter_mut().enumerate() {
+        row[i] = 1.0;
+        row.iter_mut().zip(&gain[i]).for_each(|(left, gain)| *left -= gain);
+    }
+    let mut next = congruent(covariance, &left);
+    for i in 0..I {
+        for j in 0..=i {
+            next[i][j] += (0..D).map(|k| gain[i][k] * noise[k] * gain[j][k]).sum::<f64>();
+            next[j][i] = next[i][j];
+        }
+    }
+    next
+}

@@ -1,0 +1,53 @@
+//! Draws: models whose constants and times differ by what the runs leave open.
+
+use super::variant::Variant;
+use super::{Tuned, Tuning};
+use crate::linear_algebra::Cholesky;
+use crate::rng::Stream;
+use crate::workers::Workers;
+
+/// How often a draw is taken back by half, and one more.
+const HALVES: usize = 16;
+
+impl Tuning<'_> {
+    /// Tuned models with their free values drawn from what the runs leave open, one for each stream of random numbers.
+    ///
+    /// What is left is known where χ² is a parabola; a draw that leaves the place where it is one is taken back by
+    /// halves until the runs bear it.
+    pub fn drawn(
+        &self,
+        tuned: &Tuned,
+        streams: impl IntoIterator<Item = Stream>,
+        workers: &Workers,
+    ) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let start = Variant { constants: tuned.constants.clone(), lags: tuned.lags.clone() };
+        let size = self.size();
+        let factor =
+            (!tuned.covariance.is_empty()).then(|| Cholesky::new(&tuned.covariance, size, 0.0)).flatten();
+        let tries: Vec<Variant> = streams
+            .into_iter()
+            .flat_map(|mut stream| {
+                let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
+                let step = factor.as_ref().map_or_else(|| vec![0.0; size], |factor| factor.times(&normal));
+                let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVES);
+                let taken = |share: f64| {
+                    let step: Vec<f64> = step.iter().map(|s| share * s).collect();
+                    self.moved(&start, &step)
+                };
+                shares.map(taken).collect::<Vec<_>>()
+            })
+            .collect();
+        if tries.is_empty() {
+            // Most tunings draw nothing: no filter has to be run for them.
+            return vec![];
+        }
+        let costs = self.costs(&self.whitenings(), &tries, workers);
+        let bearable = tuned.left + size as f64 + 3.0 * (2.0 * size as f64).sqrt();
+        let borne = |(tries, costs): (&[Variant], &[f64])| {
+            let found = tries.iter().zip(costs).find(|(_, cost)| **cost <= bearable);
+            let one = found.map_or(&start, |(one, _)| one);
+            (one.constants.clone(), one.lags.clone())
+        };
+        tries.chunks_exact(HALVES).zip(costs.chunks_exact(HALVES)).map(borne).collect()
+    }
+}

@@ -1,0 +1,191 @@
+//! The observer: what runs leave of a model's predictions, for many variants side by side.
+
+use super::variant::Variant;
+use super::{Observed, Recorded, Tuning};
+use crate::dynamics::step_apart;
+use crate::lanes::{Isa, Kernel, Vector, dispatch, pack, with_flight_lanes};
+use crate::model::Model;
+use crate::regression::{LONGEST, Record, Whitening};
+use crate::workers::Workers;
+
+/// Variants that run side by side.
+pub(super) const LANES: usize = 32;
+
+impl Tuning<'_> {
+    /// Whitened prediction errors of the model as it is, (n + 1) × n_x for each record, and its states once each
+    /// reading was used; none where it diverges.
+    pub fn predictions(&self, workers: &Workers) -> Option<Vec<(Vec<f64>, Vec<f64>)>> {
+        let whitenings = self.whitenings();
+        let variant = self.start();
+        let runs = workers.map(self.records.len(), |r| {
+            let part = Part {
+                tuning: self,
+                record: r,
+                whitenings: &whitenings[r],
+                variants: std::slice::from_ref(&variant),
+                keep: true,
+            };
+            dispatch(workers.width(), part)
+        });
+        let finite = runs.iter().all(|run| !run.diverged[0]);
+        finite.then(|| runs.into_iter().map(|run| (run.errors.concat(), run.states)).collect())
+    }
+
+    /// The filters of each record, one a chain.
+    pub(super) fn whitenings(&self) -> Vec<Vec<Whitening>> {
+        let states = self.limits.signals().states();
+        let of_chain = |record: &Recorded, observed: &Observed| {
+            let pick = |values: &[f64]| -> Vec<f64> {
+                values.chunks_exact(states).flat_map(|row| observed.states.iter().map(|&i| row[i])).collect()
+            };
+            let chain =
+                Record { measured: pick(&record.states), weights: pick(&record.weights), increments: vec![] };
+            let spread = chain.spread(&observed.chain);
+            Whitening::new(&observed.chain, &observed.noise, &chain.weights, &spread)
+        };
+        self.records
+            .iter()
+            .map(|record| self.observer.iter().map(|observed| of_chain(record, observed)).collect())
+            .collect()
+    }
+
+    /// χ² of each variant.
+    pub(super) fn costs(
+        &self,
+        whitenings: &[Vec<Whitening>],
+        variants: &[Variant],
+        workers: &Workers,
+    ) -> Vec<f64> {
+        let runs = workers.map(self.records.len(), |r| {
+            let part = Part { tuning: self, record: r, whitenings: &whitenings[r], variants, keep: false };
+            dispatch(workers.width(), part)
+        });
+        (0..variants.len())
+            .map(|v| {
+                let of_run = |run: &Run| if run.diverged[v] { f64::INFINITY } else { run.squares[v] };
+                runs.iter().map(of_run).sum()
+            })
+            .collect()
+    }
+}
+
+/// Variants of a model on one record.
+pub(super) struct Part<'a> {
+    pub tuning: &'a Tuning<'a>,
+    pub record: usize,
+    pub whitenings: &'a [Whitening],
+    pub variants: &'a [Variant],
+    /// Whether errors and states are kept.
+    pub keep: bool,
+}
+
+/// What a record makes of variants.
+#[derive(Default)]
+pub(super) struct Run {
+    /// χ² of each.
+    pub squares: Vec<f64>,
+    pub diverged: Vec<bool>,
+    /// Whitened prediction errors of each, if they were to be kept.
+    pub errors: Vec<Vec<f64>>,
+    /// States of the first variant after each reading was used.
+    pub states: Vec<f64>,
+}
+
+impl Kernel for Part<'_> {
+    type Output = Run;
+
+    #[inline(always)]
+    fn run<W: Isa>(self) -> Run {
+        let mut all = Run::default();
+        for variants in self.variants.chunks(LANES) {
+            let part = Part { variants, ..self };
+            let run = with_flight_lanes!(W, variants.len(), part.lanes());
+            all.squares.extend(run.squares);
+            all.diverged.extend(run.diverged);
+            all.errors.extend(run.errors);
+            if all.states.is_empty() {
+                all.states = run.states;
+            }
+        }
+        all
+    }
+}
+
+impl Part<'_> {
+    #[inline(always)]
+    fn lanes<V: Vector>(&self) -> Run {
+        let Tuning { code, frame, observer, records, limits, .. } = *self.tuning;
+        let record = &records[self.record];
+        let (n_x, n_u) = (limits.signals().states(), frame.commands());
+        let constants: Vec<&[f64]> = self.variants.iter().map(|variant| &variant.constants[..]).collect();
+        let lags: Vec<&[f64]> = self.variants.iter().map(|variant| &variant.lags[..]).collect();
+        let model = Model { code, frame };
+        let mut workspace = model.variants::<V>(&pack(&constants), &pack(&lags));
+        let mut state: Vec<V> = record.states[..n_x].iter().map(|&x| V::splat(x)).collect();
+        let mut command = vec![V::splat(0.0); n_u];
+        let mut gusts = vec![V::splat(0.0); observer.len()];
+        let (mut innovation, mut white) = ([V::splat(0.0); LONGEST], [V::splat(0.0); LONGEST]);
+        let mut correction = [V::splat(0.0); LONGEST + 1];
+        let mut squares = V::splat(0.0);
+        let mut alive = V::splat(1.0);
+        let count = self.variants.len();
+        let mut errors = vec![Vec::with_capacity(if self.keep { record.states.len() } else { 0 }); count];
+        let mut states = Vec::with_capacity(if self.keep { record.states.len() } else { 0 });
+        let steps = record.commands.len() / n_u;
+        for k in 0..=steps {
+            for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
+                let d = observed.states.len();
+                for (innovation, &at) in innovation.iter_mut().zip(&observed.states) {
+                    let reading = V::splat(record.states[k * n_x + at]);
+                    *innovation = frame.periods().difference(at, reading, state[at]);
+                }
+                let inner = &mut correction[..whitening.inner];
+                whitening.reading(k, d).observe(&innovation[..d], &mut white, inner);
+                for ((&at, &white), &by) in observed.states.iter().zip(&white).zip(&correction) {
+                    squares = squares + white * white;
+                    state[at] = state[at] + by;
+                    if self.keep {
+                        for (lane, errors) in errors.iter_mut().enumerate() {
+                            errors.push(white.lane(lane));
+                        }
+                    }
+                }
+                if whitening.inner > d {
+                    *gust = *gust + correction[d];
+                }
+            }
+            if self.keep {
+                states.extend(state.iter().map(|value| value.lane(0)));
+            }
+            if k == steps {
+                break;
+            }
+            for (command, &value) in command.iter_mut().zip(&record.commands[k * n_u..]) {
+                *command = V::splat(value);
+            }
+            step_apart(&model, &mut workspace, &mut state, &command);
+            for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
+                if whitening.inner > observed.states.len() {
+                    for (&at, reach) in observed.states.iter().zip(observed.chain.reach()) {
+                        state[at] = state[at] + *gust * reach;
+                    }
+                    *gust = *gust * whitening.kept;
+                }
+            }
+            for (state, &limit) in state.iter().zip(limits.magnitudes()) {
+                alive = state.abs().select_less(V::splat(limit), alive, V::splat(0.0));
+            }
+            if !V::splat(0.0).any_less(alive) {
+                break;
+            }
+        }
+        Run {
+            squares: (0..count).map(|lane| squares.lane(lane)).collect(),
+            diverged: (0..count)
+                .map(|lane| alive.lane(lane) == 0.0 || !squares.lane(lane).is_finite())
+                .collect(),
+            errors,
+            states,
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! Regression: whitened inner products, likelihoods and subsets, beside one big normal distribution of all readings.
+// Matrices are written as on paper, entry by entry.
+#![allow(clippy::needless_range_loop)]
+
+use proptest::prelude::*;
+use twinloop_core::{
+    Annealing, Chain, Choices, Gram, Noise, Purpose, Record, Stream, Width, likelihood, most_likely_noise,
+    search,
+};
+
+use crate::dense::{Matrix, product, solved, transposed, zeros};
+use crate::worlds::one_worker;
+
+const FEATURES: usize = 3;
+
+/// One record of a chain, with what the test knows of it.
+#[derive(Clone, Debug)]
+struct Case {
+    chain: Chain,
+    noise: Noise,
+    measured: Vec<f64>,
+    weights: Vec<f64>,
+    /// (n × features) at the start, the middle and the end of each period.
+    features: [Vec<f64>; 3],
+}
+
+impl Case {
+    fn record(&self) -> Record {
+        let [start, middle, end] = &self.features;
+        Record::new(&self.chain, self.measured.clone(), self.weights.clone(), start, middle, end)
+    }
+
+    fn steps(&self) -> usize {
+        self.measured.len() / self.chain.states - 1
+    }
+
+    fn hidden(&self) -> usize {
+        usize::from(self.noise.gust > 0.0)
+    }
+
+    /// What a period makes of the states, and of a gust behind them.
+    fn transition(&self) -> Matrix {
+        let (d, dt) = (self.chain.states, self.chain.dt);
+        let mut phi = zeros(d + self.hidden(), d + self.hidden());
+        for i in 0..d {
+            for m in 0..=i {
+                phi[i][i - m] = match (self.chain.integrated, m) {
+                    (_, 0) => 1.0,
+                    (true, _) => dt.powi(m as i32) / factorial(m),
+                    (false, _) => 0.0,
+                };
+            }
+            if self.hidden() > 0 {
+                phi[i][d] = match (self.chain.integrated, i) {
+                    (true, _) => dt.powi(i as i32 + 1) / factorial(i + 1),
+                    (false, 0) => 1.0,
+                    (false, _) => 0.0,
+                };
+            }
+        }
+        if self.hidden() > 0 {
+            phi[d][d] = (-dt / self.noise.memory).exp();
+        }
+        phi
+    }
+
+    /// What a period adds to the covariance of the states.
+    fn added(&self) -> Matrix {
+        let (d, dt) = (self.chain.states, self.chain.dt);
+        let mut q = zeros(d + self.hidden(), d + self.hidden());
+        for a in 0..d {
+            for b in 0..d {
+                // ∫ (dt − s)^a / a! (dt − s)^b / b! ds.
+                q[a][b] = match (self.chain.integrated, a + b) {
+                    (true, power) => {
+                        let power = power + 1;
+                        self.noise.process * dt.powi(power as i32)
+                            / (factorial(a) * factorial(b) * power as f64)
+                    }
+                    (false, 0) => self.noise.process,
+                    (false, _) => 0.0,
+                };
+            }
+        }
+        if self.hidden() > 0 {
+            q[d][d] = self.noise.gust * (1.0 - (-2.0 * dt / self.noise.memory).exp());
+        }
+        q
+    }
+
+    /// Numbers of the readings that count.
+    fn counted(&self) -> Vec<usize> {
+        (0..self.measured.len()).filter(|&i| self.weights[i] > 0.0).collect()
+    }
+
+    /// Covariance of all readings that count, as if there were no law.
+    fn covariance(&self) -> Matrix {
+        let (d, n) = (self.chain.states, self.steps());
+        let (phi, q) = (self.transition(), self.added());
+        let mut now = zeros(phi.len(), phi.len());
+        for i in 0..d {
+            let of_state = self.measured.iter().skip(i).step_by(d);
+            now[i][i] = of_state.fold(0.0_f64, |most, x| most.max(x.abs())).powi(2);
+        }
+        if self.hidden() > 0 {
+            now[d][d] = self.noise.gust;
+        }
+        let mut all = zeros((n + 1) * d, (n + 1) * d);
+        for k in 0..=n {
+            let mut cross = now.clone();
+            for j in k..=n {
+                for a in 0..d {
+                    for b in 0..d {
+                        // State a at j with state b at k.
+                        all[j * d + a][k * d + b] = cross[a][b];
+                        all[k * d + b][j * d + a] = cross[a][b];
+                    }
+                }
+                cross = product(&phi, &cross);
+            }
+            for i in 0..d {
+                all[k * d + i][k * d + i] += self.noise.sensors[i];
+            }
+            now = product(&product(&phi, &now), &transposed(&phi));
+            now.iter_mut().zip(&q).for_each(|(row, q)| row.iter_mut().zip(q).for_each(|(x, q)| *x += q));
+        }
+        let counted = self.counted();
+        counted.iter().map(|&i| counted.iter().map(|&j| all[i][j]).collect()).collect()
+    }
+
+    /// Readings that count (rows) of each feature's own response, and last the readings themselves.
+    fn columns(&self) -> Matrix {
+        let (d, dt) = (self.chain.states, self.chain.dt);
+        let phi = Case { noise: Noise { gust: 0.0, ..self.noise.clone() }, ..self.clone() }.transition();
+        let mut columns = vec![];
+        for j in 0..FEATURES {
+            let (mut state, mut column) = (vec![0.0; d], vec![0.0; d]);
+            for k in 0..self.steps() {
+                let [start, middle, end] = [0, 1, 2].map(|at| self.features[at][k * FEATURES + j]);
+                let mut next: Vec<f64> =
+                    phi.iter().map(|row| row.iter().zip(&state).map(|(p, x)| p * x).sum()).collect();
+                for (m, next) in next.iter_mut().enumerate() {
+                    // Simpson's rule on ∫ (dt − s)^m / m! f(s) ds.
+                    *next += if self.chain.integrated {
+                        let weight = |s: f64| (dt - s).powi(m as i32) / factorial(m);
+                        dt / 6.0 * (weight(0.0) * start + 4.0 * weight(0.5 * dt) * middle + weight(dt) * end)
+                    } else if m == 0 {
+                        start
+                    } else {
+                        0.0
+                    };
+                }
+                state = next;
+                column.extend(&state);
+            }
+            columns.push(column);
+        }
+        columns.push(self.measured.clone());
+        self.counted().iter().map(|&i| columns.iter().map(|column| column[i]).collect()).collect()
+    }
+}
+
+fn factorial(n: usize) -> f64 {
+    (1..=n).map(|i| i as f64).product()
+}
+
+fn case() -> impl Strategy<Value = Case> {
+    (1..4_usize, any::<bool>(), any::<bool>(), 3..9_usize).prop_flat_map(
+        |(states, integrated, gusts, steps)| {
+            let readings = (steps + 1) * states;
+            let feature = || prop::collection::vec(-2.0..2.0_f64, steps * FEATURES);
+            let noise =
+                (prop::collection::vec(1e-3..0.1_f64, states), 1e-2..1.0_f64, 0.1..1.0_f64, 0.05..1.0_f64);
+            (
+                prop::collection::vec(-2.0..2.0_f64, readings),
+                prop::collection::vec(prop::sample::select(vec![1.0, 1.0, 1.0, 0.0]), readings),
+                [feature(), feature(), feature()],
+                noise,
+            )
+                .prop_map(
+                    move |(measured, weights, features, (sensors, process, gust, memory))| Case {
+                        chain: Chain { states, dt: 0.1, integrated }.validated().unwrap(),
+                        noise: Noise { sensors, process, gust: if gusts { gust } else { 0.0 }, memory },
+                        measured,
+                        weights,
+                        features,
+                    },
+                )
+        },
+    )
+}
+
+fn near(found: f64, expected: f64, scale: f64) -> bool {
+    (found - expected).abs() < 1e-7 * (scale + expected.abs())
+}
+
+proptest! {
+    #[test]
+    fn inner_products_are_those_of_one_big_normal_distribution(case in case()) {
+        let gram = Gram::new(&case.chain, &[case.record()], FEATURES, &case.noise, &one_worker());
+        let columns = case.columns();
+        prop_assert_eq!(gram.readings, columns.len());
+        let expected = if columns.is_empty() {
+            zeros(FEATURES + 1, FEATURES + 1)
+        } else {
+            product(&transposed(&columns), &solved(&case.covariance(), &columns).0)
+        };
+        for i in 0..=FEATURES {
+            for j in 0..=FEATURES {
+                let scale = (expected[i][i] * expected[j][j]).sqrt();
+                prop_assert!(near(gram.product(i, j), expected[i][j], scale), "{} {}", gram.product(i, j), expected[i][j]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_likelihood_of_residuals_is_that_of_the_same_distribution(case in case()) {
+        let found = likelihood(&case.chain, &[case.record()], std::slice::from_ref(&case.measured), &case.noise);
+        let readings: Matrix = case.counted().iter().map(|&i| vec![case.measured[i]]).collect();
+        let expected = if readings.is_empty() {
+            0.0
+        } else {
+            let (image, determinant) = solved(&case.covariance(), &readings);
+            product(&transposed(&readings), &image)[0][0] + determinant.ln()
+        };
+        prop_assert!(near(found, expected, 1.0 + readings.len() as f64), "{} {}", found, expected);
+    }
+
+    #[test]
+    fn least_squares_solve_the_normal_equations(case in case()) {
+        let gram = Gram::new(&case.chain, &[case.record()], FEATURES, &case.noise, &one_worker());
+        let all: Vec<usize> = (0..FEATURES).collect();
+        let Some(found) = gram.solve(&all, 0.0) else { return Ok(()) };
+        let rows = |right: &dyn Fn(usize) -> Vec<f64>| -> (Matrix, Matrix) {
+            all.iter().map(|&i| (all.iter().map(|&j| gram.product(i, j)).collect::<Vec<_>>(), right(i))).unzip()
+        };
+        let (matrix, right) = rows(&|i| vec![gram.product(i, FEATURES)]);
+        let (expected, determinant) = solved(&matrix, &right);
+        // Where features are collinear, both lose the digits.
+        prop_assume!(determinant.abs() > 1e-6 * (0..FEATURES).map(|i| matrix[i][i]).product::<f64>());
+        let identity = |i: usize| (0..FEATURES).map(|j| f64::from(u8::from(i == j))).collect();
+        let (inverse, _) = solved(&matrix, &rows(&identity).1);
+        for i in 0..FEATURES {
+            prop_assert!(near(found.coefficients[i], expected[i][0], 1e-3));
+            for j in 0..FEATURES {
+                let scale = (inverse[i][i] * inverse[j][j]).sqrt();
+                prop_assert!(near(found.covariance[i * FEATURES + j], inverse[i][j], scale));
+            }
+        }
+        let explained: f64 = (0..FEATURES).map(|i| expected[i][0] * right[i][0]).sum();
+        prop_assert!(near(found.left, gram.total() - explained, gram.total()));
+    }
+
+    #[test]
+    fn annealing_finds_the_best_of_all_subsets(case in case(), price in 0.1..20.0_f64, seed in any::<u64>()) {
+        let gram = Gram::new(&case.chain, &[case.record()], FEATURES, &case.noise, &one_worker());
+        let choices = Choices::new(&gram, &[price, 0.5 * price, 2.0 * price]);
+        let annealing = Annealing { moves: 400, largest: FEATURES, coldest: 2.0 }.validated().unwrap();
+        let mut stream = Stream::new(seed, Purpose::Subsets, 0, 0, 0);
+        let found = search(&choices, &annealing, &mut stream, Width::widest());
+        let energy = |subset: &[usize]| {
+            let price: f64 = subset.iter().map(|&j| [price, 0.5 * price, 2.0 * price][j]).sum();
+            gram.solve(subset, 0.0).map_or(f64::INFINITY, |solution| solution.left + price)
+        };
+        let subsets = (0..1 << FEATURES).map(|set: usize| (0..FEATURES).filter(|j| set >> j & 1 == 1).collect::<Vec<_>>());
+        let best = subsets.map(|subset| energy(&subset)).fold(f64::INFINITY, f64::min);
+        prop_assert!(near(found[0].energy, best, 1.0), "{:?} {}", found[0], best);
+        prop_assert!(near(found[0].energy, energy(&found[0].subset), 1.0));
+    }
+
+    #[test]
+    fn the_most_likely_noise_is_no_less_likely_than_where_the_search_began(case in case()) {
+        let (records, residuals) = ([case.record()], [case.measured.clone()]);
+        let smallest = Noise { sensors: vec![1e-6; case.chain.states], process: 1e-9, ..case.noise.clone() };
+        let (found, score) = most_likely_noise(&case.chain, &records, &residuals, &case.noise, &smallest);
+        prop_assert_eq!(score, likelihood(&case.chain, &records, &residuals, &found));
+        prop_assert!(score <= likelihood(&case.chain, &records, &residuals, &case.noise));
+        prop_assert!(found.sensors.iter().all(|&sensor| sensor >= 1e-6) && found.process >= 1e-9);
+    }
+}
