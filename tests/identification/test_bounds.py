@@ -41,6 +41,17 @@ def test_it_is_the_least_that_bounds_allow(seed, data):
     assert np.abs(off).max() < 1e-4 * (1.0 + np.sqrt(expected.cost))
 
 
+def test_it_is_that_too_where_sweeps_over_the_bounds_would_not_end():
+    gram = inner_products(3526)
+    free, covariance, least = gram.solve(range(4))
+    root = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    low, high = np.array([0.0, 0.0, 0.0, -np.inf]), np.array([1e-3, 1e-3, 1e-3, np.inf])
+    expected = lsq_linear(root, root @ free, (low, high), method="trf", tol=1e-14)
+    weights, left = bounded_solution(gram, range(4), dict.fromkeys(range(3), (0.0, 1e-3)))
+    assert left == pytest.approx(least + 2.0 * expected.cost, rel=1e-9)
+    np.testing.assert_allclose(weights, expected.x, atol=1e-9)
+
+
 def test_bounds_that_do_not_bind_change_no_bit():
     gram = inner_products(3)
     free, _, left = gram.solve([0, 2])

@@ -61,9 +61,42 @@ def bounded_solution(gram: _core.Gram, subset: Sequence[int], limits: Limits) ->
             moved = max(moved, abs(change) * float(np.sqrt(variance)))
         if moved < STILL:
             break
+    else:
+        # Features that hardly differ pass their forces on to each other for long; which are held is clear by then.
+        at = {i: high if forces[i] > 0.0 else low for i, (low, high) in boxed if forces[i] != 0.0}
+        return _held(solved, dict(boxed), at)
     for i, bounds in boxed:
         weights[i] = within(weights[i], bounds)
     return weights, left + float((covariance * np.outer(forces, forces)).sum())
+
+
+def _held(solved: tuple[Floats, Floats, float], boxed: Limits, at: dict[int, float]) -> tuple[Floats, float]:
+    """Least squares under equalities: each weight that is held moves the others along what is left of the covariance.
+
+    Args:
+        solved: free weights, covariance, χ².
+        boxed: bounds of weights, by place.
+        at: values at which some of them are held; others that leave their bounds then are held there, too.
+    """
+    weights, covariance, left = solved
+    waiting = dict(at)
+    while waiting:
+        for i, value in waiting.items():
+            column, variance = covariance[:, i].copy(), float(covariance[i, i])
+            if variance > 0.0:
+                off = float(weights[i]) - value
+                weights = weights - off / variance * column
+                covariance = covariance - np.outer(column, column) / variance
+                left += off * off / variance
+            covariance[i] = covariance[:, i] = 0.0
+            weights[i] = value
+        at = at | waiting
+        waiting = {
+            i: within(float(weights[i]), bounds)
+            for i, bounds in boxed.items()
+            if i not in at and weights[i] != within(float(weights[i]), bounds)
+        }
+    return weights, left
 
 
 def bounded_model(model: _core.Model, limits: Limits) -> tuple[_core.Model, set[int]]:
