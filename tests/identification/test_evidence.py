@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, Evidence, price, strongest
-from twinloop.identification.identify import Found
 from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -76,4 +75,3 @@ def test_rounding_alone_decides_nothing():
     lengths = -1e5 + TIE * np.linspace(-0.4, 0.4, 5)
     named = [Named(i, evidence(length)) for i, length in enumerate(lengths)]
     assert strongest(named).name == 0
-    assert Found(named[3]).evidence is named[3].evidence

@@ -18,7 +18,8 @@ from twinloop.identification.fit import fitting
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.proposals.parts import cut
 from twinloop.identification.records import HELD, Run, guessed_noise
-from twinloop.identification.search.structure import all_judged, prices
+from twinloop.identification.search.structure import prices
+from twinloop.identification.search.subsets import all_judged
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.identification.terms.libraries import LIBRARIES, rungs
@@ -112,7 +113,8 @@ def test_a_copy_of_a_pool_grows_as_the_pool_would_and_leaves_it_as_it_was(pool, 
             grown.found[grown.enter(more[number])] = 1.0
             grown.length(grown.enter(more[number]))
     assert pool.to_record() == before
-    assert same(again, other) and again.nodes[: len(pool)] == pool.nodes
+    assert same(again, other) and again.extends(pool)
+    assert pool.extends(again) == (len(again) == len(pool))
     for number in range(INPUTS, len(more)):
         assert pool.enter(more[number]) == again.enter(more[number])
 

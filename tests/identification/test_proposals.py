@@ -11,7 +11,14 @@ from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
-from twinloop.identification.identify import PROPOSALS, Found, decided, identify_runs, searched
+from twinloop.identification.identify import (
+    PROPOSALS,
+    Found,
+    concluded,
+    decided,
+    identify_runs,
+    searched,
+)
 from twinloop.identification.proposals import terms as terms_file
 from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
@@ -146,3 +153,21 @@ def test_what_was_known_is_a_start_of_its_own_that_changes_no_other():
     late = searched(context, two)
     assert same(searched(context, one).best, searched(context, one).best)
     assert same(late.best, searched(context, two).best)
+
+
+def test_a_newcomer_is_a_function_and_a_line():
+    """Here one that believes in a term of its own, entered after parts have entered theirs."""
+    context, entered = pendulum(1), []
+
+    def believer(context, hypothesis):
+        grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
+        entered.append(grown.pool.add("tanh", grown.pool.add("*", 0, 0.123)))
+        first, *others = grown.sums
+        first = replace(first, weights={**first.weights, entered[0]: 0.5}, energy=first.energy - 1e3)
+        return [fitted(context, replace(grown, sums=(first, *others), fit=None))]
+
+    found = searched(context, start_of(context), (*PROPOSALS, believer))
+    learnt = concluded(context, found, [])
+    assert learnt.of_parts and learnt.pool.text(entered[0], ["angle", "rate", "torque"]).startswith("tanh")
+    assert all(node < len(learnt.pool) for found in learnt.sums for node in found.weights)
+    assert type(learnt).from_record(learnt.to_record(), context.signals).energy == learnt.energy

@@ -102,7 +102,7 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
     context.watch("form")
     looks = [brief_look(context, form, FORMS + place) for place, form in enumerate(forms)]
     best = strongest(looks)
-    return best.form, [_said(best, next(look for look in looks if look is not best))]
+    return best.form, [_said(best, strongest(look for look in looks if look is not best))]
 
 
 def brief_look(context: Context, form: str, start: int) -> Hypothesis:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import Evidence, strongest
+from twinloop.identification.evidence import strongest
 from twinloop.identification.fit.committee import committee
 from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
@@ -40,20 +40,15 @@ PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, second_look, parts)
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the search from one start leaves.
+    """What a search leaves.
 
     Args:
         best: what is believed.
-        rivals: what else was proposed on the way and lasts on the runs, in order.
+        rivals: what else was proposed on the way and lasts on the runs, in order; from other starts, too.
     """
 
     best: Hypothesis
     rivals: tuple[Hypothesis, ...] = ()
-
-    @property
-    def evidence(self) -> Evidence:
-        """That of what is believed."""
-        return self.best.evidence
 
 
 def identify_runs(
@@ -91,7 +86,8 @@ def identify_runs(
     form, said = likeliest(context)
     context = context.under(form)
     context.watch("noise")
-    found = strongest([searched(context, start) for start in starts(context, form)])
+    first, *others = [searched(context, start) for start in starts(context, form)]
+    found = decided(first, [found for other in others for found in (other.best, *other.rivals)])
     context.watch("committee")
     return concluded(context, found, said)
 
@@ -118,8 +114,9 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
     fit, sums = best.fit, list(best.sums)
     assert fit is not None  # `terms` and the starts see to it
     members, observer, of_parts = committee(context, best, fit, found.rivals)
-    # Pools of parts hold that of the whole, and what they have entered stays known.
-    pool = max((h.pool for h in (best, *found.rivals) if h is best or h.of_part), key=len)
+    # What parts have entered stays known.
+    of_rivals = (rival.pool for rival in found.rivals if rival.of_part)
+    pool = max((best.pool, *(pool for pool in of_rivals if pool.extends(best.pool))), key=len)
     driven = [chain.states[0] for chain in best.driven]
     return Identified(
         model=members[0],

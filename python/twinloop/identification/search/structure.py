@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -13,9 +13,9 @@ from twinloop.arrays import Floats
 from twinloop.elementary import log, power
 from twinloop.errors import engine_input
 from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.subsets import Judged, all_judged, with_what_must_be
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
-from twinloop.identification.terms.bounds import Limits, bounded_solution, excludes_zero
 from twinloop.identification.terms.pool import Pool
 from twinloop.records import Recorded
 from twinloop.streams import Purpose, Unit
@@ -26,8 +26,6 @@ Walked = Sequence[Sequence[tuple[Sequence[int], float]]]
 """Subsets with their energies, the best first, for each chain."""
 Walk = Callable[[Sequence[_core.Gram], Sequence[Floats], int], Walked]
 """Annealed walks: from inner products and prices, a pair for each chain, and the number of the walks."""
-Judged = tuple[tuple[int, ...], float, Floats]
-"""A subset of features, its energy, its coefficients."""
 NOISE_ROUNDS = 5
 """Times at most that terms are searched and the noise that they leave is estimated."""
 FEW_RUNS = 5
@@ -249,7 +247,7 @@ def _best_subsets(
     if known is not None and all(term in place for term in known.weights):
         subsets.append(tuple(sorted(place[term] for term in known.weights)))
     limits = problem.limits(chain, usable)
-    subsets = _with_what_must_be(subsets, gram, costs, limits)
+    subsets = with_what_must_be(subsets, gram, costs, limits)
     return sorted(
         all_judged(gram, subsets, costs, limits),
         key=lambda found: (found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]), found[0]),
@@ -296,62 +294,6 @@ def _differ(new: Chain, old: Chain, problem: Problem) -> bool:
     _, slow = floor_of(old, problem.dt, problem.integration(old))
     moved = (abs(log((new.motion[i] + slow[i]) / (old.motion[i] + slow[i]))) > 1.0 for i in range(2))
     return bool(np.any(np.abs(log(new.sensors / old.sensors)) > 0.3)) or any(moved)
-
-
-def _with_what_must_be(
-    subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
-) -> list[tuple[int, ...]]:
-    """Subsets that hold every term whose bounds exclude 0, as far as the runs can tell those terms apart."""
-    told = (place for place, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[place]))
-    must = _told_apart(gram, told)
-    if not must:
-        return subsets
-    forced = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
-    if all(gram.solve(list(subset)) is None for subset in forced):
-        forced.append(tuple(sorted(must)))
-    return forced
-
-
-def all_judged(
-    gram: _core.Gram, subsets: Sequence[tuple[int, ...]], costs: Floats, limits: Limits
-) -> list[Judged]:
-    """Least squares on subsets; where rounding leaves none of them a solution, on the largest parts that have one.
-
-    Args:
-        gram: of the features.
-        subsets: of them.
-        costs: of each feature, in units of χ².
-        limits: bounds of coefficients, by feature.
-
-    Returns:
-        Those that have a solution.
-    """
-    found = [_judged(gram, subset, costs, limits) for subset in dict.fromkeys(subsets)]
-    if not any(found):
-        parts = dict.fromkeys(_told_apart(gram, subset) for subset in subsets)
-        found = [_judged(gram, subset, costs, limits) for subset in parts]
-    return [judged for judged in found if judged]
-
-
-def _told_apart(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]:
-    """The features of a subset, in order, that those before them do not already span."""
-    kept: list[int] = []
-    for feature in subset:
-        if gram.solve([*kept, feature]) is not None:
-            kept.append(feature)
-    return tuple(kept)
-
-
-def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Limits) -> Judged | None:
-    solved = bounded_solution(gram, subset, limits)
-    if solved is None:
-        return None
-    weights, left = solved
-    nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
-    if nothing and len(nothing) < len(subset):
-        # Held at 0 a term is none.
-        return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
-    return subset, left + float(costs[list(subset)].sum()), weights
 
 
 def total(sums: Sequence[Sum]) -> float:

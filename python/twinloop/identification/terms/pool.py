@@ -112,6 +112,10 @@ class Pool(Expressions, Recorded, kind="pool"):
         other._lengths = dict(self._lengths)
         return other
 
+    def extends(self, other: Pool) -> bool:
+        """Whether every number of another pool means the same in this one."""
+        return self.inputs == other.inputs and self.nodes[: len(other)] == other.nodes
+
     def rung(self, numbers: Iterable[int]) -> int:
         """The highest rung of the ladder that some terms stand on; one above all for what was evolved."""
         top = max(self.rungs.values(), default=-1) + 1
