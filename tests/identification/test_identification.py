@@ -402,6 +402,24 @@ def test_a_lag_of_the_actuator_is_found():
     assert terms[0] == pytest.approx(-0.8, rel=0.1) and terms[1] == pytest.approx(3.0, rel=0.1)
 
 
+def test_a_delay_beyond_the_longest_that_is_tried_is_found_where_a_lag_stands_in():
+    dt, dead, stream, runs = 0.1, 3, np.random.default_rng(2), []
+    signals = tl.Signals([tl.State("level", "m", 3.0)], [tl.Command("u", "V", (-2.0, 2.0), scale=1.0)], dt)
+    for _ in range(2):
+        commands = np.repeat(stream.uniform(-2.0, 2.0, (12, 1)), 8, axis=0)
+        acting = np.concatenate([np.full(dead, commands[0, 0]), commands[:, 0]])[: len(commands)]
+        kept, level = np.exp(-0.8 * dt), [0.0]
+        for u in acting:
+            level.append(kept * level[-1] + (1.0 - kept) * 2.0 / 0.8 * u)
+        readings = np.array(level)[:, None]
+        runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands))
+    found = identified(runs, signals, lags=True, form="acceleration", longest_delay=2)
+    [(time, delay, _)] = found.actuation.actuators
+    assert delay == dead and time < 0.1 * dt
+    terms = law(found)
+    assert terms[0] == pytest.approx(-0.8, rel=0.02) and terms[1] == pytest.approx(2.0, rel=0.02)
+
+
 def test_a_hidden_state_that_commands_fill_is_found():
     signals, runs = fans(3, fading=3.0)
     rests = [np.array([1.0, 1.0])]

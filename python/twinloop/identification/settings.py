@@ -48,7 +48,7 @@ class IdentificationOptions:
             come first, rather than only from what all terms together leave.
         gusts: whether disturbances may last, as gusts do, rather than be white.
         lags: whether lags and delays of the actuators are searched.
-        longest_delay: of an actuator, periods.
+        longest_delay: of an actuator, periods, that is tried in any case; longer ones are where a lag may stand in.
         hidden: whether a hidden state that commands fill and that fades, such as a climb or heat, is searched.
         offsets: whether sensors may be late or early against those of the driven states.
         tuning: whether constants are tuned on predictions.
