@@ -15,6 +15,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from twinloop.faces.console import duration
+
 
 class JobBar:
     """The jobs that are done, on standard error; use it as a context.
@@ -34,7 +36,7 @@ class JobBar:
             console=self._console, transient=True, disable=not self._console.is_terminal,
         )  # fmt: skip
         self._task = self._bar.add_task(label, total=total, last="")
-        self._spoke = time.monotonic()
+        self._begun = self._spoke = time.monotonic()
 
     def __enter__(self) -> JobBar:
         self._bar.start()
@@ -45,19 +47,27 @@ class JobBar:
     ) -> None:
         self._bar.stop()
 
-    def advance(self, name: str, failure: str | None = None, known: bool = False) -> None:
+    def advance(self, name: str, failure: str | None = None, known: bool = False, result: str = "") -> None:
         """Says that a job is done.
 
         Args:
             name: of the job.
             failure: why it failed; None if it did not.
             known: whether it had been done before: worth no line.
+            result: what came of it, in a few words.
         """
         self.done += 1
         if failure is not None:
-            self._console.print(f"Failed: {name}: {failure}", highlight=False, markup=False)
+            self._print(f"Failed: {name}: {failure}")
         self._bar.update(self._task, advance=1, last=name)
         now = time.monotonic()
-        if not self._console.is_terminal and not known and now - self._spoke >= self.pause:
-            self._spoke = now
-            self._console.print(f"{self.done} of {self.total}: {name}", highlight=False, markup=False)
+        if self._console.is_terminal or known or now - self._spoke < self.pause:
+            return
+        self._spoke = now
+        rest = duration((now - self._begun) / self.done * (self.total - self.done))
+        self._print(
+            f"{self.done} of {self.total}: {name}{f': {result}' if result else ''}; about {rest} left"
+        )
+
+    def _print(self, line: str) -> None:
+        self._console.print(line, highlight=False, markup=False, soft_wrap=True)

@@ -4,25 +4,15 @@ from __future__ import annotations
 
 import json
 import tempfile
-import time
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
 import click
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from twinloop.arrays import whole
 from twinloop.errors import InvalidInput, unknown
-from twinloop.faces.console import duration
+from twinloop.sweep.progress import JobBar
 from twinloop.sweep.workers import HERE, finished, processes
 from twinloop_exam.ablations import SMOKE_OPTIONS
 from twinloop_exam.tables import as_markdown, as_text
@@ -116,28 +106,14 @@ def _work(jobs: Sequence[Job], folder: Path, cluster: str) -> None:
     there = results.kept(jobs, folder)
     todo = [job for job in jobs if job not in there]
     _say(f"{len(todo)} of {len(jobs)} campaigns to fly.")
-    console, clock = Console(stderr=True), time.monotonic()
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[last]}"),
-        TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
-    )  # fmt: skip
     processes(cluster)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("zoo", total=len(todo), last="")
-        for done, (job, measured) in enumerate(finished(fly, todo, cluster), start=1):
+    with JobBar("zoo", len(todo)) as bar:
+        for job, measured in finished(fly, todo, cluster):
             if isinstance(measured, BaseException):
-                failure = f"{type(measured).__name__}: {measured}"
-                bar.console.print(f"Failed: {job.name}: {failure}", highlight=False, markup=False)
+                bar.advance(job.name, f"{type(measured).__name__}: {measured}")
                 continue
             results.keep(job, measured, folder)
-            bar.update(task, advance=1, last=job.name)
-            if not console.is_terminal:
-                rest = (time.monotonic() - clock) / done * (len(todo) - done)
-                console.print(
-                    f"{done} of {len(todo)}: {job.name}: {bars.best_flown(measured, job.flights):.3f} × the optimum;"
-                    f" about {duration(rest)} left",
-                    highlight=False, markup=False,
-                )  # fmt: skip
+            bar.advance(job.name, result=f"{bars.best_flown(measured, job.flights):.3f} × the optimum")
 
 
 def _search(names: Sequence[str]) -> None:
