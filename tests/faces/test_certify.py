@@ -190,6 +190,23 @@ def test_hostile_texts_stay_texts_on_the_page(flown):
     assert "<script>alert(1)</script>" in found.text
 
 
+def test_margins_of_loops_that_are_unstable_or_around_a_twin_that_does_not_follow_are_not_shown(
+    flown, monkeypatch
+):
+    campaign, _ = flown
+    names, units = SIGNALS.state_names, [state.unit for state in SIGNALS.states]
+    said = facts(campaign, campaign.certificate(), "rig.db", "rig", None, {})
+    gain = f"{said['margins']['worst'][0]['phase'] * 180.0 / np.pi:.4g}"
+    assert gain in Page(page(said, names, units)).text
+    said["margins"]["worst"][0]["stable"] = False
+    unstable = Page(page(said, names, units)).text
+    assert gain not in unstable and "it has no margins" in unstable
+    monkeypatch.setattr(tl.Twin, "follows", property(lambda twin: False))
+    found = campaign.certificate()
+    assert found.margins is None and any("does not follow" in each for each in found.not_tested)
+    assert not found.granted
+
+
 def test_nothing_told_is_no_certificate():
     with pytest.raises(tl.NotAvailable, match="told"):
         rig_campaign().certificate()

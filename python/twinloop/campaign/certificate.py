@@ -52,7 +52,7 @@ class Certificate:
         old: the controller that was flown first, to go back to; None where none was.
         experiments: that it was judged on.
         members: models of the committee.
-        margins: of its loops; None where they cannot be computed.
+        margins: of its loops; None where they cannot be computed, or the twin does not follow its flights.
         step: the predicted flight of its task, with a band; None without a controller.
         uses: of the range of each state.
         not_tested: what nobody has tested, in sentences.
@@ -93,6 +93,12 @@ def certificate(campaign: Campaign) -> Certificate:
     best, twin = found.best, found.twin
     step = None if best is None else twin.simulate(best)
     uses = () if step is None else _uses(found.experiments, step)
+    # Around a twin that does not follow its own flights margins say nothing of the system's.
+    margins = found.margins if twin.follows else None
+    slopes = "the controller or the twin has no slope at the target"
+    why_none = (
+        "" if margins is not None else slopes if twin.follows else "the twin does not follow its flights"
+    )
     return Certificate(
         checks=checks(found),
         law_gains=tuple(campaign.family.law_gains),
@@ -100,10 +106,10 @@ def certificate(campaign: Campaign) -> Certificate:
         old=next((run.test for run in found.experiments if run.test is not None), None),
         experiments=found.experiments,
         members=len(twin.members),
-        margins=found.margins,
+        margins=margins,
         step=step,
         uses=uses,
-        not_tested=() if best is None else tuple(_not_tested(best, found.experiments, found.margins, uses)),
+        not_tested=() if best is None else tuple(_not_tested(best, found.experiments, why_none, uses)),
     )
 
 
@@ -126,7 +132,7 @@ def _uses(experiments: tuple[Experiment, ...], step: Trajectory) -> tuple[Use, .
 
 
 def _not_tested(
-    best: Test, experiments: tuple[Experiment, ...], margins: Margins | None, uses: tuple[Use, ...]
+    best: Test, experiments: tuple[Experiment, ...], no_margins: str, uses: tuple[Use, ...]
 ) -> list[str]:
     """What nobody tested, from what is there."""
     signals = best.family.signals
@@ -147,7 +153,7 @@ def _not_tested(
         said.append(
             f"No envelope is declared for {', '.join(bare)}: nobody looked whether the flight stays safe there."
         )
-    if margins is None:
-        said.append("Margins of stability: the controller or the twin has no slope at the target.")
+    if no_margins:
+        said.append(f"Margins of stability: {no_margins}.")
     said.append("Another load, battery, temperature or wind than in these flights, and wear.")
     return said

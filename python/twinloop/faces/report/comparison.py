@@ -80,7 +80,7 @@ def _answers(source: Source) -> list[Row]:
             ("risk", best.risk),
         ]
     rows.append(("quality of the first gains, flown", None if first is None else first.quality))
-    if found.margins is not None:
+    if found.margins is not None and found.twin.follows:
         worst = found.margins.worst
         gain = min(loop.gain for loop in worst)
         if all(loop.stable for loop in worst):
