@@ -246,6 +246,7 @@ MISUSE = {
     "no generations": [*PAPER, "--generations", "0"],
     "generations in words": [*PAPER, "--generations", "many"],
     "no experiments": ["run", "quadrotor", "--experiments", "0"],
+    "a risk that is none": ["run", "quadrotor", "--max-risk", "2", "--store", "rig.db"],
     "no threads": ["run", "quadrotor", "--threads", "0"],
     "a negative seed": ["run", "quadrotor", "--seed", "-1"],
     "a seed of 65 bits": ["run", "quadrotor", "--seed", str(2**64)],

@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from twinloop import __version__
+from twinloop.arrays import share
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file
 from twinloop.campaign.presets import PRESETS, options_of, parsed
@@ -178,6 +179,8 @@ def run(
         raise InvalidInput(
             f"--experiments: expected at least 1, found {experiments}; the first flight counts."
         )
+    if max_risk is not None:
+        share("--max-risk", max_risk)
     options = dict(_change(preset, change) for change in changes)
     options |= _generations(preset, generations, test_generations)
     rig = _vehicle(system, noise, seed, gyroscopic, harsh)
