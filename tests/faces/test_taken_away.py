@@ -11,7 +11,8 @@ import pytest
 
 import twinloop as tl
 from command import invoke
-from lives import SMALL
+from conftest import PENDULUM_GAINS, pendulum_step
+from lives import CONTROLLER, SIGNALS, SMALL, by_hand
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.law.exports.export import SUFFIXES
 
@@ -130,6 +131,21 @@ def test_the_twin_in_every_kind_compared_with_its_flights(flown, kind, tmp_path)
 def test_the_controller_compared_on_its_flights(flown, kind, tmp_path):
     campaign, _ = flown
     assert campaign.export_controller(tmp_path / f"loop{SUFFIXES[kind]}")
+
+
+@pytest.mark.parametrize("kind", ["python", "c"])
+def test_a_controller_that_follows_a_reference_is_compared_along_it(kind, tmp_path):
+    campaign = tl.Campaign(
+        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], duration=1.0, threads=1, options=SMALL,
+        target_state=lambda t: [np.sin(2.0 * t), 2.0 * np.cos(2.0 * t)],
+    )  # fmt: skip
+    test = campaign.test(PENDULUM_GAINS)
+    campaign.tell(test, tl.systems.Simulated(SIGNALS, pendulum_step).run(test))
+    campaign.attach(by_hand(40))  # longer than the reference
+    assert campaign.export_controller(tmp_path / f"loop{SUFFIXES[kind]}", PENDULUM_GAINS)
+    names = {}
+    exec(campaign.export_twin("gymnasium", force=True), names)
+    assert names["TARGET_STATE"] == pytest.approx([np.sin(2.0), 2.0 * np.cos(2.0)])
 
 
 def test_in_a_notebook_everything_shows_itself(flown):

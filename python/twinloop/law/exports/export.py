@@ -221,7 +221,7 @@ def exported_controller(
         name: what functions in C begin with.
         precision: of C, "double" or "float".
         flights: whose states it is checked on; none: it is not checked.
-        target: state that it leads to then (n_x,).
+        target: state that it leads to then (n_x,), or a reference, a row for each state of a run.
 
     Raises:
         InvalidInput: another kind or precision.
@@ -234,7 +234,8 @@ def exported_controller(
 
     def own(states: Floats, goal: Floats) -> Floats:
         controller = family.controller(genes)
-        return np.array([controller.command(state, goal) for state in states])
+        goals = np.broadcast_to(goal, states.shape)
+        return np.array([controller.command(*pair) for pair in zip(states, goals, strict=True)])
 
     if kind == "python":
         text = controller_python(described, family, genes)
