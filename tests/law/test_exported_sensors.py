@@ -21,6 +21,7 @@ from twinloop.law.exports.checks import (
     python_simulation,
 )
 
+needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 TUMBLING = [
     "r9 = r6 * 3.0", "r9 = r9 - r3", "r10 = r7 * 2.0", "r10 = r10 - r4", "r11 = r8 * 2.0", "r11 = r11 - r5",
     "r12 = r3 * r4", "r12 = r12 * 0.5", "r11 = r11 + r12",
@@ -89,7 +90,7 @@ def test_a_module_of_python_reads_what_the_twin_reads(case, periods, kind):
     np.testing.assert_allclose(found, both(run), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+@needs_cc
 @pytest.mark.parametrize("case", CASES)
 @EVERY
 @pytest.mark.parametrize(("precision", "close"), [("double", 1e-9), ("float", 1e-3)])
@@ -101,7 +102,7 @@ def test_c_reads_what_the_twin_reads(case, periods, precision, close):
     np.testing.assert_allclose(found, both(run), rtol=close, atol=close)
 
 
-@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+@needs_cc
 @pytest.mark.parametrize("kind", ["fmu3", "fmu2"])
 @pytest.mark.parametrize("case", ["pendulum", "body"])
 def test_an_fmu_gives_readings_as_outputs_of_their_own(kind, case, tmp_path):
@@ -148,7 +149,7 @@ def test_an_environment_of_the_package_shows_readings(case, periods):
         np.testing.assert_allclose(np.hstack([states, seen]), both(run), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["python", "c"])
+@pytest.mark.parametrize("kind", ["python", pytest.param("c", marks=needs_cc)])
 def test_an_export_that_reads_something_else_is_refused(kind, monkeypatch, tmp_path):
     twin = late_twin("pendulum", 0.6)
     flight = flown(twin)
@@ -166,5 +167,5 @@ def test_sensors_in_time_read_every_state_as_it_is():
     names = {}
     exec(twin_of(["r4 = r2 * 11.0"]).export("python"), names)
     assert names["readings"]([[0.1, 0.2], [0.3, 0.4]]) == [[0.1, 0.2], [0.3, 0.4]]
-    assert "_read" not in twin_of(["r4 = r2 * 11.0"]).export("c")
+    assert "_read" not in twin_of(["r4 = r2 * 11.0"]).export("c", force=True)
     assert written.layout(twin_of(["r7 = r6 * 2.0"], signals=TURNING_BODY, inputs=7).law, False)
