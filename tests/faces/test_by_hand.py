@@ -156,6 +156,8 @@ def test_after_old_logs_the_first_test_is_still_the_controller_that_is_trusted(f
     other = read_file("rig.toml").campaign(threads=1)
     flown(other.test({"angle.kp": 1.0, "angle.ki": 0.5, "angle.kd": 0.2}), "old.csv")
     assert run("attach", "rig.db", "old.csv").stdout == "Kept: old.csv; 1 experiment in rig.db.\n"
+    again = run("attach", "rig.db", "old.csv")
+    assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == 1
     asked = json.loads(run("ask", "rig.db", "--json").stdout)
     assert asked["gains"] == dict(trusted) and asked["excited"]
     # With the twin of the old log, the sheet says what to expect of it all the same.

@@ -14,9 +14,10 @@ from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import quality_unit, to_json
 from twinloop.faces.sheet import columns, facts, sheet
+from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import numbered, tell_failed
 from twinloop.faces.telling import tell as tell_flight
-from twinloop.logs import load, write_columns
+from twinloop.logs import write_columns
 from twinloop.store import shown_name
 from twinloop.test import Test
 
@@ -134,7 +135,7 @@ def tell(store: str, test: int, flight: Path | None, failed: str | None, aborted
 def attach(store: str, flight: Path) -> None:
     """Add a FLIGHT that nobody asked for, as CSV or .npz, to what is learnt."""
     with closing(_campaign(store)) as campaign:
-        campaign.attach(load(flight, campaign.signals))
+        attach_flight(campaign, flight)
         click.echo(f"Kept: {flight}; {_count(campaign)} in {shown_name(store)}.")
 
 

@@ -65,13 +65,27 @@ def tell(
             f"Log {called}: expected the {test.steps} steps of test {number}, found {run.steps}; record it whole, or"
             f" {otherwise}."
         )
-    if any(_same(run, told.trajectory) and not _again(told.test, test) for told in campaign.experiments):
-        raise InvalidInput(
-            f"Log {called}: expected a flight that was not told yet, found one that was, to the last digit; nothing has"
-            " changed. Name the log of this flight."
-        )
+    _refuse_told(campaign, run, called, test)
     campaign.tell(test, run)
     return test
+
+
+def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> None:
+    """Adds a flight that nobody asked for.
+
+    Args:
+        campaign: that is to learn it.
+        log: CSV or .npz.
+        name: what messages call the log; None: its path.
+
+    Raises:
+        InvalidInput: a log that cannot be used, or that is there already.
+        StoreFailure: the store cannot be written.
+    """
+    called = str(log) if name is None else name
+    run = load(log, campaign.signals, name=called)
+    _refuse_told(campaign, run, called, None)
+    campaign.attach(run)
 
 
 def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None = None) -> Test:
@@ -94,6 +108,16 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
     run = None if log is None else load(log, campaign.signals, ended="aborted", reason=reason)
     campaign.tell_failed(test, reason, run)
     return test
+
+
+def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | None) -> None:
+    """Refuses a log that is there already; a system without noise repeats itself where a test is flown again."""
+    for told in campaign.experiments:
+        if _same(run, told.trajectory) and not (test is not None and _again(told.test, test)):
+            raise InvalidInput(
+                f"Log {called}: expected a flight that was not told yet, found one that was, to the last digit; nothing"
+                " has changed. Name the log of this flight."
+            )
 
 
 def _again(earlier: Test | None, test: Test) -> bool:

@@ -13,8 +13,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.history import Progress
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
 from twinloop.faces.console import STEPS
-from twinloop.faces.telling import numbered, tell, tell_failed
-from twinloop.logs import load
+from twinloop.faces.telling import attach, numbered, tell, tell_failed
 from twinloop.store import approve, approved, kept, opened, state
 
 
@@ -143,7 +142,7 @@ class Desk:
             StoreFailure: somebody else writes the campaign.
         """
         with self._writing(name) as campaign:
-            campaign.attach(load(log, campaign.signals, name=called))
+            attach(campaign, log, name=called)
             return f"Attached: {len(campaign.experiments)} experiments are kept."
 
     def fail(self, name: str, number: int, reason: str) -> str:
