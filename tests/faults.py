@@ -62,11 +62,12 @@ def digest(campaign):
 
 
 def die_at_statement(number):
-    """Ends this process, without any chance to tidy up, before its n-th statement of SQL."""
+    """Ends this process, without any chance to tidy up, before its n-th statement of SQL or commit."""
     from sqlalchemy import Engine, event
 
     left = [number]
 
+    @event.listens_for(Engine, "commit")
     @event.listens_for(Engine, "before_cursor_execute")
     def count(*_):
         left[0] -= 1

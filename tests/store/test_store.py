@@ -1,5 +1,6 @@
 """What was told is kept: committed when `tell` returns, resumed to the bit, and never lost to a failure."""
 
+import itertools
 import os
 import signal
 import sqlite3
@@ -15,9 +16,10 @@ from sqlalchemy import event
 import twinloop as tl
 from conftest import TINY
 from faults import killed_and_resumed
-from lives import LIFE, SMALL, flown, lived, plain, stored
+from lives import LIFE, OTHER_GAINS, SMALL, flown, lived, plain, stored
 from sameness import same
 from twinloop.campaign import keeping
+from twinloop.records import to_text
 from twinloop.store import found, kept, opened
 
 
@@ -85,6 +87,80 @@ def test_a_campaign_that_is_opened_anew_after_each_event_is_the_one_that_was_not
 @pytest.mark.parametrize("preset", ["paper", "default"])
 def test_a_campaign_that_is_killed_at_random_moments_ends_with_the_same_bits(preset):
     assert killed_and_resumed(preset, kills=3, seed=1)[0] >= 3
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_a_tell_that_is_killed_before_any_of_its_statements_is_kept_whole_or_not_at_all(
+    path, preset, pendulum
+):
+    """And the campaign goes on to the bits of one that was not killed."""
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import numpy as np, twinloop as tl\n"
+        "from faults import die_at_statement\n"
+        "from lives import stored\n"
+        "campaign = stored(sys.argv[2], sys.argv[3])\n"
+        "rows = np.load(sys.argv[4])\n"
+        "run = tl.Trajectory(rows['t'], rows['states'], rows['commands'])\n"
+        "die_at_statement(int(sys.argv[5]))\n"
+        "campaign.tell(campaign.tests[1], run)\n"
+    )
+    campaign = flown(stored(path, preset), pendulum)
+    second = campaign.test(OTHER_GAINS)
+    seen = pendulum.run(second)
+    run = tl.Trajectory(seen.t, seen.states, seen.commands)
+    log = path.with_name("flight.npz")
+    np.savez(log, t=run.t, states=run.states, commands=run.commands)
+    campaign.close()
+    kept_before = path.read_bytes()
+    whole = tl.Campaign.load(path)
+    whole.tell(whole.tests[1], run)
+    expected = plain(whole)
+    whole.close()
+    killed, statement = 0, 0
+    while True:
+        statement += 1
+        for leftover in path.parent.glob(f"{path.name}*"):
+            leftover.unlink()
+        path.write_bytes(kept_before)
+        tests = str(Path(__file__).parents[1])
+        child = subprocess.run(
+            [sys.executable, "-c", code, tests, str(path), preset, str(log), str(statement)], check=False
+        )
+        again = tl.Campaign.load(path)
+        told = len(again.experiments)
+        if child.returncode == 0:
+            assert told == 2 and plain(again) == expected
+            again.close()
+            break
+        assert child.returncode == -signal.SIGKILL and told in (1, 2)
+        killed += 1
+        if told == 1:
+            again.tell(again.tests[1], run)
+        assert plain(again) == expected
+        again.close()
+    assert killed >= 3
+
+
+def test_a_clock_that_jumps_changes_nothing(path, pendulum, monkeypatch):
+    """Neither the time of the day nor the one that only goes forward; both jump to and fro at every look."""
+    now, outcomes = itertools.cycle([1e9, -1e9, 0.0, 5e8]), []
+    for jumping in (False, True):
+        where = path.with_name(f"{jumping}.db")
+        if jumping:
+            monkeypatch.setattr("time.monotonic", lambda: next(now))
+            monkeypatch.setattr("time.time", lambda: next(now))
+            monkeypatch.setattr("twinloop.store.keeper._now", lambda: "1970-01-01T00:00:00+00:00")
+        campaign = flown(stored(where), pendulum)
+        test = campaign.ask()
+        campaign.tell(test, pendulum.run(test))
+        campaign.close()
+        again = tl.Campaign.load(where)
+        outcomes.append(
+            plain(again) + to_text(again.best_test.to_record()).replace(again.best_test.campaign, "")
+        )
+        again.close()
+    assert outcomes[0] == outcomes[1]
 
 
 def test_the_noise_of_a_system_that_counts_its_runs_goes_on_where_it_was(path):
