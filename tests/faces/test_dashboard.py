@@ -116,8 +116,10 @@ def test_what_went_wrong_is_told(store, tmp_path):
         status, _, _ = call(address, "POST", "/c/1/tests/1/log?file=a.csv&reason=wind", log)
         assert status == 200
         assert look(store).experiments[1].trajectory.reason == "wind"
-        attached = flight(tmp_path / "other.csv", look(store).tests[0])
-        assert call(address, "POST", "/c/1/log?file=x.csv", attached)[0] == 200
+        told, other = (flight(tmp_path / "other.csv", look(store).tests[i]) for i in (0, 1))
+        status, _, said = call(address, "POST", "/c/1/log?file=x.csv", told)
+        assert status == 422 and "told yet" in said
+        assert call(address, "POST", "/c/1/log?file=x.csv", other)[0] == 200
     with served(store) as address:
         other = tl.Campaign.load(store, threads=1)
         asked = other.ask()
