@@ -3,7 +3,7 @@
 
 use crate::error::{Result, invalid};
 use crate::hidden::{Filling, Hidden};
-use crate::lanes::{Vector, numbers, vectors};
+use crate::lanes::{Vector, numbers, vectors_once, zeros};
 
 /// The way from one command to its effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,13 +121,12 @@ impl<V: Vector> Line<V> {
             None => actuation.times().into_iter().flat_map(|time| vec![time; V::LANES]).collect(),
         };
         let (kept, gains) = fading(&lanes, dt);
-        let (kept, gains): (Vec<V>, Vec<V>) = (vectors(&kept), vectors(&gains));
-        let zeros = |size: usize| vec![V::splat(0.0); size];
-        let effects = zeros(kept.len());
+        let (kept, gains): (Vec<V>, Vec<V>) = (vectors_once(&kept), vectors_once(&gains));
+        let effects = || zeros(kept.len());
         Self {
             memory: zeros(commands),
+            effects: [effects(), effects(), effects()],
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
-            effects: [effects.clone(), effects.clone(), effects],
             hidden: (commands..).zip(hidden).map(|(i, one)| Filling::new(one, kept[i], gains[i])).collect(),
             halves: kept,
             factors: factors.to_vec(),

@@ -23,12 +23,9 @@ impl<'a, V: Vector> Excitation<'a, V> {
     pub(crate) fn add(&self, family: &Family, step: usize, reading: &[V], command: &mut [V]) {
         let width = command.len();
         let Some(row) = self.rows.get(step * width..(step + 1) * width) else { return };
-        if self.hold_back.is_empty() {
-            family.excite(command, row.iter().copied());
-        } else {
-            let share = share(self.hold_back, reading);
-            family.excite(command, row.iter().map(|&added| added * share));
-        }
+        // All of it where nothing holds it back: times 1, which changes no bit.
+        let share = share(self.hold_back, reading);
+        family.excite(command, row.iter().map(|&added| added * share));
     }
 }
 

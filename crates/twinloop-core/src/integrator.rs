@@ -1,6 +1,6 @@
 //! The classical Runge–Kutta method of order four, on lanes, with the command held over the step.
 
-use crate::lanes::Vector;
+use crate::lanes::{Vector, zeros};
 
 /// Scratch of a step: the stage's derivative, its argument, and the sum of the derivatives.
 #[derive(Clone)]
@@ -13,8 +13,7 @@ pub struct Stages<V: Vector> {
 impl<V: Vector> Stages<V> {
     /// Scratch for `states` states.
     pub fn new(states: usize) -> Self {
-        let zeros = || vec![V::splat(0.0); states];
-        Self { slope: zeros(), point: zeros(), sum: zeros() }
+        Self { slope: zeros(states), point: zeros(states), sum: zeros(states) }
     }
 }
 

@@ -99,7 +99,20 @@ pub(crate) fn vectors<V: Vector>(interleaved: &[f64]) -> Vec<V> {
     vectors
 }
 
-/// Vectors as interleaved numbers.
+/// The same by a call, for what is done once a run: one short copy for each vector.
+#[inline(never)]
+pub(crate) fn vectors_once<V: Vector>(interleaved: &[f64]) -> Vec<V> {
+    vectors(interleaved)
+}
+
+/// So many zeros, by a call as well.
+#[inline(never)]
+pub(crate) fn zeros<V: Vector>(count: usize) -> Vec<V> {
+    vec![V::splat(0.0); count]
+}
+
+/// Vectors as interleaved numbers, by a call as well.
+#[inline(never)]
 pub(crate) fn numbers<V: Vector>(vectors: &[V]) -> Vec<f64> {
     let mut numbers = vec![0.0; vectors.len() * V::LANES];
     for (vector, values) in vectors.iter().zip(numbers.chunks_exact_mut(V::LANES)) {

@@ -19,8 +19,8 @@ mod vector;
 mod width;
 
 pub(crate) use groups::{
-    flight_lanes, groups, interleave, lanes_for, numbers, pack, scalars, vectors, with_flight_lanes,
-    with_lanes, with_test_lanes,
+    flight_lanes, groups, interleave, lanes_for, numbers, pack, scalars, vectors, vectors_once,
+    with_flight_lanes, with_lanes, with_test_lanes, zeros,
 };
 pub use piece::Apart;
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::instruction::Operand;
 use super::interpreter::{Step, interpret};
 use super::program::Program;
-use crate::lanes::Vector;
+use crate::lanes::{Vector, zeros};
 
 /// The effective part of a program. Two programs with equal code are the same function, bit for bit.
 #[derive(Clone, Debug)]
@@ -93,7 +93,7 @@ impl Code {
 
     /// Registers for the rows of a vector, to be used with this code only.
     pub fn bank<V: Vector>(&self) -> Bank<V> {
-        let mut registers = vec![V::splat(0.0); self.registers + self.constants.len()];
+        let mut registers = zeros::<V>(self.registers + self.constants.len());
         for (register, &constant) in registers[self.registers..].iter_mut().zip(&self.constants) {
             *register = V::splat(constant);
         }

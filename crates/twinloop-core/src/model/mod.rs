@@ -15,7 +15,7 @@ use crate::actuators::Line;
 use crate::dynamics::{Dynamics, step_apart};
 use crate::error::{Result, invalid};
 use crate::integrator::{Stages, rk4};
-use crate::lanes::{Vector, vectors};
+use crate::lanes::{Vector, vectors, zeros};
 use crate::lgp::{Bank, Code, Program};
 use crate::sensors::Recent;
 use crate::signals::Signals;
@@ -140,8 +140,8 @@ impl<'a> Model<'a> {
     fn workspace_of<V: Vector>(&self, bank: Bank<V>, line: Option<Line<V>>) -> ModelWorkspace<V> {
         let states = if self.frame.form == Form::Acceleration { self.frame.states() } else { 0 };
         let body = if states > 0 && self.frame.body.is_some() { states } else { 0 };
-        let turned = vec![V::splat(0.0); if body > 0 { body + 4 } else { 0 }];
-        let (stages, seen) = (Stages::new(states.max(turned.len())), turned[..body].to_vec());
+        let turned = zeros(if body > 0 { body + 4 } else { 0 });
+        let (stages, seen) = (Stages::new(states.max(turned.len())), zeros(body));
         ModelWorkspace { bank, stages, line, recent: Recent::default(), turned, seen }
     }
 }
