@@ -34,6 +34,14 @@ BODY = tl.Signals(
     kinematics=tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "int")),
 )
 """Two of its names are words of C."""
+FAST_BODY = tl.Signals(
+    states=[tl.State(name, "rad", 3.0) for name in ("roll", "pitch", "yaw")]
+    + [tl.State(name, "rad/s", 20.0) for name in ("p", "q", "r")],
+    commands=[tl.Command("torque", "N m", (-2.0, 2.0))],
+    dt=0.05,
+    kinematics=tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "r")),
+)
+"""It may turn by a radian a period, which is integrated in four steps."""
 
 
 def flown(twin, steps=60, seed=0):
@@ -92,6 +100,10 @@ TWINS = {
     ),
     "kinematics": lambda: twin_of(
         ["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], signals=BODY, inputs=7,
+    ),
+    "kinematics in several steps": lambda: twin_of(
+        ["r7 = r6 * 20.0", "r8 = r3 * r5", "r8 = r8 * -0.3", "r9 = sin(r0)"], signals=FAST_BODY, inputs=7,
+        actuators=[(0.04, 1, 0.5)],
     ),
 }  # fmt: skip
 ALL = pytest.mark.parametrize("which", TWINS)

@@ -236,6 +236,8 @@ class Signals:
         periods: Sequence[float | None] | None = None,
     ) -> Signals:
         """kinematics: the states of a rigid body's three angles (roll, pitch, yaw) and of its three rates."""
+    @property
+    def substeps(self) -> int: ...
 
 @final
 class Model:

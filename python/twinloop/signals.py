@@ -273,6 +273,11 @@ class Signals(Recorded, kind="signals"):
                 continued[k, i] = last
         return continued
 
+    @property
+    def substeps(self) -> int:
+        """Runge-Kutta steps in which a model integrates a rigid body over a period, as the scales of its rates need."""
+        return self.engine.substeps
+
     @cached_property
     def engine(self) -> _core.Signals:
         """The same signals as numbers, for the native engine."""

@@ -61,14 +61,16 @@ def test_over_a_period_it_moves_as_the_twin_predicts(form):
     assert found.states == ("angle", "rate") and found.commands == ("torque", "fan") and found.dt == 0.05
 
 
-def test_kinematics_are_among_the_equations():
+@pytest.mark.parametrize("usual", [1.0, 20.0])
+def test_kinematics_are_among_the_equations(usual):
     body = tl.Signals(
         states=[tl.State(name, "rad", 1.0) for name in ("roll", "pitch", "yaw")]
-        + [tl.State(name, "rad/s", 1.0) for name in ("p", "q", "r")],
+        + [tl.State(name, "rad/s", usual) for name in ("p", "q", "r")],
         commands=[tl.Command("torque", "N m", (-2.0, 2.0))],
         dt=0.05,
         kinematics=tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "r")),
     )
+    assert body.substeps == (1 if usual == 1.0 else 4)
     model = twin(["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], inputs=7, signals=body)
     # Upright, all but vertical, turned over; slow and by a radian a period.
     for pitch in (0.4, -1.1, 1.5, 2.2):

@@ -32,6 +32,12 @@ pub struct RigidBody {
 }
 
 impl Signals {
+    /// Angle by which a rigid body turns in one step of the integrator at most, rad: a step of order four leaves some
+    /// 5e-7 rad of it.
+    pub const FARTHEST_TURN: f64 = 0.25;
+    /// More steps a period than this are not taken.
+    const MOST_SUBSTEPS: f64 = 64.0;
+
     /// Refuses signals that no loop can be closed with.
     pub fn validated(self) -> Result<Self> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
@@ -81,6 +87,17 @@ impl Signals {
     pub fn is_given(&self, state: usize) -> bool {
         self.derivative_of.contains(&Some(state))
             || self.kinematics.is_some_and(|body| body.angles.contains(&state))
+    }
+
+    /// Steps in which a model integrates a rigid body over a period, so that at the scale of its rates it turns by
+    /// [`Self::FARTHEST_TURN`] at most in each; 1 for what is no rigid body. Signals alone decide it: all models, exports
+    /// and lanes do the same.
+    pub fn substeps(&self) -> usize {
+        let Some(body) = self.kinematics else { return 1 };
+        let fastest = body.rates.iter().fold(0.0_f64, |most, &rate| most.max(self.state_scales[rate]));
+        // A quotient that is whole but for its rounding takes no step more.
+        let steps = libm::ceil(self.dt * fastest / Self::FARTHEST_TURN - 1e-9);
+        steps.clamp(1.0, Self::MOST_SUBSTEPS) as usize
     }
 
     /// Number of commands, n_u.

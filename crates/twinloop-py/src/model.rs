@@ -43,6 +43,11 @@ impl PySignals {
         };
         Ok(Self(Arc::new(signals.validated()?)))
     }
+
+    #[getter]
+    fn substeps(&self) -> usize {
+        self.0.substeps()
+    }
 }
 
 /// A program with the form that makes it dynamics.

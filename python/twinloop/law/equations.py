@@ -16,6 +16,7 @@ from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.law import Law
 from twinloop.law.spread import Spread, spreads
 from twinloop.law.writing import EXACT, TEXT, Term, Writer
+from twinloop.signals import Signals
 
 WIDTH = 100
 """Columns of a line."""
@@ -83,7 +84,7 @@ class _Page:
         kinds = {
             "absolute": f"the state one period of {dt:g} s later",
             "increment": f"the state one period of {dt:g} s later, as the state and what is added to it",
-            "acceleration": f"derivatives, integrated by one Runge-Kutta step of {dt:g} s",
+            "acceleration": f"derivatives, integrated by {_steps(signals)} of {dt / signals.substeps:g} s",
         }
         units = ", ".join(f"{state.name} in {state.unit or 'units'}" for state in signals.states)
         lines = [f"Form {self.law.form!r}: {kinds[self.law.form]}; {units}."]
@@ -289,3 +290,12 @@ def readable(expressions: Expressions, number: int, symbols: Sequence[str], digi
     root = written(target, Expansion(expressions, target).polynomial(number))
     endless = replace(TEXT, longest=sys.maxsize, worth=sys.maxsize)
     return Writer(target, [root], symbols, digits, "t", False, endless).text(root)
+
+
+def _steps(signals: Signals) -> str:
+    """How often a law is integrated in a period, in words."""
+    return (
+        "one Runge-Kutta step"
+        if signals.substeps == 1
+        else f"{signals.substeps} Runge-Kutta steps a period, each"
+    )

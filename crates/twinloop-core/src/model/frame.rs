@@ -33,6 +33,8 @@ fn slopes(signals: &Signals) -> impl Iterator<Item = Slope> {
 pub struct Frame {
     pub(super) form: Form,
     pub(super) dt: f64,
+    /// Steps of the integrator in a period.
+    pub(super) substeps: usize,
     /// Commands of the signals.
     commands: usize,
     /// What the inputs of a program after the states are multiplied by: commands, then hidden states.
@@ -52,8 +54,8 @@ impl Frame {
         let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
         let (commands, actuation) = (factors.len(), Actuation::default());
         let (body, periods) = (signals.kinematics, signals.periods.clone());
-        let (dt, sensors) = (signals.dt, Sensors::default());
-        Self { form, dt, commands, factors, slopes, body, periods, actuation, sensors }
+        let (dt, substeps, sensors) = (signals.dt, signals.substeps(), Sensors::default());
+        Self { form, dt, substeps, commands, factors, slopes, body, periods, actuation, sensors }
     }
 
     /// The same with something between commands and model, an actuator for each command.
@@ -89,6 +91,7 @@ impl Frame {
     pub fn fits(&self, signals: &Signals) -> bool {
         let factors = signals.command_scales.iter().map(|scale| 1.0 / scale);
         self.dt == signals.dt
+            && self.substeps == signals.substeps()
             && self.body == signals.kinematics
             && self.periods == signals.periods
             && factors.eq(self.factors.iter().copied().take(self.commands))

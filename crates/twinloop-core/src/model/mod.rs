@@ -92,7 +92,7 @@ impl<'a> Model<'a> {
                 let field = Held { model: self, bank, effects, stage: 0 };
                 match &self.frame.body {
                     None => rk4(state, self.frame.dt, stages, field),
-                    Some(body) => turn(state, self.frame.dt, stages, field, body, turned, seen),
+                    Some(body) => turn(state, self.frame, stages, field, body, turned, seen),
                 }
             }
         }

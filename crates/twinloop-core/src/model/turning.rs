@@ -1,5 +1,6 @@
 //! A rigid body in a period: its angles go on as a quaternion.
 
+use super::frame::Frame;
 use super::held::Held;
 use crate::attitude::{angles, quaternion, turning};
 use crate::integrator::{Field, Stages, rk4};
@@ -11,7 +12,7 @@ use crate::signals::RigidBody;
 #[inline(always)]
 pub(super) fn turn<V: Vector>(
     state: &mut [V],
-    dt: f64,
+    frame: &Frame,
     stages: &mut Stages<V>,
     field: Held<'_, V>,
     body: &RigidBody,
@@ -22,10 +23,36 @@ pub(super) fn turn<V: Vector>(
     let (states, attitude) = turned.split_at_mut(state.len());
     states.copy_from_slice(state);
     set_attitude(attitude, before);
-    rk4(turned, dt, stages, Turning { field, body, before, seen });
+    let Held { model, bank, effects, .. } = field;
+    let steps = frame.substeps as f64;
+    for part in 0..frame.substeps {
+        let mut within = [vec![], vec![], vec![]];
+        // What commands do is held, or known at three places of the period.
+        let effects = if frame.substeps == 1 || frame.actuation.is_direct() {
+            effects
+        } else {
+            for (within, share) in within.iter_mut().zip([0.0, 0.5, 1.0]) {
+                between(effects, (part as f64 + share) / steps, within);
+            }
+            within.each_ref().map(Vec::as_slice)
+        };
+        let field = Held { model, bank: &mut *bank, effects, stage: 0 };
+        rk4(turned, frame.dt / steps, stages, Turning { field, body, before, seen: &mut *seen });
+    }
     let (states, attitude) = turned.split_at(state.len());
     state.copy_from_slice(states);
     set_angles(state, body, attitude, before);
+}
+
+/// Effects at a share of a period: the parabola through those at its start, middle and end.
+#[inline(always)]
+fn between<V: Vector>(effects: [&[V]; 3], share: f64, within: &mut Vec<V>) {
+    let [start, middle, end] = effects;
+    let weights =
+        [(1.0 - share) * (1.0 - 2.0 * share), 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)];
+    for ((&start, &middle), &end) in start.iter().zip(middle).zip(end) {
+        within.push(start * weights[0] + middle * weights[1] + end * weights[2]);
+    }
 }
 
 /// The slope of states, and of the quaternion of a rigid body's angles behind them.

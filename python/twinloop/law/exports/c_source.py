@@ -296,7 +296,7 @@ def _stepped(law: Law, name: str, precision: str, n_x: int) -> list[str]:
             *_turned(law, name, precision, body),
             *_slopes(law, name, precision, body),
             *lines[:2],
-            f"    real seen[3][SEEN], first[{size}], begun[{size}], ended[{size}];",
+            f"    real seen[3][SEEN], first[{size}], begun[{size}];",
             f"    const real before[3] = {{{', '.join(f'x[{i}]' for i in places(law, body.angles))}}};",
             f"    {name}_effects(memory, u, seen);",
             f"    for (int i = 0; i < {n_x}; ++i) {{",
@@ -304,8 +304,12 @@ def _stepped(law: Law, name: str, precision: str, n_x: int) -> list[str]:
             "    }",
             f"    {name}_quaternion(before, begun + {n_x});",
         ]
-    half, whole, sixth = (number(law.signals.dt * share, precision) for share in (0.5, 1.0, 1.0 / 6.0))
-    target = "next" if body is None else "ended"
+    steps = law.signals.substeps
+    half, whole, sixth = (
+        number(law.signals.dt / steps * share, precision) for share in (0.5, 1.0, 1.0 / 6.0)
+    )
+    target = "next" if body is None else "begun"
+    inputs = "seen" if steps == 1 else "within"
 
     def moved(slope: str, time: str) -> list[str]:
         return [
@@ -314,20 +318,38 @@ def _stepped(law: Law, name: str, precision: str, n_x: int) -> list[str]:
             "    }",
         ]
 
-    lines += [
-        f"    real second[{size}], third[{size}], fourth[{size}], point[{size}];",
-        f"    {slopes}{begun}, seen[0], first);",
+    stages = [
+        f"    {slopes}{begun}, {inputs}[0], first);",
         *moved("first", half),
-        f"    {slopes}point, seen[1], second);",
+        f"    {slopes}point, {inputs}[1], second);",
         *moved("second", half),
-        f"    {slopes}point, seen[1], third);",
+        f"    {slopes}point, {inputs}[1], third);",
         *moved("third", whole),
-        f"    {slopes}point, seen[2], fourth);",
+        f"    {slopes}point, {inputs}[2], fourth);",
         f"    for (int i = 0; i < {size}; ++i) {{",
         f"        {target}[i] = {begun}[i] + {sixth} * (first[i] + 2 * second[i] + 2 * third[i] + fourth[i]);",
         "    }",
     ]
-    return [*lines, *([] if body is None else [f"    {name}_seen(before, ended, next);"]), "}"]
+    if steps > 1:
+        stages = [f"    {line}" for line in [*_within(steps, precision), *stages]]
+        stages = [f"    for (int part = 0; part < {steps}; ++part) {{", *stages, "    }"]
+    lines += [f"    real second[{size}], third[{size}], fourth[{size}], point[{size}];", *stages]
+    return [*lines, *([] if body is None else [f"    {name}_seen(before, begun, next);"]), "}"]
+
+
+def _within(steps: int, precision: str) -> list[str]:
+    """Inputs in a part of a period: the parabola through those at its start, middle and end."""
+    half, one = number(0.5, precision), number(1.0, precision)
+    return [
+        "    real within[3][SEEN];",
+        "    for (int stage = 0; stage < 3; ++stage) {",
+        f"        const real at = (part + {half} * stage) / {number(float(steps), precision)};",
+        f"        const real a = ({one} - at) * ({one} - 2 * at), b = 4 * at * ({one} - at), c = at * (2 * at - {one});",
+        "        for (int i = 0; i < SEEN; ++i) {",
+        "            within[stage][i] = a * seen[0][i] + b * seen[1][i] + c * seen[2][i];",
+        "        }",
+        "    }",
+    ]
 
 
 def _attitude_of_sensors(law: Law, name: str, precision: str) -> list[str]:

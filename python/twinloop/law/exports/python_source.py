@@ -214,6 +214,8 @@ def layout(law: Law, actuated: bool) -> list[str]:
         if offset != 0.0
     ]
     lines += sensor_layout(law)
+    if law.form == "acceleration" and signals.kinematics is not None:
+        lines.append(f"SUBSTEPS = {signals.substeps}  # of the integrator, in a period")
     if (law.form == "acceleration" or any(law.offsets)) and signals.kinematics is not None:
         body, place = signals.kinematics, signals.state_names.index
         lines += [

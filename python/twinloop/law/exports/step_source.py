@@ -18,7 +18,7 @@ def _step(x, start, middle, end):
     "acceleration": '''
 def _step(x, start, middle, end):
     """One Runge-Kutta step of order four."""
-    return _integrated(_outputs, x, start, middle, end)
+    return _integrated(_outputs, x, DT, start, middle, end)
 ''',
 }
 
@@ -27,13 +27,13 @@ def _along(a, b, share):
     return [first + share * second for first, second in zip(a, b)]
 
 
-def _integrated(slope, x, start, middle, end):
+def _integrated(slope, x, dt, start, middle, end):
     first = slope(x, start)
-    second = slope(_along(x, first, 0.5 * DT), middle)
-    third = slope(_along(x, second, 0.5 * DT), middle)
-    fourth = slope(_along(x, third, DT), end)
+    second = slope(_along(x, first, 0.5 * dt), middle)
+    third = slope(_along(x, second, 0.5 * dt), middle)
+    fourth = slope(_along(x, third, dt), end)
     return [
-        value + DT / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        value + dt / 6.0 * (a + 2.0 * b + 2.0 * c + d)
         for value, a, b, c, d in zip(x, first, second, third, fourth)
     ]
 """
@@ -50,8 +50,14 @@ def _quaternion(roll, pitch, yaw):
 """
 
 _TURNED = '''
+def _part_of(start, middle, end, share):
+    """Inputs at a share of a period: the parabola through those at its start, middle and end."""
+    a, b, c = (1.0 - share) * (1.0 - 2.0 * share), 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)
+    return [a * first + b * second + c * third for first, second, third in zip(start, middle, end)]
+
+
 def _step(x, start, middle, end):
-    """One Runge-Kutta step of order four; the attitude goes on as a quaternion, for which no pitch is singular."""
+    """Runge-Kutta steps of order four; the attitude goes on as a quaternion, for which no pitch is singular."""
     before = [x[i] for i in ANGLES]
 
     def seen(y):
@@ -66,7 +72,11 @@ def _step(x, start, middle, end):
         turning = [-(b * p + c * q + d * r), a * p + c * r - d * q, a * q - b * r + d * p, a * r + b * q - c * p]
         return [*_outputs(states, u), *turning]
 
-    return seen(_integrated(slope, [*x, *_quaternion(*before)], start, middle, end))
+    y = [*x, *_quaternion(*before)]
+    for part in range(SUBSTEPS):
+        places = [(part + share) / SUBSTEPS for share in (0.0, 0.5, 1.0)]
+        y = _integrated(slope, y, DT / SUBSTEPS, *[_part_of(start, middle, end, place) for place in places])
+    return seen(y)
 '''
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -217,23 +217,23 @@ def _filled(law: Law, begun: _Begun) -> list[Dual]:
 def _stepped(law: Law, x: Dual, inputs: Sequence[Dual]) -> Dual:
     """The next state under effects and hidden states at the start, the middle and the end of a period."""
 
-    def of(roots: Sequence[int], point: Dual, stage: int) -> Dual:
-        whole = Dual.stacked([point, inputs[stage]])
+    def of(roots: Sequence[int], point: Dual, given: Dual) -> Dual:
+        whole = Dual.stacked([point, given])
         values, slopes = jacobian(law.expressions, roots, _wrapped(law, whole.values))
         return Dual(values, slopes @ whole.slopes)
 
     dt = law.signals.dt
     if law.form == "absolute":
-        return of(law.outputs, x, 1)
+        return of(law.outputs, x, inputs[1])
     if law.form == "increment":
-        return x + of(law.outputs, x, 1)
+        return x + of(law.outputs, x, inputs[1])
     roots, body = law.derivatives(), law.signals.kinematics
 
-    def slope(point: Dual, stage: int) -> Dual:
+    def slope(point: Dual, given: Dual) -> Dual:
         if body is None:
-            return of(roots, point, stage)
+            return of(roots, point, given)
         states = seen(point)
-        moved = of(roots, states, stage)
+        moved = of(roots, states, given)
         still = Dual(np.zeros(3), np.zeros((3, moved.slopes.shape[1])))
         turned = turning(point.rows(range(size, size + 4)), states.rows(rates))
         return Dual.stacked([moved.put(turns, still), turned])
@@ -248,12 +248,28 @@ def _stepped(law: Law, x: Dual, inputs: Sequence[Dual]) -> Dual:
         place = law.signals.state_names.index
         turns, rates = [place(name) for name in body.angles], [place(name) for name in body.rates]
         begun = Dual.stacked([x, quaternion(x.rows(turns))])
-    first = slope(begun, 0)
-    second = slope(begun + first * (0.5 * dt), 1)
-    third = slope(begun + second * (0.5 * dt), 1)
-    fourth = slope(begun + third * dt, 2)
-    ended = begun + (first + second * 2.0 + third * 2.0 + fourth) * (dt / 6.0)
-    return ended if body is None else seen(ended)
+    steps = law.signals.substeps
+    for part in range(steps):
+        given = [_between(inputs, (part + share) / steps) for share in (0.0, 0.5, 1.0)]
+        begun = _integrated(slope, begun, dt / steps, given)
+    return begun if body is None else seen(begun)
+
+
+def _integrated(slope: Callable[[Dual, Dual], Dual], begun: Dual, dt: float, inputs: Sequence[Dual]) -> Dual:
+    """One Runge-Kutta step of order four under inputs at its start, middle and end."""
+    start, middle, end = inputs
+    first = slope(begun, start)
+    second = slope(begun + first * (0.5 * dt), middle)
+    third = slope(begun + second * (0.5 * dt), middle)
+    fourth = slope(begun + third * dt, end)
+    return begun + (first + second * 2.0 + third * 2.0 + fourth) * (dt / 6.0)
+
+
+def _between(inputs: Sequence[Dual], share: float) -> Dual:
+    """Inputs at a share of a period: the parabola through those at its start, middle and end."""
+    start, middle, end = inputs
+    weights = (1.0 - share) * (1.0 - 2.0 * share), 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)
+    return start * weights[0] + middle * weights[1] + end * weights[2]
 
 
 def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
