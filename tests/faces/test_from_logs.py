@@ -61,7 +61,12 @@ def test_as_text_it_is_equations_and_a_table(folder):
 def test_the_page_has_what_there_is_and_nothing_of_a_controller(folder, done):
     page = (folder / "logs.html").read_text()
     assert "Report of a twin from logs" in page and 'figure id="unseen"' in page
-    assert "Trust it" in page and "inside its 90 % band" in page and "under its recorded commands" in page
+    assert (
+        "Trust it" in page
+        and "inside its 90 % band" in page
+        and 'figure id="coverage"' in page
+        and "under its recorded commands" in page
+    )
     for absent in ('id="controller"', 'id="next"', "controller to fly", "Do not fly", 'id="gains-table"'):
         assert absent not in page, absent
     for target in ("checks", "twin", "campaign", "again", "crosscorrelation"):

@@ -17,9 +17,8 @@ MOST = 12
 
 
 def coverage(found: Examination) -> Figure | None:
-    """State against command where it was flown, and where the controller to fly will go."""
-    if found.planned is None:
-        return None
+    """State against command where it was flown, and where the controller to fly will go if there is one."""
+    planned = found.planned
     states = np.concatenate([run.trajectory.states[:-1] for run in found.experiments])
     commands = np.concatenate([run.trajectory.commands for run in found.experiments])
     shown = np.unique(np.linspace(0, len(states) - 1, DOTS).astype(int))
@@ -39,15 +38,12 @@ def coverage(found: Examination) -> Figure | None:
                     joined=False,
                     faint=True,
                 ),
-                Line(
-                    x_factor * found.planned.states[:-1, i],
-                    y_factor * found.planned.commands[:, j],
-                    "twin",
-                    "controller to fly",
-                ),
                 Level(y_factor * low, "limit", "bound of the command"),
                 Level(y_factor * high, "limit"),
             ]
+            if planned is not None:
+                x, y = x_factor * planned.states[:-1, i], y_factor * planned.commands[:, j]
+                marks.insert(1, Line(x, y, "twin", "controller to fly"))
             panels.append(
                 Panel(
                     f"{words(signals.states[i].name)} × {words(signals.commands[j].name)}",
@@ -63,21 +59,23 @@ def coverage(found: Examination) -> Figure | None:
     )
     return Figure(
         "coverage",
-        "Where it was flown, and where the controller to fly will go",
+        "Where it was flown" + (", and where the controller to fly will go" if planned else ""),
         panels[:MOST],
-        f"Where the line leaves the dots the twin is asked about what nobody has seen.{leaves}",
+        "Beyond the dots the twin is asked about what nobody has seen."
+        if planned is None
+        else f"Where the line leaves the dots the twin is asked about what nobody has seen.{leaves}",
     )
 
 
 def _strongest(found: Examination, state: int) -> list[int]:
-    """The two commands that go most with a state or its derivative in the planned flight."""
-    assert found.planned is not None
+    """The two commands that go most with a state or its derivative in the planned flight, or in the last one."""
+    flight = found.experiments[-1].trajectory if found.planned is None else found.planned
     if found.signals.n_u <= 2:
         return list(range(found.signals.n_u))
     name = found.signals.state_names[state]
     rate = next((k for k, s in enumerate(found.signals.states) if s.derivative_of == name), state)
-    values = np.diff(found.planned.states[:, rate])
-    sent = found.planned.commands - found.planned.commands.mean(axis=0)
+    values = np.diff(flight.states[:, rate])
+    sent = flight.commands - flight.commands.mean(axis=0)
     together = np.abs((sent * (values - values.mean())[:, np.newaxis]).sum(axis=0))
     size = together / (1e-12 + np.sqrt(np.square(sent).sum(axis=0)))
     return sorted(np.argsort(-size, kind="stable")[:2].tolist())
