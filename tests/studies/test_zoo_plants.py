@@ -292,10 +292,12 @@ def test_a_load_rests_inside_the_gap_and_shares_momentum_beyond_it():
 
 
 def test_a_stop_pushes_back_and_takes_energy():
-    assert end_stop.contact(0.99, 5.0) == 0.0 and end_stop.contact(1.01, -10.0) == 0.0
-    assert end_stop.contact(1.01, 0.0) == pytest.approx(-0.01 * end_stop.STIFFNESS)
-    run = held(end_stop.PLANT.truth, np.zeros((60, 1)), [0.9, 3.0])
+    beyond = end_stop.STOP + 0.01
+    assert end_stop.contact(end_stop.STOP - 0.01, 5.0) == 0.0 and end_stop.contact(beyond, -10.0) == 0.0
+    assert end_stop.contact(beyond, 0.0) == pytest.approx(-0.01 * end_stop.STIFFNESS)
+    run = held(end_stop.PLANT.truth, np.zeros((60, 1)), [0.8, 3.0])
     energy = (
-        0.5 * run.states[:, 1] ** 2 + 0.5 * end_stop.STIFFNESS * np.maximum(run.states[:, 0] - 1.0, 0.0) ** 2
+        0.5 * run.states[:, 1] ** 2
+        + 0.5 * end_stop.STIFFNESS * np.maximum(run.states[:, 0] - end_stop.STOP, 0.0) ** 2
     )
     assert (np.diff(energy) <= 1e-9).all() and run.states[-1, 1] < 0.0

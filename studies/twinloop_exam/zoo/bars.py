@@ -54,17 +54,20 @@ def number(value: Any) -> float:
 
 
 def best_flown(campaign: Measured, flights: int) -> float:
-    """The best true quality among the first flights, over the optimum; infinite where none ran to its end."""
+    """The best quality on true states among the first flights, over that of the optimum under the same noise.
+
+    It is infinite where no flight ran to its end.
+    """
     flown = [
         number(row["flown"])
         for row in campaign["flights"][:flights]
         if row["ended"] == "completed" and row["flown"] is not None
     ]
-    return min(flown, default=math.inf) / float(campaign["optimum"])
+    return min(flown, default=math.inf) / float(campaign["optimum_under_noise"])
 
 
 def best_gains(campaign: Measured, flights: int) -> float:
-    """The same of the gains alone, flown without noise, disturbances and excitation."""
+    """The same of the gains alone and the optimum, both flown without noise, disturbances and excitation."""
     flown = [
         number(row["gains_quality"]) for row in campaign["flights"][:flights] if row["flown"] is not None
     ]

@@ -68,6 +68,7 @@ def fly(job: Job) -> Measured:
         "flights_asked": job.flights,
         "version": version(),
         "optimum": best_quality(plant),
+        "optimum_under_noise": best_quality(plant, noisy=True),
         "flights": [],
         "failure": None,
     }

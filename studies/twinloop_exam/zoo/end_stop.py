@@ -7,7 +7,7 @@ from twinloop.signals import Command, Signals, State
 from twinloop_exam.zoo.machine import Machine, Mechanism, Row, runge_kutta
 from twinloop_exam.zoo.plant import Plant, Task
 
-MASS, VISCOUS, STOP, STIFFNESS, DAMPING = 1.0, 0.8, 1.0, 3000.0, 15.0
+MASS, VISCOUS, STOP, STIFFNESS, DAMPING = 1.0, 0.8, 0.9, 3000.0, 15.0
 """kg, N s/m, m, N/m, N s/m."""
 
 
@@ -25,7 +25,7 @@ def derivative(z: Row, u: Row) -> Row:
 
 SIGNALS = Signals(
     [
-        State("position", "m", 1.0, envelope=(-0.3, 1.08)),
+        State("position", "m", 1.0, envelope=(-0.3, 0.98)),
         State("velocity", "m/s", 3.0, derivative_of="position", envelope=(-4.0, 4.0)),
     ],
     [Command("force", "N", (-8.0, 8.0))],
@@ -41,7 +41,7 @@ def _task(_: Machine) -> Task:
     return Task(
         family,
         start=[0.0, 0.0],
-        target=[0.97, 0.0],
+        target=[0.87, 0.0],
         duration=2.4,
         first={"position.kp": 1.5, "position.ki": 0.1, "position.kd": 0.6},
     )

@@ -8,6 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from twinloop.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.streams import Unit
@@ -23,6 +25,8 @@ STEP, POLISH = 0.2, 0.05
 """First standard deviations of a start, and of a round that goes on from the best, in ranges of a gain."""
 ROUNDS, LEAST = 8, 1e-3
 """At most so many rounds; none after one that gained a smaller share than this."""
+NOISY, NOISE_SEED = 20, 987_654
+"""Flights over which noise is averaged; its seed is far from those of campaigns."""
 DRAW = 11
 """Tells the stream of the random starts from others of the exam."""
 
@@ -41,7 +45,7 @@ def optimum(plant: Plant, flights: int = FLIGHTS, starts: int = STARTS) -> dict[
 
     Returns:
         "quality" of the best, of the "first" controller, and of the best of each start ("starts"), with the best
-        "gains" by name and the number of "flights" of each.
+        "gains" by name, their quality "under_noise", and the number of "flights" of each.
     """
     family = plant.family
     draw = Unit(0).part(DRAW).stream("exam")
@@ -64,7 +68,14 @@ def optimum(plant: Plant, flights: int = FLIGHTS, starts: int = STARTS) -> dict[
         "starts": [value for value, _ in found],
         "gains": family.parameters(family.from_unit(best[1])),
         "flights": flights,
+        "under_noise": under_noise(plant, family.from_unit(best[1])),
     }
+
+
+def under_noise(plant: Plant, gains: Floats) -> float:
+    """Mean quality on true states of gains (size,) that are flown as a learner flies, without excitation."""
+    system, test = plant.make(NOISE_SEED), plant.test(gains)
+    return float(np.mean([plant.judged(system.run(test), test) for _ in range(NOISY)]))
 
 
 def _searched(plant: Plant, start: Floats, step: float, seed: int, flights: int) -> tuple[float, Floats]:
@@ -96,11 +107,12 @@ def keep(found: Mapping[str, Any], path: Path = FILE) -> None:
     path.write_text(text + "\n", "utf-8")
 
 
-def best_quality(plant: Plant) -> float:
+def best_quality(plant: Plant, noisy: bool = False) -> float:
     """Of the best controller that is known.
 
     Args:
         plant: whose.
+        noisy: on true states under the noise of its sensors and its disturbances, rather than without.
 
     Raises:
         NotAvailable: it was not searched yet.
@@ -111,4 +123,4 @@ def best_quality(plant: Plant) -> float:
             f"Optimum of {plant.name}: expected it in {FILE.name}, found none; search it with"
             f" `twinloop bench zoo --optima --plants {plant.name}`."
         )
-    return float(found[plant.name]["quality"])
+    return float(found[plant.name]["under_noise" if noisy else "quality"])

@@ -55,7 +55,8 @@ def kept(jobs: Iterable[Job], folder: Path) -> dict[Job, Measured]:
             raise InvalidInput(
                 f"{path}: expected the campaign {job.name}, found another one; remove the file."
             )
+        of = plant(job.plant)
         # A better controller may have been found since it was flown.
-        found["optimum"] = best_quality(plant(job.plant))
+        found |= {"optimum": best_quality(of), "optimum_under_noise": best_quality(of, noisy=True)}
         there[job] = found
     return there
