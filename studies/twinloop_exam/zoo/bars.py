@@ -139,7 +139,10 @@ def _predictions(campaigns: Sequence[Measured]) -> Iterator[tuple[float, float, 
 
 
 def _within(campaigns: Sequence[Measured]) -> Found:
-    share, count = _share(abs(p - m) <= SPREADS * s for p, m, s in _predictions(campaigns))
+    # Who foretells that a flight diverges, and sees it land, has foretold nothing.
+    share, count = _share(
+        math.isfinite(p) and abs(p - m) <= SPREADS * s for p, m, s in _predictions(campaigns)
+    )
     return Found(f"{_percent(share)} of {count}", 0.85 <= share <= 0.98, share) if count else _NOTHING
 
 
