@@ -101,6 +101,11 @@ def test_a_cluster_gives_the_same_bits_though_a_worker_is_killed(here, tmp_path)
         # The one that died was replaced by another process, and so it was not there for nothing.
         client.wait_for_workers(2, timeout=30)
         assert set(client.run(os.getpid).values()) != set(pids)
+        # By its address, as the verb names it, and in part done before.
+        address, path = cluster.scheduler_address, tmp_path / "address.db"
+        assert address.startswith("tcp://127.0.0.1:")
+        list(sweep(small()[:1], path, address))
+        assert records(sweep(small(), path, address)) == records(outcomes)
 
 
 def test_a_job_that_fails_is_said_and_the_others_go_on(tmp_path, monkeypatch):
