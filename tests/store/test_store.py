@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -328,6 +329,22 @@ def test_a_full_disk_is_said_and_loses_nothing(path, pendulum):
     assert plain(again) == before
     again.tell(first, pendulum.run(first))
     assert len(again.experiments) == told + 1
+
+
+@pytest.mark.parametrize(("free", "word"), [(0, "expected room on the disk"), (1 << 30, "disk I/O error")])
+def test_a_disk_without_room_for_the_index_of_a_log_is_called_full(path, pendulum, monkeypatch, free, word):
+    """What SQLite says then is "disk I/O error", which may be anything."""
+    campaign = flown(stored(path), pendulum)
+
+    @event.listens_for(campaign._keeping._keeper.store.engine, "before_cursor_execute")
+    def fail(*_):
+        raise sqlite3.OperationalError("disk I/O error")
+
+    usage = shutil.disk_usage(path.parent)._replace(free=free)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
+    with pytest.raises(tl.StoreFailure, match=word):
+        campaign.test(OTHER_GAINS)
+    assert len(campaign.tests) == 1
 
 
 def test_what_was_learnt_survives_a_full_disk_in_memory(path, pendulum):

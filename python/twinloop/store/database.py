@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,9 +17,12 @@ if TYPE_CHECKING:
 BUSY_SECONDS = 30.0
 """How long a transaction waits for another one; each takes milliseconds."""
 
+SMALLEST_ROOM = 1 << 16
+"""Bytes on a disk below which it counts as full: the index of a log takes half of that."""
 ROOM = ("room on the disk", "free some, then do the same again")
 RIGHT = ("the right to write", "give it for the file and its folder, or read with read_only=True")
 REFUSALS = (
+    (ROOM[0], *ROOM),
     ("full", *ROOM),
     ("no space", *ROOM),
     ("readonly", *RIGHT),
@@ -160,6 +164,9 @@ def said(name: str, failure: Exception) -> TwinloopError:
     """
     reason = str(getattr(failure, "orig", None) or failure).split("\n")[0]
     low = reason.lower()
+    if "disk i/o error" in low and _is_full(name):
+        # On a full disk SQLite has no room for the index of its log, and says no more than that.
+        low = ROOM[0]
     if "not a database" in low or "malformed" in low or "encrypted" in low:
         return InvalidInput(
             f"Store {name}: expected a database of Twinloop, found a file that is damaged or none at all ({reason});"
@@ -174,6 +181,13 @@ def said(name: str, failure: Exception) -> TwinloopError:
         f"Store {name}: expected an answer of the database, found: {reason}; nothing that was kept is lost: mend that,"
         " then do the same again."
     )
+
+
+def _is_full(name: str) -> bool:
+    try:
+        return shutil.disk_usage(Path(name).parent).free < SMALLEST_ROOM
+    except (OSError, ValueError):
+        return False
 
 
 def _check_file(path: Path, create: bool) -> None:
