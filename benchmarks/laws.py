@@ -12,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import sympy as sp
+from rational import RATIONAL, RATIONAL_REPORTED, RATIONAL_TUNED
 from scipy.integrate import solve_ivp
 from textbook import REPORTED, TEXTBOOK, TUNED
 
@@ -27,7 +28,13 @@ STEPS = 149
 FOLLOWED = 0.999
 NOTHING = 1e-4
 """Share of the largest coefficient below which a term is rounding."""
-SMOKE = ("RC circuit", "Lotka-Volterra")
+SMOKE = ("RC circuit", "Lotka-Volterra", "cart and pendulum")
+SYSTEMS = {**TEXTBOOK, **RATIONAL}
+HALVES = {
+    "textbook": {"tuned": TUNED, "reported": REPORTED, "both": tuple(sorted(TEXTBOOK))},
+    "rational": {"tuned": RATIONAL_TUNED, "reported": RATIONAL_REPORTED, "both": tuple(sorted(RATIONAL))},
+}
+"""Names of systems by their kind, and by whether the identification may be tuned on them."""
 
 
 def run_of(system, start):
@@ -52,10 +59,20 @@ def run_of(system, start):
 def signals_of(system, states):
     scales = np.abs(states).max(axis=0)
     return tl.Signals(
-        states=[tl.State(name, "1", float(s)) for name, s in zip(system.equations, scales, strict=True)],
+        states=[
+            tl.State(name, _unit(system, name), float(s), derivative_of=system.rates.get(name))
+            for name, s in zip(system.equations, scales, strict=True)
+        ],
         commands=[tl.Command("idle", "1", (0.0, 1.0))],
         dt=system.length / STEPS,
     )
+
+
+def _unit(system, name):
+    if name in system.angles:
+        return "rad"
+    of = system.rates.get(name)
+    return "1" if of is None else f"{_unit(system, of)}/s"
 
 
 def right(found, truth):
@@ -64,18 +81,34 @@ def right(found, truth):
 
 
 def _terms(expression):
-    """Terms above and below the line, without their coefficients."""
+    """Terms above and below the line, without their coefficients; of sines at most the first power."""
     sides = []
-    for side in sp.fraction(sp.together(sp.expand(expression))):
+    for side in sp.fraction(sp.together(_unsquared(sp.expand(expression)))):
+        side = _unsquared(side)
         parts = [term.as_coeff_Mul() for term in sp.Add.make_args(sp.expand(side))]
         largest = max(abs(c) for c, _ in parts)
         sides.append(frozenset(term for c, term in parts if abs(c) > NOTHING * largest))
     return tuple(sides)
 
 
+def _unsquared(expression):
+    """Sums of angles multiplied out, and squares of sines as 1 less those of cosines."""
+    expanded = sp.expand(sp.expand_trig(expression))
+    return sp.expand(
+        expanded.replace(
+            lambda part: (
+                part.is_Pow and isinstance(part.base, sp.sin) and part.exp.is_Integer and part.exp > 1
+            ),
+            lambda part: (
+                part.base ** (part.exp % 2) * (1 - sp.cos(part.base.args[0]) ** 2) ** (part.exp // 2)
+            ),
+        )
+    )
+
+
 def learnt(name, noise, changes, seed=0):
     """What is learnt of one system, and how good it is."""
-    system = TEXTBOOK[name]
+    system = SYSTEMS[name]
     clean = run_of(system, system.learnt)
     signals = signals_of(system, clean)
     random = np.random.default_rng([seed, *name.encode()])
@@ -122,6 +155,7 @@ def main():
     )
     parser.add_argument("--smoke", action="store_true", help="two systems, a short search: does it run")
     parser.add_argument("--half", choices=["tuned", "reported", "both"], default="reported")
+    parser.add_argument("--kind", choices=sorted(HALVES), default="textbook")
     parser.add_argument(
         "--noise", type=float, action="append", help="share of a state's deviation; 0 and 0.01"
     )
@@ -131,8 +165,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="print every row")
     arguments = parser.parse_args()
-    halves = {"tuned": TUNED, "reported": REPORTED, "both": sorted(TEXTBOOK)}
-    names = arguments.only or (SMOKE if arguments.smoke else halves[arguments.half])
+    names = arguments.only or (SMOKE if arguments.smoke else HALVES[arguments.kind][arguments.half])
     changes = {key: json.loads(value) for key, _, value in (text.partition("=") for text in arguments.set)}
     if arguments.smoke:
         changes = {"moves": 1000, "starts": 1, "generations": 0, "committee_size": 2, **changes}

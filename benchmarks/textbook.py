@@ -4,16 +4,23 @@ Written from general knowledge of the field (Strogatz, *Nonlinear dynamics and c
 and the papers that the systems are named after).
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 
 class System(NamedTuple):
-    """Derivatives by state, an initial state to learn from and one to test on, and how long both runs are, s."""
+    """Derivatives by state, an initial state to learn from and one to test on, and how long both runs are, s.
+
+    `angles` are states in rad; `rates` names, for states that are declared derivatives, what they are derivatives of.
+    """
 
     equations: dict[str, str]
     learnt: tuple[float, ...]
     tested: tuple[float, ...]
     length: float = 10.0
+    angles: tuple[str, ...] = ()
+    rates: Mapping[str, str] = MappingProxyType({})
 
 
 TEXTBOOK = {
