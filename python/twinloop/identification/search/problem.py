@@ -15,6 +15,9 @@ from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import Told
 from twinloop.signals import Bounds
 
+Columns = Floats
+"""Values at the start, the middle and the end of each period (3, rows, p)."""
+
 
 class Problem:
     """Readings of all runs and the inputs within each period; makes regressions of terms.
@@ -67,19 +70,27 @@ class Problem:
                     self._usable.add(term)
         return [term for term in terms if term in self._usable]
 
+    def values(self, terms: Sequence[int]) -> Columns:
+        """Of terms that were found usable, at the start, the middle and the end of each period (3, rows, terms)."""
+        found = np.empty((3, len(self.stages.start), len(terms)))
+        for place, term in enumerate(terms):
+            found[:, :, place] = self._values[term]
+        return found
+
     def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
         """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
+        return self.regression_on(chain, self.values(terms))
+
+    def regression_on(self, chain: Chain, columns: Columns) -> _core.Regression:
+        """Of one chain on features that need not be terms (3, rows, p)."""
         known = self.usable(self.told.fixed.get(chain.states[0], ()))
         readings = [run.states[:, list(chain.states)] for run in self.runs]
         if known:
-            readings = self._of(chain, known, readings).residuals(np.ones(len(known)))
-        return self._of(chain, terms, readings)
+            readings = self._of(chain, self.values(known), readings).residuals(np.ones(len(known)))
+        return self._of(chain, columns, readings)
 
-    def _of(self, chain: Chain, terms: Sequence[int], readings: Sequence[Floats]) -> _core.Regression:
-        none = np.empty((len(self.stages.start), 0))
-        start, middle, end = (
-            np.stack([self._values[term][s] for term in terms], axis=1) if terms else none for s in range(3)
-        )
+    def _of(self, chain: Chain, columns: Columns, readings: Sequence[Floats]) -> _core.Regression:
+        start, middle, end = np.ascontiguousarray(columns)
         states = list(chain.states)
         records = [
             (measured, run.weights[:, states], start[rows], middle[rows], end[rows])

@@ -1,0 +1,228 @@
+"""Implicit regression: what may be above and below the line of a law y = N / D, D = 1 + Σ d φ.
+
+Multiplied out the law is linear in its constants: y = N − Σ d (y φ). On the right stands for y what the readings show
+of it (`slopes.py`), with the sum of terms that is believed so far where that helps, as it does where commands jump. So
+one search over subsets chooses what is above the line and what below.
+
+Mangan, Brunton, Proctor and Kutz 2016 for laws that are implicit; here the left side stays an integral of readings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.identification.search.problem import Columns, Problem
+from twinloop.identification.search.structure import Sum, prices
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.noise import calm, floor_of
+from twinloop.identification.slopes import slopes
+from twinloop.identification.terms.denominators import Denominator, above, below, power_of, quotient
+from twinloop.identification.terms.pool import Pool
+from twinloop.signals import Signals
+from twinloop.streams import Unit
+
+TRIED = 3
+"""Denominators of each chain that are refined, of all those that searches have come across."""
+NOISE_ROUNDS = 2
+"""Times that the noise is estimated behind what a search has found."""
+POWERS = (2, 4)
+"""Powers of which denominators are also searched alone: together, powers of one state stand in for each other."""
+NEAREST = 1e-3
+"""Share of its largest value that a denominator has at least wherever the runs were."""
+VARIES = 1.25
+"""Times that a denominator's largest value is its least at least: by less it is a series, and a plain term as good."""
+FEW_TERMS = 3
+"""Terms up to which a sum that leaves nothing but noise is believed: a quotient and its denominator are no fewer."""
+NOISE = 4.0
+"""Times that the least noise which is believed may be there where nothing is left but noise."""
+
+
+@dataclass(frozen=True)
+class Quotient:
+    """Plain terms, terms over a denominator, and that."""
+
+    plain: tuple[int, ...]
+    above: tuple[int, ...]
+    denominator: Denominator
+
+
+def implicit(
+    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
+) -> list[list[Quotient]]:
+    """Quotients that may drive each chain, the shortest description first; none where none is shorter than without.
+
+    Args:
+        problem: of all chains.
+        signals: of the system.
+        known: the best sum of each chain so far.
+        moves: of each search over subsets.
+        largest: number of terms at most.
+        unit: of work.
+    """
+    pool = problem.pool
+    lower = problem.usable(below(pool, signals))
+    found: list[list[Quotient]] = [[] for _ in known]
+    posed = [i for i, sum_ in enumerate(known) if not _explained(problem, sum_)]
+    if not lower or not posed:
+        return found
+    own = [term for sum_ in known for term in sum_.weights if quotient(pool, term) is not None]
+    upper = problem.usable(list(dict.fromkeys([*above(pool, signals, lower), *own])))
+    sums = [known[i] for i in posed]
+    costs = [prices(pool, [*upper, *lower], problem.readings(sum_.chain), len(problem.runs)) for sum_ in sums]
+    over_line, under = problem.values(upper), problem.values(lower)
+    columns = [
+        np.concatenate([over_line, -driving(problem, sum_)[:, :, np.newaxis] * under], axis=2)
+        for sum_ in sums
+    ]
+    grams = _whitened(problem, sums, columns, costs, moves, largest, unit)
+    walks: list[list[tuple[list[int], float]]] = [[] for _ in sums]
+    for number, mask in enumerate(_masks(pool, signals, lower), NOISE_ROUNDS):
+        masked = [
+            np.concatenate([cost[: len(upper)], np.where(mask, cost[len(upper) :], np.inf)]) for cost in costs
+        ]
+        for walked, more in zip(
+            walks, _walks(problem, grams, masked, moves, largest, unit.part(number)), strict=True
+        ):
+            walked += more
+    for i, gram, walked in zip(posed, grams, walks, strict=True):
+        subsets = sorted(walked, key=lambda answer: answer[1])
+        found[i] = _quotients(problem, gram, [subset for subset, _ in subsets], upper, lower)
+    return found
+
+
+def _explained(problem: Problem, found: Sum) -> bool:
+    """Whether few terms leave nothing but the noise of sensors."""
+    chain = found.chain
+    if len(found.weights) < 2:
+        return True
+    _, slow = floor_of(chain, problem.dt, problem.integration(chain))
+    still = chain.motion[0] <= NOISE * slow[0] and chain.motion[1] <= NOISE * slow[1]
+    return len(found.weights) <= FEW_TERMS and (still or calm(problem, chain) is chain)
+
+
+def driving(problem: Problem, found: Sum) -> Floats:
+    """What drives a chain within each period (3, rows): a sum with the slope of what that leaves, or the slope alone.
+
+    Of the two that one is believed of which the readings miss each other less.
+    """
+    chain = found.chain
+    period = problem.dt if chain.integrated else 1.0
+    ways = []
+    for terms in (problem.usable(list(found.weights)), []):
+        weights = np.array([found.weights[term] for term in terms])
+        value: Floats = (problem.values(terms) * weights).sum(axis=2)
+        missed = 0.0
+        left = problem.regression(chain, terms).residuals(weights)
+        for rows, residual in zip(problem.stages.runs, left, strict=True):
+            shown = slopes(np.ascontiguousarray(residual[:, 0]))
+            if shown is None:
+                missed += float(np.square(residual[:, 0]).sum())
+                continue
+            missed += shown.missed * len(residual)
+            # What a period adds is one number for it.
+            edges = (shown.at[:-1], shown.at[1:]) if chain.integrated else (shown.between, shown.between)
+            for stage, slope in zip(value, (edges[0], shown.between, edges[1]), strict=True):
+                stage[rows] += slope / period
+        ways.append((missed, value))
+    return ways[0][1] if ways[0][0] <= ways[1][0] else ways[1][1]
+
+
+def matters(problem: Problem, denominator: Denominator) -> bool:
+    """Whether a denominator stays away from 0 wherever the runs were, and makes a difference there."""
+    values = problem.values([node for node, _ in denominator])
+    total = 1.0 + (values * np.array([weight for _, weight in denominator])).sum(axis=2)
+    least, most = float(total.min()), float(total.max())
+    return least > NEAREST * most and most > VARIES * least
+
+
+def _masks(pool: Pool, signals: Signals, lower: Sequence[int]) -> list[Floats]:
+    """Which terms a denominator may have: all of them, or those of one power."""
+    every = np.ones(len(lower), dtype=bool)
+    masks = [every]
+    for power in POWERS:
+        powers = {power_of(pool, i, power) for i in range(signals.n_x)}
+        mask = np.array([term in powers for term in lower])
+        if mask.any():
+            masks.append(mask)
+    return masks
+
+
+def _whitened(
+    problem: Problem,
+    sums: Sequence[Sum],
+    columns: Sequence[Columns],
+    costs: Sequence[Floats],
+    moves: int,
+    largest: int,
+    unit: Unit,
+) -> list[_core.Gram]:
+    """Inner products of each chain's columns, under the noise that is left behind what a search finds among them."""
+    regressions = [problem.regression_on(sum_.chain, own) for sum_, own in zip(sums, columns, strict=True)]
+    chains: list[Chain] = [sum_.chain for sum_ in sums]
+    for round_ in range(NOISE_ROUNDS + 1):
+        grams = [
+            regression.gram(chain.sensors, chain.motion, problem.workers)
+            for regression, chain in zip(regressions, chains, strict=True)
+        ]
+        if round_ == NOISE_ROUNDS:
+            break
+        walks = _walks(problem, grams, costs, moves, largest, unit.part(round_))
+        posed = []
+        for regression, gram, walked, chain in zip(regressions, grams, walks, chains, strict=True):
+            coefficients = np.zeros(gram.features)
+            solved = gram.solve(walked[0][0]) if walked and walked[0][0] else None
+            if solved is not None:
+                coefficients[walked[0][0]] = solved[0]
+            floor = floor_of(chain, problem.dt, problem.integration(chain))
+            posed.append((regression, coefficients, chain.sensors, chain.motion, *floor))
+        with engine_input():
+            noises = _core.most_likely_noises(posed, problem.workers)
+        chains = [
+            chain.with_noise(sensors, motion)
+            for chain, (sensors, motion, _) in zip(chains, noises, strict=True)
+        ]
+    return grams
+
+
+def _walks(
+    problem: Problem,
+    grams: Sequence[_core.Gram],
+    costs: Sequence[Floats],
+    moves: int,
+    largest: int,
+    unit: Unit,
+) -> list[list[tuple[list[int], float]]]:
+    with engine_input():
+        return _core.search_subsets(
+            grams, costs, moves=moves, largest=largest, starts=1, unit=unit.named("subsets"),
+            workers=problem.workers,
+        )  # fmt: skip
+
+
+def _quotients(
+    problem: Problem,
+    gram: _core.Gram,
+    subsets: Sequence[Sequence[int]],
+    upper: Sequence[int],
+    lower: Sequence[int],
+) -> list[Quotient]:
+    """Quotients of subsets, the best first, a denominator of some terms once; none that is longer than without."""
+    found: dict[tuple[int, ...], Quotient] = {}
+    for subset in subsets:
+        support = tuple(j for j in subset if j >= len(upper))
+        if not support or len(found) == TRIED:
+            break
+        solved = gram.solve(list(subset)) if support not in found else None
+        if solved is None:
+            continue
+        weights = dict(zip(subset, solved[0].tolist(), strict=True))
+        denominator = tuple((lower[j - len(upper)], weights[j]) for j in support)
+        if matters(problem, denominator):
+            found[support] = Quotient((), tuple(upper[j] for j in subset if j < len(upper)), denominator)
+    return list(found.values())

@@ -1,0 +1,241 @@
+"""Quotients: sums of plain terms and of terms over one denominator, that a law pays for once.
+
+What may be above and below the line comes from an implicit regression. The denominator's constants are then refined by
+steps of Gauss and Newton, of which each is a regression as well (Sanathanan and Koerner 1963), and a search among plain
+terms and those over it says by description length what it is worth. Where it is worth its price it is offered to all
+other chains, which need not pay for it again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from twinloop.elementary import log
+from twinloop.identification.search.description import shorter, shortest
+from twinloop.identification.search.implicit import Quotient, implicit, matters
+from twinloop.identification.search.newton import refined
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.structure import Sum, prices, search
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.terms.denominators import (
+    Denominator,
+    above,
+    denominators,
+    over,
+    plain,
+    quotient,
+)
+from twinloop.signals import Signals
+from twinloop.streams import Unit
+
+ROUNDS = 2
+"""Denominators of one sum at most."""
+TURNS = 2
+"""How often the terms over a denominator are chosen, and its constants refined behind them."""
+OWN = 10
+"""Share of the moves, inverted, that a search among a few terms takes."""
+CHOICE = float(log(2.0))
+"""Nats of the choice whether a term is over a denominator that is there."""
+RUNG = 0
+"""On which rung of the ladder quotients stand: their denominator is priced, constant by constant."""
+
+
+def with_quotients(
+    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
+) -> list[Sum]:
+    """The best sums with quotients among their terms, where these make descriptions shorter.
+
+    Args:
+        problem: of all chains; new expressions are entered in its pool.
+        signals: of the system.
+        known: the best sum of each chain so far, with its noise.
+        moves: of each search over subsets.
+        largest: number of terms of a sum at most.
+        unit: of work.
+
+    Returns:
+        A sum for each chain, the very one that was known where no quotient is worth its price.
+    """
+    finder = _Finder(problem, signals, moves, largest, unit)
+    best = list(known)
+    for number in range(ROUNDS):
+        candidates = implicit(problem, signals, best, moves=moves, largest=largest, unit=unit.part(number))
+        found = finder.best_of(best, candidates)
+        if all(new is old for new, old in zip(found, best, strict=True)):
+            break
+        best = finder.shared(found)
+    finder.price(best)
+    return best
+
+
+def renewed(
+    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
+) -> list[Sum]:
+    """The same sums with denominators refined on a problem's states, where that makes descriptions shorter.
+
+    Args and returns as `with_quotients`.
+    """
+    finder = _Finder(problem, signals, moves, largest, unit)
+    best = [finder.renewed(found) for found in known]
+    finder.price(best)
+    return best
+
+
+class _Finder:
+    """Searches among terms over denominators; each draws from the next part of the unit."""
+
+    def __init__(self, problem: Problem, signals: Signals, moves: int, largest: int, unit: Unit) -> None:
+        self.problem, self.pool, self.signals = problem, problem.pool, signals
+        self.moves, self.largest, self.unit = moves, largest, unit
+        self._searches = ROUNDS
+
+    def best_of(self, known: Sequence[Sum], candidates: Sequence[Sequence[Quotient]]) -> list[Sum]:
+        """For each chain what is known, or the best sum over one of its candidates if that is shorter."""
+        best = list(known)
+        for i, quotients in enumerate(candidates):
+            for candidate in quotients:
+                found = self._with(known[i], candidate)
+                if found is not None and shorter(found.energy, best[i].energy):
+                    best[i] = found
+        return best
+
+    def shared(self, known: Sequence[Sum]) -> list[Sum]:
+        """The same, or sums over a denominator that another chain has paid for."""
+        best = list(known)
+        for denominator in self._all(known):
+            for i, found in enumerate(best):
+                others = [other for j, other in enumerate(best) if j != i]
+                if self._split(found, denominator).above or denominator not in self._all(others):
+                    continue
+                alike = [own for own in self._all([found]) if _terms(own) == _terms(denominator)]
+                tried = [self._carried(found, own, denominator, 0.0) for own in alike]
+                tried.append(self._searched(found.chain, denominator, found))
+                best[i] = shortest([found, *tried], lambda sum_: sum_.energy)
+        return best
+
+    def renewed(self, known: Sum) -> Sum:
+        """A sum with its denominators refined."""
+        for own in self._all([known]):
+            there = refined(self.problem, known.chain, self._split(known, own))
+            new = self._carried(known, own, there, self._share(own, [known]))
+            known = new if shorter(new.energy, known.energy) else known
+        return known
+
+    def _carried(self, known: Sum, own: Denominator, there: Denominator, share: float) -> Sum:
+        """A sum whose terms over one denominator are over another; each pays a share of that, nats."""
+        lengths, terms = {}, []
+        for term in known.weights:
+            parts = quotient(self.pool, term)
+            if parts is not None and parts[1] == own:
+                term = over(self.pool, parts[0], there)
+                lengths[term] = self.pool.length(parts[0]) + CHOICE + share
+                self.pool.rungs.setdefault(term, RUNG)
+            terms.append(term)
+        return self._search(known.chain, terms, None, lengths, self.moves // OWN)
+
+    def price(self, sums: Sequence[Sum]) -> None:
+        """From now on each term over a denominator costs its share of that; what was only tried stands on no rung."""
+        used = {term for found in sums for term in found.weights}
+        for denominator in self._all(sums):
+            share = self._share(denominator, sums)
+            for term in used:
+                parts = quotient(self.pool, term)
+                if parts is not None and parts[1] == denominator:
+                    self.pool.found[term] = self.pool.length(parts[0]) + CHOICE + share
+        for term in [t for t in self.pool.rungs if t not in used and quotient(self.pool, t) is not None]:
+            if term not in self.pool.found:
+                del self.pool.rungs[term]
+
+    def _share(self, denominator: Denominator, sums: Sequence[Sum]) -> float:
+        """What a denominator costs each term over it, nats, where all of them pay the same."""
+        over_it = {
+            term: found.chain
+            for found in sums
+            for term in found.weights
+            if (parts := quotient(self.pool, term)) is not None and parts[1] == denominator
+        }
+        chain = next(iter(over_it.values()))
+        nodes, readings = [node for node, _ in denominator], self.problem.readings(chain)
+        return 0.5 * float(prices(self.pool, nodes, readings, 1).sum()) / len(over_it)
+
+    # Steps
+
+    def _with(self, known: Sum, candidate: Quotient) -> Sum | None:
+        """The best sum of plain terms and terms over a candidate's denominator, with what that costs."""
+        denominator = refined(self.problem, known.chain, candidate)
+        best: Sum | None = None
+        for _ in range(TURNS):
+            if not matters(self.problem, denominator):
+                break
+            # What is known may stand in for the quotient: at first it is left out.
+            own = [t for t in known.weights if best is not None or quotient(self.pool, t) is not None]
+            found = self._searched(known.chain if best is None else best.chain, denominator, best, own)
+            split = self._split(found, denominator)
+            if not split.above:
+                break
+            denominator = refined(self.problem, found.chain, split)
+            ratios = self._over([*split.plain, *split.above], denominator)
+            terms = [*split.plain, *split.above, *ratios]
+            again = self._search(found.chain, terms, None, ratios, self.moves // OWN)
+            again = self._paid(again, denominator)
+            if not matters(self.problem, denominator) or (best and not shorter(again.energy, best.energy)):
+                break
+            best = again
+        return best
+
+    def _searched(
+        self, chain: Chain, denominator: Denominator, known: Sum | None, extra: Sequence[int] = ()
+    ) -> Sum:
+        """The best sum among plain terms, those over a denominator, and some more; nothing is paid for that."""
+        lower = [node for node, _ in denominator]
+        own = [] if known is None else [p[0] for t in known.weights if (p := quotient(self.pool, t))]
+        ratios = self._over([*above(self.pool, self.signals, lower), *own], denominator)
+        terms = [*plain(self.pool, self.signals), *ratios, *extra]
+        return self._search(chain, terms, known, ratios, self.moves)
+
+    def _search(
+        self, chain: Chain, terms: Sequence[int], known: Sum | None, ratios: dict[int, float], moves: int
+    ) -> Sum:
+        self._searches += 1
+        (found,) = search(
+            self.problem, [chain], terms, [known],
+            moves=max(1, moves), starts=1, largest=self.largest, unit=self.unit.part(self._searches),
+            favoured=[ratios],
+        )  # fmt: skip
+        return found
+
+    def _over(self, terms: Sequence[int], denominator: Denominator) -> dict[int, float]:
+        """Terms over a denominator, with their description lengths where that is paid for."""
+        ratios = {over(self.pool, term, denominator): self.pool.length(term) + CHOICE for term in terms}
+        for node in ratios:
+            self.pool.rungs.setdefault(node, RUNG)
+        return ratios
+
+    def _paid(self, found: Sum, denominator: Denominator) -> Sum:
+        """A sum with the price of a denominator in its description, if it uses that."""
+        used = bool(self._split(found, denominator).above)
+        return replace(found, energy=found.energy + self._cost(denominator, found.chain) * used)
+
+    def _cost(self, denominator: Denominator, chain: Chain) -> float:
+        nodes = [node for node, _ in denominator]
+        readings = self.problem.readings(chain)
+        return float(prices(self.pool, nodes, readings, len(self.problem.runs)).sum())
+
+    def _split(self, found: Sum, denominator: Denominator) -> Quotient:
+        """A sum's terms over a denominator, without that, and all others."""
+        beside, over_it = [], []
+        for term in found.weights:
+            parts = quotient(self.pool, term)
+            if parts is not None and parts[1] == tuple(sorted(denominator)):
+                over_it.append(parts[0])
+            else:
+                beside.append(term)
+        return Quotient(tuple(beside), tuple(over_it), denominator)
+
+    def _all(self, sums: Sequence[Sum]) -> list[Denominator]:
+        return denominators(self.pool, (term for found in sums for term in found.weights))
+
+
+def _terms(denominator: Denominator) -> list[int]:
+    return [node for node, _ in denominator]

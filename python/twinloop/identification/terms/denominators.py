@@ -1,0 +1,97 @@
+"""Denominators: what terms may be divided by, 1 + Σ d φ, and the nodes of such quotients."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import combinations
+
+from twinloop.identification.terms.libraries import (
+    angles,
+    coordinates,
+    periodic,
+    quadratic,
+    rates,
+    trigonometric,
+)
+from twinloop.identification.terms.pool import Pool
+from twinloop.law.expressions import CONSTANT
+from twinloop.signals import Signals
+
+HIGHEST = 4
+"""Power of a state below the line at most: of Hill's law for four places that bind together."""
+
+Denominator = tuple[tuple[int, float], ...]
+"""Terms with their coefficients, all that is added to 1."""
+
+
+def below(pool: Pool, signals: Signals) -> list[int]:
+    """Terms of denominators: powers and products of states that are no rates, cosines of angles and their squares.
+
+    How a rigid body turns does not depend on its attitude: of its angles there are none.
+    """
+    moving = angles(signals) | rates(signals)
+    rest = [i for i in range(signals.n_x) if i not in moving]
+    found = [power_of(pool, i, power) for i in rest for power in range(1, HIGHEST + 1)]
+    found += [pool.product(i, j) for i, j in combinations(rest, 2)]
+    for i in sorted(angles(signals)) if signals.kinematics is None else ():
+        wave = pool.wave("cos", i, signals.states[i].period)
+        found += [wave, pool.product(wave, wave)]
+    return list(dict.fromkeys(found))
+
+
+def power_of(pool: Pool, node: int, power: int) -> int:
+    """The node of a whole power of a node."""
+    return pool.product(*[node] * power)
+
+
+def plain(pool: Pool, signals: Signals) -> list[int]:
+    """Terms that stand beside quotients: none of those that resemble one where the runs were, as roots do."""
+    terms = [pool.one, *coordinates(pool, signals), *quadratic(pool, signals)]
+    if not periodic(signals):
+        terms += trigonometric(pool, signals)
+    return list(dict.fromkeys(terms))
+
+
+def above(pool: Pool, signals: Signals, lower: Iterable[int]) -> list[int]:
+    """Terms above the line: what is plain, and each term of the denominator alone and times each input."""
+    inputs = coordinates(pool, signals)
+    products = (pool.product(i, term) for term in lower for i in inputs)
+    return list(dict.fromkeys([*plain(pool, signals), *lower, *products]))
+
+
+def over(pool: Pool, term: int, denominator: Denominator) -> int:
+    """The node of a term over 1 + Σ d φ.
+
+    It is written as 1 − Σ (−d) φ: so tuning leaves the 1 as it is, and every other constant has a value of its own.
+    """
+    total: int | None = None
+    for node, weight in denominator:
+        part = pool.add("*", node, pool.constant(-weight))
+        total = part if total is None else pool.add("+", total, part)
+    assert total is not None
+    return pool.add("/", term, pool.add("-", pool.one, total))
+
+
+def quotient(pool: Pool, number: int) -> tuple[int, Denominator] | None:
+    """What is above the line and what is below it, of a node that `over` has made; None for all others."""
+    operation, operands, _ = pool[number]
+    lower = pool[operands[1]] if operation == "/" else None
+    if lower is None or lower.operation != "-" or lower.operands[0] != pool.one:
+        return None
+    parts, waiting = [], [lower.operands[1]]
+    while waiting:
+        node = pool[waiting.pop()]
+        if node.operation == "+":
+            waiting += reversed(node.operands)
+            continue
+        constants = [i for i in node.operands if pool[i].operation == CONSTANT]
+        if node.operation != "*" or len(constants) != 1:
+            return None
+        (term,) = (i for i in node.operands if i != constants[0])
+        parts.append((term, -pool[constants[0]].value))
+    return operands[0], tuple(sorted(parts))
+
+
+def denominators(pool: Pool, terms: Iterable[int]) -> list[Denominator]:
+    """Of quotients among some terms, without repetition, in a fixed order."""
+    return sorted({parts[1] for term in terms if (parts := quotient(pool, term)) is not None})

@@ -1,0 +1,184 @@
+"""Quotients: slopes of readings, nodes over a denominator, their constants, and what a search finds among them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+import twinloop as tl
+from twinloop import _core
+from twinloop.identification.records import Run, guessed_noise, stages
+from twinloop.identification.search.implicit import Quotient
+from twinloop.identification.search.newton import refined
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.quotients import with_quotients
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.chains import chains
+from twinloop.identification.slopes import slopes
+from twinloop.identification.terms.denominators import denominators, over, quotient
+from twinloop.identification.terms.pool import Pool
+from twinloop.identification.terms.priors import Told
+from twinloop.law.actuation import Actuation
+from twinloop.streams import Unit
+
+WORKERS = _core.Workers(1)
+STEPS = 150
+
+
+def flown(slope, start, length, noise=0.0, seed=0):
+    """Readings of an autonomous law, integrated to rounding by somebody else."""
+    times = np.linspace(0.0, length, STEPS)
+    states = solve_ivp(
+        lambda t, x: slope(*x), times[[0, -1]], start, "DOP853", times, rtol=1e-13, atol=1e-13
+    ).y.T
+    return states + noise * states.std(axis=0) * np.random.default_rng(seed).standard_normal(states.shape)
+
+
+def signals_of(names, length):
+    return tl.Signals(
+        states=[tl.State(name, "1", 3.0) for name in names],
+        commands=[tl.Command("idle", "1", (0.0, 1.0))],
+        dt=length / (STEPS - 1),
+    )
+
+
+def problem_of(readings, signals):
+    """A problem, and its chains with the noise that readings seem to have."""
+    run = Run.of(readings, np.zeros((len(readings) - 1, 1)))
+    pool = Pool(signals.n_x + signals.n_u, 10)
+    inputs = stages([run], signals, Actuation.direct(signals))
+    noise = guessed_noise([run], np.ones(signals.n_x))
+    return Problem(pool, [run], inputs, signals.dt, WORKERS, Told({}, {})), chains(
+        signals, "acceleration", noise
+    )
+
+
+def saturating(s, p):
+    return [-1.5 * s / (0.8 + s), 1.5 * s / (0.8 + s) - 0.3 * p]
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3), st.integers(5, 60))
+def test_slopes_of_a_parabola_are_its_own(coefficients, count):
+    times = np.arange(count)
+    parabola = np.polynomial.Polynomial(coefficients)
+    found = slopes(parabola(times))
+    tolerance = 1e-8 * (1.0 + np.abs(parabola(times)).max())
+    assert np.allclose(found.at, parabola.deriv()(times), atol=tolerance)
+    assert np.allclose(found.between, parabola.deriv()(times[:-1] + 0.5), atol=tolerance)
+
+
+def test_slopes_of_noisy_readings_are_those_of_the_polynomial_that_foretells_them_best():
+    times = np.arange(80)
+    readings = np.sin(0.1 * times) + 0.03 * np.random.default_rng(1).standard_normal(80)
+    missed, slope = [], {}
+    for degree in (2, 4, 6):
+        for width in (w for w in (5, 7, 9, 13, 19, 27, 39) if w > degree + 1):
+            errors, slope[degree, width] = [], np.empty(80)
+            for i in times:
+                window = np.clip(i - width // 2, 0, 80 - width) + np.arange(width)
+                fit = np.polynomial.Polynomial.fit(window, readings[window], degree)
+                slope[degree, width][i] = fit.deriv()(i)
+                others = window[window != i]
+                errors.append(readings[i] - np.polynomial.Polynomial.fit(others, readings[others], degree)(i))
+            missed.append((np.mean(np.square(errors)), degree, width))
+    least, degree, width = min(missed)
+    found = slopes(readings)
+    assert found.missed == pytest.approx(least, rel=1e-6)
+    assert np.allclose(found.at, slope[degree, width], atol=1e-9)
+
+
+def test_too_few_readings_have_no_slope():
+    assert slopes(np.zeros(4)) is None
+
+
+WEIGHTS = st.floats(-3.0, 3.0).filter(lambda weight: abs(weight) > 1e-3)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 4), WEIGHTS), min_size=1, max_size=4, unique_by=lambda part: part[0])
+)
+def test_a_term_over_a_denominator_has_its_value_and_is_known_again(parts):
+    pool = Pool(2)
+    terms = [0, 1, pool.product(0, 0), pool.product(0, 1), pool.add("cos", 1)]
+    denominator = tuple((terms[place], weight) for place, weight in parts)
+    node = over(pool, terms[3], denominator)
+    x, y = rows = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 30))
+    of_terms = [x, y, x * x, x * y, np.cos(y)]
+    below = 1.0 + sum(weight * of_terms[place] for place, weight in parts)
+    with np.errstate(all="ignore"):
+        expected = np.where(np.abs(below) > 1e-6, x * y / below, x * y)
+    assert np.allclose(pool.values([node], rows.T)[:, 0], expected, rtol=1e-9)
+    assert quotient(pool, node) == (terms[3], tuple(sorted(denominator)))
+
+
+def test_other_nodes_are_no_quotients():
+    pool = Pool(2)
+    nodes = [0, pool.add("/", 0, 1), pool.add("/", 0, pool.add("-", pool.one, 1)), pool.product(0, 1)]
+    assert all(quotient(pool, node) is None for node in nodes)
+    assert denominators(pool, nodes) == []
+
+
+def test_constants_below_the_line_are_those_of_least_squares():
+    signals = signals_of("sp", 8.0)
+    readings = flown(saturating, (5.0, 0.2), 8.0, noise=0.01)
+    problem, (chain, _) = problem_of(readings, signals)
+    # A sensor with noise and nothing that disturbs: what is left is the sum of squares of the readings' errors.
+    chain = chain.with_noise(chain.sensors, (1e-12, 0.0, 1.0))
+    ((_, found),) = refined(problem, chain, Quotient((), (0,), ((0, 0.3),)))
+    start, middle, end = (problem.stages.start[:, 0], problem.stages.middle[:, 0], problem.stages.end[:, 0])
+
+    def errors(parameters):
+        first, weight, constant = parameters
+        steps = [s / (1.0 + constant * s) for s in (start, middle, end)]
+        moves = signals.dt / 6.0 * (steps[0] + 4.0 * steps[1] + steps[2])
+        return readings[:, 0] - first - weight * np.concatenate([[0.0], np.cumsum(moves)])
+
+    expected = least_squares(errors, [5.0, -1.0, 0.3], xtol=1e-12, ftol=1e-12).x[2]
+    assert found == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_denominator_that_two_chains_share_is_found_and_paid_for_once():
+    signals = signals_of("sp", 8.0)
+    problem, both = problem_of(flown(saturating, (5.0, 0.2), 8.0), signals)
+    pool = problem.pool
+    terms = [pool.one, 0, 1, pool.product(0, 0), pool.product(1, 1), pool.product(0, 1)]
+    problem.usable(terms)
+    plain = [_fitted(problem, chain, terms) for chain in both]
+    found = with_quotients(problem, signals, plain, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    shared = denominators(pool, [term for sum_ in found for term in sum_.weights])
+    assert len(shared) == 1
+    ((term, constant),) = shared[0]
+    assert term == 0
+    assert constant == pytest.approx(1.25, rel=1e-4)
+    assert all(new.energy < old.energy for new, old in zip(found, plain, strict=True))
+    quotients = [term for sum_ in found for term in sum_.weights if quotient(pool, term) is not None]
+    bare = pool.length(0)
+    assert all(bare < pool.length(term) for term in quotients)
+    # What the constant and its term cost, shared out to all that use them.
+    share = (0.5 * np.log(problem.readings(both[0])) + bare) / len(set(quotients))
+    for term in quotients:
+        over_it = pool.length(quotient(pool, term)[0])
+        assert pool.length(term) == pytest.approx(over_it + np.log(2.0) + share)
+
+
+def _fitted(problem, chain, terms):
+    """All of some terms, by least squares."""
+    gram = problem.regression(chain, terms).gram(chain.sensors, chain.motion, WORKERS)
+    weights, _, left = gram.solve(list(range(len(terms))), 1e-9)
+    return Sum(dict(zip(terms, weights.tolist(), strict=True)), left + 200.0, chain)
+
+
+def test_where_no_quotient_is_worth_its_price_sums_stay_the_very_same():
+    signals = signals_of("xy", 10.0)
+    readings = flown(
+        lambda x, y: [1.2 * x - 0.4 * x * y, 0.1 * x * y - 0.8 * y], (5.0, 2.0), 10.0, noise=0.01
+    )
+    problem, both = problem_of(readings, signals)
+    pool = problem.pool
+    product = pool.product(0, 1)
+    problem.usable([0, 1, product])
+    plain = [_fitted(problem, chain, [i, product]) for i, chain in enumerate(both)]
+    found = with_quotients(problem, signals, plain, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    assert all(new is old for new, old in zip(found, plain, strict=True))
