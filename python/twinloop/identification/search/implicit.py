@@ -31,13 +31,13 @@ TRIED = 3
 """Denominators of each chain that are refined, of all those that searches have come across."""
 NOISE_ROUNDS = 2
 """Times that the noise is estimated behind what a search has found."""
-POWERS = (2, 4)
-"""Powers of which denominators are also searched alone: together, powers of one state stand in for each other."""
+POWERS = ((1, 2), (2,), (4,))
+"""Powers of states to which denominators are also restricted: all together they stand in for each other."""
 NEAREST = 1e-3
 """Share of its largest value that a denominator has at least wherever the runs were."""
 VARIES = 1.25
 """Times that a denominator's largest value is its least at least: by less it is a series, and a plain term as good."""
-FEW_TERMS = 3
+FEW_TERMS = 2
 """Terms up to which a sum that leaves nothing but noise is believed: a quotient and its denominator are no fewer."""
 NOISE = 4.0
 """Times that the least noise which is believed may be there where nothing is left but noise."""
@@ -80,14 +80,14 @@ def implicit(
         np.concatenate([over_line, -driving(problem, sum_)[:, :, np.newaxis] * under], axis=2)
         for sum_ in sums
     ]
-    grams = _whitened(problem, sums, columns, costs, moves, largest, unit)
+    grams = whitened(problem, sums, columns, costs, moves, largest, unit)
     walks: list[list[tuple[list[int], float]]] = [[] for _ in sums]
     for number, mask in enumerate(_masks(pool, signals, lower), NOISE_ROUNDS):
         masked = [
             np.concatenate([cost[: len(upper)], np.where(mask, cost[len(upper) :], np.inf)]) for cost in costs
         ]
         for walked, more in zip(
-            walks, _walks(problem, grams, masked, moves, largest, unit.part(number)), strict=True
+            walks, walks_among(problem, grams, masked, moves, largest, unit.part(number)), strict=True
         ):
             walked += more
     for i, gram, walked in zip(posed, grams, walks, strict=True):
@@ -143,17 +143,16 @@ def matters(problem: Problem, denominator: Denominator) -> bool:
 
 def _masks(pool: Pool, signals: Signals, lower: Sequence[int]) -> list[Floats]:
     """Which terms a denominator may have: all of them, or those of one power."""
-    every = np.ones(len(lower), dtype=bool)
-    masks = [every]
-    for power in POWERS:
-        powers = {power_of(pool, i, power) for i in range(signals.n_x)}
+    masks: list[Floats] = [np.ones(len(lower), dtype=bool)]
+    for allowed in POWERS:
+        powers = {power_of(pool, i, power) for i in range(signals.n_x) for power in allowed}
         mask = np.array([term in powers for term in lower])
         if mask.any():
             masks.append(mask)
     return masks
 
 
-def _whitened(
+def whitened(
     problem: Problem,
     sums: Sequence[Sum],
     columns: Sequence[Columns],
@@ -162,7 +161,17 @@ def _whitened(
     largest: int,
     unit: Unit,
 ) -> list[_core.Gram]:
-    """Inner products of each chain's columns, under the noise that is left behind what a search finds among them."""
+    """Inner products of each chain's columns, under the noise that is left behind what a search finds among them.
+
+    Args:
+        problem: of the chains.
+        sums: the best so far, with their chains.
+        columns: features of each chain (3, rows, p).
+        costs: of each chain's features (p,).
+        moves: of each search over subsets.
+        largest: number of features at most.
+        unit: of work.
+    """
     regressions = [problem.regression_on(sum_.chain, own) for sum_, own in zip(sums, columns, strict=True)]
     chains: list[Chain] = [sum_.chain for sum_ in sums]
     for round_ in range(NOISE_ROUNDS + 1):
@@ -172,7 +181,7 @@ def _whitened(
         ]
         if round_ == NOISE_ROUNDS:
             break
-        walks = _walks(problem, grams, costs, moves, largest, unit.part(round_))
+        walks = walks_among(problem, grams, costs, moves, largest, unit.part(round_))
         posed = []
         for regression, gram, walked, chain in zip(regressions, grams, walks, chains, strict=True):
             coefficients = np.zeros(gram.features)
@@ -190,7 +199,7 @@ def _whitened(
     return grams
 
 
-def _walks(
+def walks_among(
     problem: Problem,
     grams: Sequence[_core.Gram],
     costs: Sequence[Floats],
@@ -198,6 +207,7 @@ def _walks(
     largest: int,
     unit: Unit,
 ) -> list[list[tuple[list[int], float]]]:
+    """Subsets of each chain's columns with their energies, the best first."""
     with engine_input():
         return _core.search_subsets(
             grams, costs, moves=moves, largest=largest, starts=1, unit=unit.named("subsets"),

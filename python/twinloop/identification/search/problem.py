@@ -81,12 +81,14 @@ class Problem:
         """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
         return self.regression_on(chain, self.values(terms))
 
-    def regression_on(self, chain: Chain, columns: Columns) -> _core.Regression:
-        """Of one chain on features that need not be terms (3, rows, p)."""
+    def regression_on(self, chain: Chain, columns: Columns, taken: Columns | None = None) -> _core.Regression:
+        """Of one chain on features that need not be terms (3, rows, p), where others are taken to be what they are."""
         known = self.usable(self.told.fixed.get(chain.states[0], ()))
         readings = [run.states[:, list(chain.states)] for run in self.runs]
         if known:
             readings = self._of(chain, self.values(known), readings).residuals(np.ones(len(known)))
+        if taken is not None:
+            readings = self._of(chain, taken, readings).residuals(np.ones(taken.shape[2]))
         return self._of(chain, columns, readings)
 
     def _of(self, chain: Chain, columns: Columns, readings: Sequence[Floats]) -> _core.Regression:

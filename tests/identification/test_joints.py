@@ -1,0 +1,139 @@
+"""Joints that share their masses: nodes that solve equations together, and the search for them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+import twinloop as tl
+from twinloop import _core
+from twinloop.identification.records import Run, guessed_noise, stages
+from twinloop.identification.search.joints import with_joints
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.chains import chains
+from twinloop.identification.terms.joints import forces, masses, solution
+from twinloop.identification.terms.pool import Pool
+from twinloop.identification.terms.priors import Told
+from twinloop.law.actuation import Actuation
+from twinloop.streams import Unit
+
+WORKERS = _core.Workers(1)
+WEIGHT = st.floats(-0.2, 0.2)
+
+
+@given(st.data(), st.integers(1, 4))
+def test_nodes_of_a_solution_are_those_of_numpy(data, count):
+    pool = Pool(3)
+    rows = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 3))
+    entry = st.dictionaries(st.sampled_from([0, 1, 2, pool.one]), WEIGHT, max_size=2)
+    matrix = data.draw(
+        st.lists(st.lists(entry, min_size=count, max_size=count), min_size=count, max_size=count)
+    )
+    right = data.draw(st.lists(entry, min_size=count, max_size=count))
+
+    def value(terms):
+        return sum((w * pool.values([term], rows)[:, 0] for term, w in terms.items()), np.zeros(20))
+
+    below = np.array(
+        [[value(terms) + float(i == j) for j, terms in enumerate(row)] for i, row in enumerate(matrix)]
+    )
+    expected = np.linalg.solve(
+        below.transpose(2, 0, 1), np.array([value(terms) for terms in right]).T[:, :, None]
+    )
+    for i, node in enumerate(solution(pool, matrix, right)):
+        found = 0.0 if node is None else node[1] * pool.values([node[0]], rows)[:, 0]
+        assert np.allclose(found, expected[:, i, 0], atol=1e-9)
+
+
+def test_a_one_on_the_diagonal_is_no_constant_that_tuning_moves():
+    pool = Pool(2)
+    ((node, _),) = solution(pool, [[{0: 0.5}]], [{1: 2.0}])
+    free = [pool[held] for held in pool.held([node]) if held != pool.one]
+    assert len(free) == 2
+
+
+def cart(x, v, a, w):
+    """A pendulum on a cart, solved by somebody else from the equations as textbooks write them."""
+    inertia = np.array([[1.5, 0.3 * np.cos(a)], [0.3 * np.cos(a), 0.18]])
+    push = np.array([0.3 * w * w * np.sin(a) - 0.4 * v, -0.3 * 9.81 * np.sin(a)])
+    return [v, *np.linalg.solve(inertia, push)[:1], w, *np.linalg.solve(inertia, push)[1:]]
+
+
+def apart(x, v, a, w):
+    """A pendulum beside a cart on a spring."""
+    return [v, -2.0 * x - 0.4 * v, w, -16.0 * np.sin(a) - 0.1 * w]
+
+
+def posed(slope, noise):
+    length, steps = 4.0, 150
+    times = np.linspace(0.0, length, steps)
+    states = solve_ivp(
+        lambda t, s: slope(*s), times[[0, -1]], (0.0, 0.5, 2.2, 0.0), "DOP853", times, rtol=1e-12, atol=1e-12
+    ).y.T
+    readings = states + noise * states.std(axis=0) * np.random.default_rng(0).standard_normal(states.shape)
+    signals = tl.Signals(
+        states=[
+            tl.State("x", "m", 1.0),
+            tl.State("v", "m/s", 2.0, derivative_of="x"),
+            tl.State("a", "rad", 2.0),
+            tl.State("w", "rad/s", 8.0, derivative_of="a"),
+        ],
+        commands=[tl.Command("idle", "1", (0.0, 1.0))],
+        dt=length / (steps - 1),
+    )
+    run = Run.of(readings, np.zeros((steps - 1, 1)))
+    pool = Pool(5, 10)
+    inputs = stages([run], signals, Actuation.direct(signals))
+    problem = Problem(pool, [run], inputs, signals.dt, WORKERS, Told({}, {}))
+    terms = [pool.one, 0, 1, 2, 3, pool.add("sin", 2)]
+    problem.usable(terms)
+    known = []
+    for chain in chains(signals, "acceleration", guessed_noise([run], np.ones(4))):
+        chain = chain.with_noise(chain.sensors, (1.0, 0.0, 1.0))
+        gram = problem.regression(chain, terms).gram(chain.sensors, chain.motion, WORKERS)
+        weights, _, left = gram.solve(list(range(len(terms))), 1e-9)
+        known.append(Sum(dict(zip(terms, weights.tolist(), strict=True)), left + 200.0, chain))
+    return problem, signals, known, states
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_the_masses_of_a_cart_and_its_pendulum_are_found(noise):
+    problem, signals, known, states = posed(cart, noise)
+    found = with_joints(problem, signals, known, moves=25_000, largest=16, unit=Unit(0, (1,)))
+    assert all(new is not old for new, old in zip(found, known, strict=True))
+    rows = np.random.default_rng(3).uniform(states.min(axis=0), states.max(axis=0), (50, 4))
+    truth = np.array([cart(*row) for row in rows])[:, [1, 3]]
+    inputs = np.column_stack([rows, np.zeros(50)])
+    for column, sum_ in enumerate(found):
+        ((node, weight),) = sum_.weights.items()
+        missed = weight * problem.pool.values([node], inputs)[:, 0] - truth[:, column]
+        # Simpson's rule leaves half a percent of so fast a swing.
+        assert np.sqrt(np.square(missed).mean()) < (0.01 if noise == 0.0 else 0.05) * truth[:, column].std()
+
+
+def test_joints_that_share_no_mass_stay_apart():
+    problem, signals, known, _ = posed(apart, 0.01)
+    found = with_joints(problem, signals, known, moves=25_000, largest=16, unit=Unit(0, (1,)))
+    assert all(new is old for new, old in zip(found, known, strict=True))
+
+
+def test_where_no_rates_are_declared_there_are_no_joints():
+    problem, signals, known, _ = posed(cart, 0.0)
+    bare = tl.Signals(
+        states=[tl.State(name, "1", 1.0) for name in signals.state_names],
+        commands=[tl.Command("idle", "1", (0.0, 1.0))],
+        dt=signals.dt,
+    )
+    alone = [replace(found, chain=replace(found.chain, states=found.chain.states[:1])) for found in known]
+    assert with_joints(problem, bare, alone, moves=100, largest=4, unit=Unit(0, (1,))) == alone
+
+
+def test_terms_of_joints_are_entered_once():
+    problem, signals, _, _ = posed(cart, 0.0)
+    for terms in (forces(problem.pool, signals), masses(problem.pool, signals)):
+        assert len(terms) == len(set(terms))
+        assert problem.usable(terms) == terms
