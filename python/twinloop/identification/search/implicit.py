@@ -68,7 +68,7 @@ def implicit(
     pool = problem.pool
     lower = problem.usable(below(pool, signals))
     found: list[list[Quotient]] = [[] for _ in known]
-    posed = [i for i, sum_ in enumerate(known) if not _explained(problem, sum_)]
+    posed = [i for i, sum_ in enumerate(known) if not (bounded(problem, sum_) or _explained(problem, sum_))]
     if not lower or not posed:
         return found
     own = [term for sum_ in known for term in sum_.weights if quotient(pool, term) is not None]
@@ -94,6 +94,11 @@ def implicit(
         subsets = sorted(walked, key=lambda answer: answer[1])
         found[i] = _quotients(problem, gram, [subset for subset, _ in subsets], upper, lower)
     return found
+
+
+def bounded(problem: Problem, found: Sum) -> bool:
+    """Whether coefficients of a chain's terms have bounds, which a term over a denominator would evade."""
+    return found.chain.states[0] in problem.told.bounds
 
 
 def _explained(problem: Problem, found: Sum) -> bool:

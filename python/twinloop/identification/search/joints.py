@@ -19,7 +19,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.elementary import log
 from twinloop.identification.search.description import shorter
-from twinloop.identification.search.implicit import NEAREST, driving, walks_among, whitened
+from twinloop.identification.search.implicit import NEAREST, bounded, driving, walks_among, whitened
 from twinloop.identification.search.problem import Columns, Problem
 from twinloop.identification.search.structure import Sum, prices, search
 from twinloop.identification.terms.joints import forces, masses, solution
@@ -27,6 +27,8 @@ from twinloop.identification.terms.libraries import angles
 from twinloop.signals import Signals
 from twinloop.streams import Unit
 
+FIRST = 2000
+"""Number of the first unit of work within a search's own, of which others have lower ones."""
 FEWEST, MOST = 2, 4
 """Joints that may share their masses."""
 STEPS = 12
@@ -61,7 +63,8 @@ def with_joints(
     """
     joints = [i for i, found in enumerate(known) if found.chain.integrated and len(found.chain.states) > 1]
     turning = sorted(angles(signals))
-    if not (FEWEST <= len(joints) <= MOST and turning) or signals.kinematics is not None:
+    free = signals.kinematics is None and not any(_told(problem, known[i]) for i in joints)
+    if not (free and turning and FEWEST <= len(joints) <= MOST):
         return list(known)
     finder = _Joints(problem, signals, [known[i] for i in joints], moves, largest, unit)
     found = finder.found()
@@ -72,6 +75,11 @@ def with_joints(
         for i, sum_ in zip(joints, found, strict=True):
             best[i] = sum_
     return best
+
+
+def _told(problem: Problem, found: Sum) -> bool:
+    """Whether anything is known of a chain's terms beforehand."""
+    return bounded(problem, found) or found.chain.states[0] in problem.told.fixed
 
 
 class _Joints:
@@ -101,9 +109,9 @@ class _Joints:
         costs = [self._costs(sum_, of_joint) for sum_, of_joint in zip(self.known, pairs, strict=True)]
         columns = [self._columns(of_joint, accelerations) for of_joint in pairs]
         grams = whitened(
-            self.problem, self.known, columns, costs, self.moves, self.largest, self.unit.part(0)
+            self.problem, self.known, columns, costs, self.moves, self.largest, self.unit.part(FIRST)
         )
-        walks = walks_among(self.problem, grams, costs, self.moves, self.largest, self.unit.part(1))
+        walks = walks_among(self.problem, grams, costs, self.moves, self.largest, self.unit.part(FIRST + 1))
         subsets = [list(walked[0][0]) for walked in walks]
         parts = [
             _thinned(gram, subset, cost) for gram, subset, cost in zip(grams, subsets, costs, strict=True)
@@ -188,7 +196,7 @@ class _Joints:
         matrix = [[equation.of_joint(j) for j in range(count)] for equation in equations]
         nodes = solution(self.pool, matrix, [equation.terms for equation in equations])
         found = []
-        for number, (node, sum_, cost) in enumerate(zip(nodes, self.known, costs, strict=True), 2):
+        for number, (node, sum_, cost) in enumerate(zip(nodes, self.known, costs, strict=True), FIRST + 2):
             readings = self.problem.readings(sum_.chain)
             if node is None or not self.problem.usable([node[0]]):
                 return None

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from twinloop.elementary import log
 from twinloop.identification.search.description import shorter, shortest
-from twinloop.identification.search.implicit import Quotient, implicit, matters
+from twinloop.identification.search.implicit import Quotient, bounded, implicit, matters
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, prices, search
@@ -29,6 +29,8 @@ from twinloop.identification.terms.denominators import (
 from twinloop.signals import Signals
 from twinloop.streams import Unit
 
+FIRST = 1000
+"""Number of the first unit of work within a search's own, which has lower ones for itself."""
 ROUNDS = 2
 """Denominators of one sum at most."""
 TURNS = 2
@@ -60,7 +62,9 @@ def with_quotients(
     finder = _Finder(problem, signals, moves, largest, unit)
     best = list(known)
     for number in range(ROUNDS):
-        candidates = implicit(problem, signals, best, moves=moves, largest=largest, unit=unit.part(number))
+        candidates = implicit(
+            problem, signals, best, moves=moves, largest=largest, unit=unit.part(FIRST + number)
+        )
         found = finder.best_of(best, candidates)
         if all(new is old for new, old in zip(found, best, strict=True)):
             break
@@ -88,7 +92,7 @@ class _Finder:
     def __init__(self, problem: Problem, signals: Signals, moves: int, largest: int, unit: Unit) -> None:
         self.problem, self.pool, self.signals = problem, problem.pool, signals
         self.moves, self.largest, self.unit = moves, largest, unit
-        self._searches = ROUNDS
+        self._searches = FIRST + ROUNDS
 
     def best_of(self, known: Sequence[Sum], candidates: Sequence[Sequence[Quotient]]) -> list[Sum]:
         """For each chain what is known, or the best sum over one of its candidates if that is shorter."""
@@ -106,10 +110,11 @@ class _Finder:
         for denominator in self._all(known):
             for i, found in enumerate(best):
                 others = [other for j, other in enumerate(best) if j != i]
-                if self._split(found, denominator).above or denominator not in self._all(others):
+                own = bool(self._split(found, denominator).above) or bounded(self.problem, found)
+                if own or denominator not in self._all(others):
                     continue
-                alike = [own for own in self._all([found]) if _terms(own) == _terms(denominator)]
-                tried = [self._carried(found, own, denominator, 0.0) for own in alike]
+                alike = [each for each in self._all([found]) if _terms(each) == _terms(denominator)]
+                tried = [self._carried(found, each, denominator, 0.0) for each in alike]
                 tried.append(self._searched(found.chain, denominator, found))
                 best[i] = shortest([found, *tried], lambda sum_: sum_.energy)
         return best
