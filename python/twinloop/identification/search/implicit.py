@@ -68,7 +68,7 @@ def implicit(
     pool = problem.pool
     lower = problem.usable(below(pool, signals))
     found: list[list[Quotient]] = [[] for _ in known]
-    posed = [i for i, sum_ in enumerate(known) if not (bounded(problem, sum_) or _explained(problem, sum_))]
+    posed = [i for i, sum_ in enumerate(known) if not explained(problem, sum_)]
     if not lower or not posed:
         return found
     own = [term for sum_ in known for term in sum_.weights if quotient(pool, term) is not None]
@@ -101,10 +101,10 @@ def bounded(problem: Problem, found: Sum) -> bool:
     return found.chain.states[0] in problem.told.bounds
 
 
-def _explained(problem: Problem, found: Sum) -> bool:
-    """Whether few terms leave nothing but the noise of sensors."""
+def explained(problem: Problem, found: Sum) -> bool:
+    """Whether few terms leave nothing but the noise of sensors, or a chain is to have no quotients."""
     chain = found.chain
-    if len(found.weights) < 2:
+    if len(found.weights) < 2 or bounded(problem, found):
         return True
     _, slow = floor_of(chain, problem.dt, problem.integration(chain))
     still = chain.motion[0] <= NOISE * slow[0] and chain.motion[1] <= NOISE * slow[1]

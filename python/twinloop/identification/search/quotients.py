@@ -16,6 +16,7 @@ from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.implicit import Quotient, bounded, implicit, matters
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum, prices, search
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.denominators import (
@@ -62,9 +63,23 @@ def with_quotients(
     finder = _Finder(problem, signals, moves, largest, unit)
     best = list(known)
     for number in range(ROUNDS):
-        candidates = implicit(
-            problem, signals, best, moves=moves, largest=largest, unit=unit.part(FIRST + number)
-        )
+        candidates = [
+            [*first, *second]
+            for first, second in zip(
+                *(
+                    look(
+                        problem,
+                        signals,
+                        best,
+                        moves=moves,
+                        largest=largest,
+                        unit=unit.part(FIRST + 2 * number + i),
+                    )
+                    for i, look in enumerate((implicit, saturations))
+                ),
+                strict=True,
+            )
+        ]
         found = finder.best_of(best, candidates)
         if all(new is old for new, old in zip(found, best, strict=True)):
             break
@@ -92,7 +107,7 @@ class _Finder:
     def __init__(self, problem: Problem, signals: Signals, moves: int, largest: int, unit: Unit) -> None:
         self.problem, self.pool, self.signals = problem, problem.pool, signals
         self.moves, self.largest, self.unit = moves, largest, unit
-        self._searches = FIRST + ROUNDS
+        self._searches = FIRST + 2 * ROUNDS
 
     def best_of(self, known: Sequence[Sum], candidates: Sequence[Sequence[Quotient]]) -> list[Sum]:
         """For each chain what is known, or the best sum over one of its candidates if that is shorter."""
