@@ -39,8 +39,8 @@ VARIES = 1.25
 """Times that a denominator's largest value is its least at least: by less it is a series, and a plain term as good."""
 FEW_TERMS = 2
 """Terms up to which a sum that leaves nothing but noise is believed: a quotient and its denominator are no fewer."""
-NOISE = 4.0
-"""Times that the least noise which is believed may be there where nothing is left but noise."""
+NOISE = 100.0
+"""Times that the least disturbance which is believed may be there where nothing is left but noise."""
 
 
 @dataclass(frozen=True)
@@ -211,11 +211,12 @@ def walks_among(
     moves: int,
     largest: int,
     unit: Unit,
+    starts: int = 1,
 ) -> list[list[tuple[list[int], float]]]:
     """Subsets of each chain's columns with their energies, the best first."""
     with engine_input():
         return _core.search_subsets(
-            grams, costs, moves=moves, largest=largest, starts=1, unit=unit.named("subsets"),
+            grams, costs, moves=moves, largest=largest, starts=starts, unit=unit.named("subsets"),
             workers=problem.workers,
         )  # fmt: skip
 

@@ -19,9 +19,16 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.elementary import log
 from twinloop.identification.search.description import shorter
-from twinloop.identification.search.implicit import NEAREST, bounded, driving, walks_among, whitened
+from twinloop.identification.search.implicit import (
+    NEAREST,
+    NOISE_ROUNDS,
+    bounded,
+    driving,
+    walks_among,
+    whitened,
+)
 from twinloop.identification.search.problem import Columns, Problem
-from twinloop.identification.search.structure import Sum, prices, search
+from twinloop.identification.search.structure import Sum, prices, search, total
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.libraries import angles
 from twinloop.signals import Signals
@@ -31,6 +38,10 @@ FIRST = 2000
 """Number of the first unit of work within a search's own, of which others have lower ones."""
 FEWEST, MOST = 2, 4
 """Joints that may share their masses."""
+TURNS = 2
+"""How often equations are searched, the second time with the accelerations that the first ones give."""
+STARTS = 3
+"""Walks among the terms of each equation."""
 STEPS = 12
 """Steps of Gauss and Newton, joint by joint."""
 LEAST = 100
@@ -69,9 +80,7 @@ def with_joints(
     finder = _Joints(problem, signals, [known[i] for i in joints], moves, largest, unit)
     found = finder.found()
     best = list(known)
-    if found is not None and shorter(
-        sum(sum_.energy for sum_ in found), sum(known[i].energy for i in joints)
-    ):
+    if found is not None and shorter(total(found), total([known[i] for i in joints])):
         for i, sum_ in zip(joints, found, strict=True):
             best[i] = sum_
     return best
@@ -95,8 +104,19 @@ class _Joints:
         self.over, self.under = problem.values(self.forces), problem.values(self.masses)
 
     def found(self) -> list[Sum] | None:
-        """Sums of one node each; None where no acceleration stands in another's equation."""
-        accelerations = [driving(self.problem, sum_) for sum_ in self.known]
+        """Sums of one node each; None where no acceleration stands in another's equation.
+
+        What one turn has found gives the accelerations of the next one.
+        """
+        best: list[Sum] | None = None
+        for turn in range(TURNS):
+            sums = self._turn(self.known if best is None else best, self.unit.part(FIRST + turn))
+            if sums is not None and (best is None or shorter(total(sums), total(best))):
+                best = sums
+        return best
+
+    def _turn(self, known: Sequence[Sum], unit: Unit) -> list[Sum] | None:
+        accelerations = [driving(self.problem, sum_) for sum_ in known]
         pairs = [
             [
                 (j, term)
@@ -108,10 +128,10 @@ class _Joints:
         ]
         costs = [self._costs(sum_, of_joint) for sum_, of_joint in zip(self.known, pairs, strict=True)]
         columns = [self._columns(of_joint, accelerations) for of_joint in pairs]
-        grams = whitened(
-            self.problem, self.known, columns, costs, self.moves, self.largest, self.unit.part(FIRST)
+        grams = whitened(self.problem, known, columns, costs, self.moves, self.largest, unit)
+        walks = walks_among(
+            self.problem, grams, costs, self.moves, self.largest, unit.part(NOISE_ROUNDS), STARTS
         )
-        walks = walks_among(self.problem, grams, costs, self.moves, self.largest, self.unit.part(FIRST + 1))
         subsets = [list(walked[0][0]) for walked in walks]
         parts = [
             _thinned(gram, subset, cost) for gram, subset, cost in zip(grams, subsets, costs, strict=True)
@@ -196,7 +216,9 @@ class _Joints:
         matrix = [[equation.of_joint(j) for j in range(count)] for equation in equations]
         nodes = solution(self.pool, matrix, [equation.terms for equation in equations])
         found = []
-        for number, (node, sum_, cost) in enumerate(zip(nodes, self.known, costs, strict=True), FIRST + 2):
+        for number, (node, sum_, cost) in enumerate(
+            zip(nodes, self.known, costs, strict=True), FIRST + TURNS
+        ):
             readings = self.problem.readings(sum_.chain)
             if node is None or not self.problem.usable([node[0]]):
                 return None

@@ -34,6 +34,8 @@ FIRST = 1000
 """Number of the first unit of work within a search's own, which has lower ones for itself."""
 ROUNDS = 2
 """Denominators of one sum at most."""
+WORTH = 20.0
+"""What a new denominator must gain, in units of χ², beside its price: as much as a rung of the ladder."""
 TURNS = 2
 """How often the terms over a denominator are chosen, and its constants refined behind them."""
 OWN = 10
@@ -115,7 +117,8 @@ class _Finder:
         for i, quotients in enumerate(candidates):
             for candidate in quotients:
                 found = self._with(known[i], candidate)
-                if found is not None and shorter(found.energy, best[i].energy):
+                worth = found is not None and shorter(found.energy + WORTH, known[i].energy)
+                if found is not None and worth and shorter(found.energy, best[i].energy):
                     best[i] = found
         return best
 
