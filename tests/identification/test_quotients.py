@@ -1,5 +1,7 @@
 """Quotients: slopes of readings, nodes over a denominator, their constants, and what a search finds among them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,13 +11,16 @@ from scipy.optimize import least_squares
 
 import twinloop as tl
 from twinloop import _core
+from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise, stages
 from twinloop.identification.search.implicit import Quotient
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import with_quotients
+from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import chains
+from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.slopes import slopes
 from twinloop.identification.terms.denominators import denominators, over, quotient
 from twinloop.identification.terms.pool import Pool
@@ -145,14 +150,14 @@ def test_a_denominator_that_two_chains_share_is_found_and_paid_for_once():
     pool = problem.pool
     terms = [pool.one, 0, 1, pool.product(0, 0), pool.product(1, 1), pool.product(0, 1)]
     problem.usable(terms)
-    plain = [_fitted(problem, chain, terms) for chain in both]
-    found = with_quotients(problem, signals, plain, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    known = [_fitted(problem, chain, terms) for chain in both]
+    found = with_quotients(problem, signals, known, moves=12_500, largest=16, unit=Unit(0, (1,)))
     shared = denominators(pool, [term for sum_ in found for term in sum_.weights])
     assert len(shared) == 1
     ((term, constant),) = shared[0]
     assert term == 0
     assert constant == pytest.approx(1.25, rel=1e-4)
-    assert all(new.energy < old.energy for new, old in zip(found, plain, strict=True))
+    assert all(new.energy < old.energy for new, old in zip(found, known, strict=True))
     quotients = [term for sum_ in found for term in sum_.weights if quotient(pool, term) is not None]
     bare = pool.length(0)
     assert all(bare < pool.length(term) for term in quotients)
@@ -179,6 +184,39 @@ def test_where_no_quotient_is_worth_its_price_sums_stay_the_very_same():
     pool = problem.pool
     product = pool.product(0, 1)
     problem.usable([0, 1, product])
-    plain = [_fitted(problem, chain, [i, product]) for i, chain in enumerate(both)]
-    found = with_quotients(problem, signals, plain, moves=12_500, largest=16, unit=Unit(0, (1,)))
-    assert all(new is old for new, old in zip(found, plain, strict=True))
+    known = [_fitted(problem, chain, [i, product]) for i, chain in enumerate(both)]
+    found = with_quotients(problem, signals, known, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    assert all(new is old for new, old in zip(found, known, strict=True))
+
+
+def ring(x, y, z):
+    return [4.0 / (1.0 + z**4) - x, 4.0 / (1.0 + x**4) - y, 4.0 / (1.0 + y**4) - z]
+
+
+def test_which_state_saturates_shows_behind_noise():
+    signals = signals_of("xyz", 15.0)
+    problem, every = problem_of(flown(ring, (0.2, 1.0, 2.0), 15.0, noise=0.01), signals)
+    terms = [problem.pool.one, 0, 1, 2, *(problem.pool.product(i, j) for i, j in ((0, 0), (1, 1), (2, 2)))]
+    problem.usable(terms)
+    known = [_fitted(problem, chain.with_noise(chain.sensors, (1e-2, 0.0, 1.0)), terms) for chain in every]
+    found = saturations(problem, signals, known, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    for repressor, quotients in zip((2, 0, 1), found, strict=True):
+        steep = {problem.pool.product(*[repressor] * power) for power in (2, 4)}
+        assert steep & {candidate.denominator[0][0] for candidate in quotients}
+
+
+def test_a_twin_of_noisy_readings_has_the_quotient_and_no_other_one():
+    signals = signals_of("s", 6.0)
+    readings = flown(lambda s: [-1.5 * s / (0.8 + s)], (5.0,), 6.0, noise=0.01)
+    run = Run.of(readings, np.zeros((STEPS - 1, 1)))
+    options = IdentificationOptions(form="acceleration", committee_size=2, parts=False)
+    found = identify_runs([run], signals, options, workers=WORKERS)
+    (sum_,) = found.sums
+    (term,) = sum_.weights
+    over_it, ((under, _),) = quotient(found.pool, term)
+    assert (over_it, under) == (0, 0)
+    states = np.array([0.1, 1.0, 4.0, 9.0])
+    slope = found.model.program.run(np.column_stack([states, np.zeros(4)]))[:, 0]
+    assert np.allclose(slope, -1.5 * states / (0.8 + states), rtol=0.03)
+    bare = identify_runs([run], signals, replace(options, implicit=False), workers=WORKERS)
+    assert denominators(bare.pool, [term for sum_ in bare.sums for term in sum_.weights]) == []
