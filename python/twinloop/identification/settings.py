@@ -47,6 +47,8 @@ class IdentificationOptions:
         noise_from_above: whether the noise is also searched from the largest that could be, so that the strongest terms
             come first, rather than only from what all terms together leave.
         gusts: whether disturbances may last, as gusts do, rather than be white.
+        implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
+            masses.
         lags: whether lags and delays of the actuators are searched.
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are where a lag may stand in.
         hidden: whether a hidden state that commands fill and that fades, such as a climb or heat, is searched.
@@ -77,6 +79,7 @@ class IdentificationOptions:
     most_terms: int = 450
     noise_from_above: bool = True
     gusts: bool = True
+    implicit: bool = True
     lags: bool = True
     longest_delay: int = 2
     hidden: bool = True

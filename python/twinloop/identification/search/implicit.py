@@ -37,6 +37,8 @@ NEAREST = 1e-3
 """Share of its largest value that a denominator has at least wherever the runs were."""
 VARIES = 1.25
 """Times that a denominator's largest value is its least at least: by less it is a series, and a plain term as good."""
+LARGE = 100.0
+"""What a denominator's least value is below: beside more its 1 is nothing, and a term over it one of the ladder's."""
 FEW_TERMS = 2
 """Terms up to which a sum that leaves nothing but noise is believed: a quotient and its denominator are no fewer."""
 NOISE = 100.0
@@ -143,7 +145,7 @@ def matters(problem: Problem, denominator: Denominator) -> bool:
     values = problem.values([node for node, _ in denominator])
     total = 1.0 + (values * np.array([weight for _, weight in denominator])).sum(axis=2)
     least, most = float(total.min()), float(total.max())
-    return least > NEAREST * most and most > VARIES * least
+    return least > NEAREST * most and most > VARIES * least and least < LARGE
 
 
 def _masks(pool: Pool, signals: Signals, lower: Sequence[int]) -> list[Floats]:

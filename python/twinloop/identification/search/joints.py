@@ -45,7 +45,9 @@ STARTS = 3
 STEPS = 12
 """Steps of Gauss and Newton, joint by joint."""
 LEAST = 100
-"""Moves of a search among one term, which has nothing to choose."""
+"""Moves of a search among next to no terms."""
+WORTH = 20.0
+"""What equations must gain together, in units of χ², beside their price: as much as a rung of the ladder."""
 RIDGE = 1e-12
 """Added to the columns' unit lengths."""
 
@@ -80,7 +82,7 @@ def with_joints(
     finder = _Joints(problem, signals, [known[i] for i in joints], moves, largest, unit)
     found = finder.found()
     best = list(known)
-    if found is not None and shorter(total(found), total([known[i] for i in joints])):
+    if found is not None and shorter(total(found) + WORTH, finder.judged(found)):
         for i, sum_ in zip(joints, found, strict=True):
             best[i] = sum_
     return best
@@ -114,6 +116,17 @@ class _Joints:
             if sums is not None and (best is None or shorter(total(sums), total(best))):
                 best = sums
         return best
+
+    def judged(self, found: Sequence[Sum]) -> float:
+        """Description length of the known sums, each under the noise of a found one if it is shorter there."""
+        length = 0.0
+        for number, (known, new) in enumerate(zip(self.known, found, strict=True), FIRST + TURNS + MOST):
+            (again,) = search(
+                self.problem, [new.chain], list(known.weights), [None], moves=LEAST, starts=1,
+                largest=self.largest, unit=self.unit.part(number),
+            )  # fmt: skip
+            length += min(known.energy, again.energy)
+        return length
 
     def _turn(self, known: Sequence[Sum], unit: Unit) -> list[Sum] | None:
         accelerations = [driving(self.problem, sum_) for sum_ in known]

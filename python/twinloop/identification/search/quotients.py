@@ -19,6 +19,7 @@ from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum, prices, search
 from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.noise import calm
 from twinloop.identification.terms.denominators import (
     Denominator,
     above,
@@ -117,8 +118,9 @@ class _Finder:
         for i, quotients in enumerate(candidates):
             for candidate in quotients:
                 found = self._with(known[i], candidate)
-                worth = found is not None and shorter(found.energy + WORTH, known[i].energy)
-                if found is not None and worth and shorter(found.energy, best[i].energy):
+                if found is None or not shorter(found.energy, best[i].energy):
+                    continue
+                if shorter(found.energy + WORTH, self._judged(known[i], found.chain)):
                     best[i] = found
         return best
 
@@ -144,6 +146,16 @@ class _Finder:
             new = self._carried(known, own, there, self._share(own, [known]))
             known = new if shorter(new.energy, known.energy) else known
         return known
+
+    def _judged(self, known: Sum, chain: Chain) -> float:
+        """Description length of a known sum, under another sum's noise or next to none if it is shorter there.
+
+        Noise that was taken for too large hides in a disturbance what terms explain as well, whichever they are.
+        """
+        noises = (chain, calm(self.problem, known.chain))
+        terms = list(known.weights)
+        again = [self._search(noise, terms, None, {}, self.moves // OWN).energy for noise in noises]
+        return min(known.energy, *again)
 
     def _carried(self, known: Sum, own: Denominator, there: Denominator, share: float) -> Sum:
         """A sum whose terms over one denominator are over another; each pays a share of that, nats."""

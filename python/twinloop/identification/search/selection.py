@@ -12,6 +12,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.description import shorter, shortest
+from twinloop.identification.search.implicit_laws import implicit_laws
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.sensors.chains import Chain
@@ -126,7 +127,22 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
                 largest=options.largest, unit=_next_unit(context, climber),
             )  # fmt: skip
             climber = climber.searched(sums)
-    return climber
+    return _with_implicit_laws(context, climber, inputs, brief)
+
+
+def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages, again: bool) -> Hypothesis:
+    """The hypothesis with quotients and shared masses, where they pay; the very same where they do not."""
+    options = context.options
+    # Where forms are compared, increments get none: a period of any law resembles a quotient.
+    compared = context.as_integrated and hypothesis.form != "acceleration"
+    if not (options.implicit and options.libraries) or compared:
+        return hypothesis
+    grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
+    sums = implicit_laws(
+        posed(context, grown, inputs), context.signals, grown.sums,
+        again=again, moves=options.moves // 2, largest=options.largest, unit=_next_unit(context, grown),
+    )  # fmt: skip
+    return hypothesis if sums is None else grown.searched(sums)
 
 
 def undisturbed(context: Context, hypothesis: Hypothesis) -> Hypothesis:
