@@ -151,7 +151,7 @@ def test_a_denominator_that_two_chains_share_is_found_and_paid_for_once():
     terms = [pool.one, 0, 1, pool.product(0, 0), pool.product(1, 1), pool.product(0, 1)]
     problem.usable(terms)
     known = [_fitted(problem, chain, terms) for chain in both]
-    found = with_quotients(problem, signals, known, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    found = with_quotients(problem, signals, known, (), moves=12_500, largest=16, unit=Unit(0, (1,)))
     shared = denominators(pool, [term for sum_ in found for term in sum_.weights])
     assert len(shared) == 1
     ((term, constant),) = shared[0]
@@ -185,7 +185,7 @@ def test_where_no_quotient_is_worth_its_price_sums_stay_the_very_same():
     product = pool.product(0, 1)
     problem.usable([0, 1, product])
     known = [_fitted(problem, chain, [i, product]) for i, chain in enumerate(both)]
-    found = with_quotients(problem, signals, known, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    found = with_quotients(problem, signals, known, (), moves=12_500, largest=16, unit=Unit(0, (1,)))
     assert all(new is old for new, old in zip(found, known, strict=True))
 
 

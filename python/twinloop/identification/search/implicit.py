@@ -188,7 +188,7 @@ def whitened(
         ]
         if round_ == NOISE_ROUNDS:
             break
-        walks = walks_among(problem, grams, costs, moves, largest, unit.part(round_))
+        walks = walks_among(problem, grams, costs, max(1, moves // 2), largest, unit.part(round_))
         posed = []
         for regression, gram, walked, chain in zip(regressions, grams, walks, chains, strict=True):
             coefficients = np.zeros(gram.features)

@@ -16,6 +16,7 @@ def implicit_laws(
     problem: Problem,
     signals: Signals,
     known: Sequence[Sum],
+    terms: Sequence[int],
     *,
     again: bool,
     moves: int,
@@ -28,6 +29,7 @@ def implicit_laws(
         problem: of all chains; new expressions are entered in its pool.
         signals: of the system.
         known: the best sum of each chain so far, with its noise.
+        terms: of the ladder.
         again: whether quotients were searched before, on states that were not smoothed: those that there are get new
             constants, and no others are looked for.
         moves: of each search over subsets.
@@ -38,6 +40,8 @@ def implicit_laws(
         A sum for each chain; None where none of them is another one.
     """
     coupled = with_joints(problem, signals, known, moves=moves, largest=largest, unit=unit)
-    divided = renewed if again else with_quotients
-    found = divided(problem, signals, coupled, moves=moves, largest=largest, unit=unit)
+    if again:
+        found = renewed(problem, signals, coupled, moves=moves, largest=largest, unit=unit)
+    else:
+        found = with_quotients(problem, signals, coupled, terms, moves=moves, largest=largest, unit=unit)
     return None if all(new is old for new, old in zip(found, known, strict=True)) else found

@@ -19,7 +19,6 @@ from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum, prices, search
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.sensors.noise import calm
 from twinloop.identification.terms.denominators import (
     Denominator,
     above,
@@ -48,7 +47,14 @@ RUNG = 0
 
 
 def with_quotients(
-    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
+    problem: Problem,
+    signals: Signals,
+    known: Sequence[Sum],
+    terms: Sequence[int],
+    *,
+    moves: int,
+    largest: int,
+    unit: Unit,
 ) -> list[Sum]:
     """The best sums with quotients among their terms, where these make descriptions shorter.
 
@@ -56,6 +62,7 @@ def with_quotients(
         problem: of all chains; new expressions are entered in its pool.
         signals: of the system.
         known: the best sum of each chain so far, with its noise.
+        terms: of the ladder, which quotients must be shorter than.
         moves: of each search over subsets.
         largest: number of terms of a sum at most.
         unit: of work.
@@ -63,7 +70,7 @@ def with_quotients(
     Returns:
         A sum for each chain, the very one that was known where no quotient is worth its price.
     """
-    finder = _Finder(problem, signals, moves, largest, unit)
+    finder = _Finder(problem, signals, terms, moves, largest, unit)
     best = list(known)
     for number in range(ROUNDS):
         candidates = [
@@ -96,9 +103,9 @@ def renewed(
 ) -> list[Sum]:
     """The same sums with denominators refined on a problem's states, where that makes descriptions shorter.
 
-    Args and returns as `with_quotients`.
+    Args and returns as those of `with_quotients`.
     """
-    finder = _Finder(problem, signals, moves, largest, unit)
+    finder = _Finder(problem, signals, (), moves, largest, unit)
     best = [finder.renewed(found) for found in known]
     finder.price(best)
     return best
@@ -107,8 +114,10 @@ def renewed(
 class _Finder:
     """Searches among terms over denominators; each draws from the next part of the unit."""
 
-    def __init__(self, problem: Problem, signals: Signals, moves: int, largest: int, unit: Unit) -> None:
-        self.problem, self.pool, self.signals = problem, problem.pool, signals
+    def __init__(
+        self, problem: Problem, signals: Signals, terms: Sequence[int], moves: int, largest: int, unit: Unit
+    ) -> None:
+        self.problem, self.pool, self.signals, self.terms = problem, problem.pool, signals, terms
         self.moves, self.largest, self.unit = moves, largest, unit
         self._searches = FIRST + 2 * ROUNDS
 
@@ -120,8 +129,11 @@ class _Finder:
                 found = self._with(known[i], candidate)
                 if found is None or not shorter(found.energy, best[i].energy):
                     continue
-                if shorter(found.energy + WORTH, self._judged(known[i], found.chain)):
+                rival = self._rival(known[i], found.chain)
+                if shorter(found.energy + WORTH, rival.energy):
                     best[i] = found
+                elif shorter(rival.energy, best[i].energy):
+                    best[i] = rival
         return best
 
     def shared(self, known: Sequence[Sum]) -> list[Sum]:
@@ -147,15 +159,15 @@ class _Finder:
             known = new if shorter(new.energy, known.energy) else known
         return known
 
-    def _judged(self, known: Sum, chain: Chain) -> float:
-        """Description length of a known sum, under another sum's noise or next to none if it is shorter there.
+    def _rival(self, known: Sum, chain: Chain) -> Sum:
+        """What terms of the ladder make of a chain under the noise of a quotient, or what is known if it is shorter.
 
         Noise that was taken for too large hides in a disturbance what terms explain as well, whichever they are.
         """
-        noises = (chain, calm(self.problem, known.chain))
-        terms = list(known.weights)
-        again = [self._search(noise, terms, None, {}, self.moves // OWN).energy for noise in noises]
-        return min(known.energy, *again)
+        terms = [*self.terms, *known.weights]
+        tried = [self._search(chain, terms, None, {}, self.moves)]
+        tried.append(self._search(chain, list(known.weights), None, {}, self.moves // OWN))
+        return shortest([known, *tried], lambda found: found.energy)
 
     def _carried(self, known: Sum, own: Denominator, there: Denominator, share: float) -> Sum:
         """A sum whose terms over one denominator are over another; each pays a share of that, nats."""

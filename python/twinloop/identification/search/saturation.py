@@ -58,7 +58,7 @@ def saturations(
         )
         costs.append(cost)
     grams = whitened(problem, sums, [features] * len(sums), costs, moves, largest, unit)
-    walks = walks_among(problem, grams, costs, moves, largest, unit.part(NOISE_ROUNDS))
+    walks = walks_among(problem, grams, costs, max(1, moves // 2), largest, unit.part(NOISE_ROUNDS))
     for i, walked in zip(posed, walks, strict=True):
         seen: dict[int, Quotient] = {}
         for subset, _ in walked:

@@ -139,7 +139,7 @@ def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages
         return hypothesis
     grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
     sums = implicit_laws(
-        posed(context, grown, inputs), context.signals, grown.sums,
+        posed(context, grown, inputs), context.signals, grown.sums, grown.candidates.ladder[-1],
         again=again, moves=options.moves // 2, largest=options.largest, unit=_next_unit(context, grown),
     )  # fmt: skip
     return hypothesis if sums is None else grown.searched(sums)
