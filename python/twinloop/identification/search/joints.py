@@ -40,6 +40,8 @@ FEWEST, MOST = 2, 4
 """Joints that may share their masses."""
 TURNS = 2
 """How often equations are searched, the second time with the accelerations that the first ones give."""
+LIKELY = 5
+"""Subsets of a short walk, the best ones, that tell whether joints may share a mass."""
 STARTS = 3
 """Walks among the terms of each equation."""
 STEPS = 12
@@ -113,7 +115,9 @@ class _Joints:
         best: list[Sum] | None = None
         for turn in range(TURNS):
             sums = self._turn(self.known if best is None else best, self.unit.part(FIRST + turn))
-            if sums is not None and (best is None or shorter(total(sums), total(best))):
+            if sums is None:
+                break
+            if best is None or shorter(total(sums), total(best)):
                 best = sums
         return best
 
@@ -141,6 +145,8 @@ class _Joints:
         ]
         costs = [self._costs(sum_, of_joint) for sum_, of_joint in zip(self.known, pairs, strict=True)]
         columns = [self._columns(of_joint, accelerations) for of_joint in pairs]
+        if not self._looks(known, columns, costs, pairs, unit.part(NOISE_ROUNDS + 1)):
+            return None
         grams = whitened(self.problem, known, columns, costs, self.moves, self.largest, unit)
         walks = walks_among(
             self.problem, grams, costs, self.moves, self.largest, unit.part(NOISE_ROUNDS), STARTS
@@ -150,14 +156,39 @@ class _Joints:
             _thinned(gram, subset, cost) for gram, subset, cost in zip(grams, subsets, costs, strict=True)
         ]
         subsets, weights = [subset for subset, _ in parts], [np.array(own) for _, own in parts]
-        if not any(
-            j != i for i, own in enumerate(pairs) for j, _ in _named(own, subsets[i], len(self.forces))
-        ):
+        if not any(self._couples(i, subset, pairs[i]) for i, subset in enumerate(subsets)):
             return None
         equations = self._descended(subsets, weights, pairs)
         if equations is None:
             return None
         return self._sums(equations, [float(c[s].sum()) for c, s in zip(costs, subsets, strict=True)])
+
+    def _looks(
+        self,
+        known: Sequence[Sum],
+        columns: Sequence[Columns],
+        costs: Sequence[Floats],
+        pairs: Sequence[_Pairs],
+        unit: Unit,
+    ) -> bool:
+        """Whether one short walk under the noise that is known comes upon a shared mass: without, no more is spent."""
+        grams = [
+            self.problem.regression_on(found.chain, own).gram(
+                found.chain.sensors, found.chain.motion, self.problem.workers
+            )
+            for found, own in zip(known, columns, strict=True)
+        ]
+        walks = walks_among(self.problem, grams, costs, max(1, self.moves // 2), self.largest, unit)
+        return any(
+            self._couples(i, subset, pairs[i])
+            for i, walked in enumerate(walks)
+            for subset, _ in walked[:LIKELY]
+        )
+
+    def _couples(self, joint: int, subset: Sequence[int], pairs: _Pairs) -> bool:
+        """Whether another joint's acceleration is among some columns of a joint's equation."""
+        places = (place - len(self.forces) for place in subset)
+        return any(pairs[place][0] != joint for place in places if place >= 0)
 
     def _descended(
         self, subsets: Sequence[Sequence[int]], weights: list[Floats], pairs: Sequence[_Pairs]
@@ -243,11 +274,6 @@ class _Joints:
             )  # fmt: skip
             found.append(best)
         return found
-
-
-def _named(pairs: _Pairs, subset: Sequence[int], forces_: int) -> list[tuple[int, int]]:
-    """Joints with the terms before their accelerations, of a subset of columns."""
-    return [pairs[place - forces_] for place in subset if place >= forces_]
 
 
 def _thinned(gram: _core.Gram, subset: Sequence[int], costs: Floats) -> tuple[list[int], list[float]]:
