@@ -35,6 +35,8 @@ def parts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     whole, found = hypothesis, []
     for number, (run, begins) in enumerate(cut(whole.runs[0], context.signals, whole.actuation), PARTS):
         brief = context.brief([run])
+        # Of so little, anything resembles a quotient.
+        brief = replace(brief, options=replace(brief.options, implicit=False))
         part = begun(brief, whole.form, whole.pool.copy(), number)
         part = climbed(brief, from_both_sides(brief, replace(part, actuation=begins)))
         whole = replace(whole, candidates=replace(whole.candidates, pool=part.pool))

@@ -35,7 +35,7 @@ POWERS = ((1, 2), (2,), (4,))
 """Powers of states to which denominators are also restricted: all together they stand in for each other."""
 NEAREST = 1e-3
 """Share of its largest value that a denominator has at least wherever the runs were."""
-VARIES = 1.25
+VARIES = 1.5
 """Times that a denominator's largest value is its least at least: by less it is a series, and a plain term as good."""
 LARGE = 100.0
 """What a denominator's least value is below: beside more its 1 is nothing, and a term over it one of the ladder's."""
@@ -89,7 +89,9 @@ def implicit(
             np.concatenate([cost[: len(upper)], np.where(mask, cost[len(upper) :], np.inf)]) for cost in costs
         ]
         for walked, more in zip(
-            walks, walks_among(problem, grams, masked, moves, largest, unit.part(number)), strict=True
+            walks,
+            walks_among(problem, grams, masked, max(1, moves // 2), largest, unit.part(number)),
+            strict=True,
         ):
             walked += more
     for i, gram, walked in zip(posed, grams, walks, strict=True):

@@ -229,6 +229,8 @@ class _Finder:
             if not matters(self.problem, denominator) or (best and not shorter(again.energy, best.energy)):
                 break
             best = again
+            if not shorter(best.energy, known.energy + WORTH):
+                break  # as long as that it will hardly become the shorter one
         return best
 
     def _searched(
