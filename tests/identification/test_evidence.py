@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, Evidence, price, strongest
+from twinloop.identification.evidence import HIDING, LAGGING, LASTING, STEPPING, Evidence, price, strongest
 from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -68,7 +68,8 @@ def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
     ],
 )
 def test_what_is_there_beside_terms_is_paid_for(form, actuation, expected):
-    assert price(form, actuation) == expected
+    assert price(form, actuation, 0) == expected
+    assert price(form, actuation, 2) == expected + 2 * LASTING
 
 
 def test_rounding_alone_decides_nothing():

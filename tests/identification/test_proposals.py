@@ -66,6 +66,7 @@ def test_no_proposal_changes_what_it_is_given_and_each_gives_the_same_again(cont
         proposed += [propose.__name__] * bool(once)
         found = decided(found, once)
     assert found.best.evidence.stage == (True, True, True, True)
+    proposed = [name for name in proposed if name != "calm"]
     assert proposed == (["lags", "terms", "second_look"] + ["parts"] * (len(context.runs) == 1)) or (
         proposed == ["lags", "hidden", "terms", "second_look"] and found.best.actuation.hidden
     )

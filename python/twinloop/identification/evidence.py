@@ -13,6 +13,8 @@ LAGGING = 12.0
 """What a lag or a delay must gain in description length: its number, and the choice of having one."""
 HIDING = 30.0
 """What a hidden state must gain: its time, its kind, and what a search may find by luck."""
+LASTING = 16.0
+"""What a disturbance that lasts must gain, each: its size, its memory, and the choice of having one."""
 STEPPING = 12.0
 """What increments must gain: a law of a step holds for that step alone."""
 
@@ -71,12 +73,18 @@ def strongest(hypotheses: Iterable[Hypotheses]) -> Hypotheses:
     return best
 
 
-def price(form: str, actuation: Actuation) -> float:
+def price(form: str, actuation: Actuation, lasting: int) -> float:
     """What a hypothesis pays for besides its terms, in units of χ².
 
     Args:
         form: what its outputs mean.
         actuation: between commands and its law.
+        lasting: how many disturbances that last.
     """
     lagging = not all(actuator.direct for actuator in actuation.actuators)
-    return STEPPING * (form == "increment") + LAGGING * lagging + HIDING * bool(actuation.hidden)
+    return (
+        STEPPING * (form == "increment")
+        + LAGGING * lagging
+        + HIDING * bool(actuation.hidden)
+        + LASTING * lasting
+    )

@@ -95,7 +95,8 @@ class Hypothesis:
     def evidence(self) -> Evidence:
         """What the readings say for it."""
         lasts = self.fit is None or self.fit.lasts
-        length = self.length + price(self.form, self.actuation)
+        lasting = sum(found.chain.motion[1] > 0.0 for found in self.sums)
+        length = self.length + price(self.form, self.actuation, lasting)
         return Evidence(self.aligned, self.fit is not None, lasts, self.smoothed, length)
 
     def searched(self, sums: Sequence[Sum]) -> Hypothesis:

@@ -19,6 +19,7 @@ from twinloop.identification.fit.committee import committee
 from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
+from twinloop.identification.proposals.calm import calm
 from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
 from twinloop.identification.proposals.parts import parts
@@ -34,7 +35,7 @@ from twinloop.streams import Unit
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
-PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, second_look, parts)
+PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, second_look, parts, calm)
 """In the order in which they are made."""
 
 

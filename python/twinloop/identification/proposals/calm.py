@@ -1,0 +1,53 @@
+"""A calmer world: disturbances that last have to pay for themselves, as terms do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.errors import engine_input
+from twinloop.identification.context import Context
+from twinloop.identification.evidence import LASTING
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import posed
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.noise import floor_of
+
+
+def calm(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The hypothesis without the lasting disturbances that explain less than they cost, fitted again.
+
+    What is left of a law that is right is white. A disturbance that may have any size and any memory explains a little
+    of that by luck, and the noise under which the readings are most likely nearly always holds one.
+    """
+    if hypothesis.fit is None or not hypothesis.fit.lasts:
+        return
+    problem = posed(context, hypothesis)
+    sums = tuple(_calmed(problem, found) for found in hypothesis.sums)
+    if all(new is old for new, old in zip(sums, hypothesis.sums, strict=True)):
+        return
+    yield fitted(context, replace(hypothesis, sums=sums, fit=None))
+
+
+def _calmed(problem: Problem, found: Sum) -> Sum:
+    """The sum with the most likely noise that does not last; itself where noise that lasts pays."""
+    chain = found.chain
+    if chain.motion[1] == 0.0:
+        return found
+    regression = problem.regression(chain, problem.usable(list(found.weights)))
+    weights = np.array(list(found.weights.values()))
+    before = regression.likelihood(weights, chain.sensors, chain.motion)
+    white = (chain.motion[0], 0.0, chain.motion[2])
+    floor = floor_of(chain, problem.dt, problem.integration(chain))
+    with engine_input():
+        ((sensors, motion, after),) = _core.most_likely_noises(
+            [(regression, weights, chain.sensors, white, *floor)], problem.workers
+        )
+    if after - before > LASTING:
+        return found
+    return replace(found, energy=found.energy + after - before, chain=chain.with_noise(sensors, motion))
