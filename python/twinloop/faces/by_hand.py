@@ -65,9 +65,7 @@ def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | N
 def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json: bool) -> None:
     """Alternatives: those that wait, and as many more as are missing."""
     if other:
-        raise InvalidInput(
-            "twinloop ask: expected --batch alone, found --last or --again beside it; leave one out."
-        )
+        raise InvalidInput("ask: expected --batch alone, found --last or --again beside it; leave one out.")
     with closing(_campaign(store, threads)) as campaign:
         if not campaign.experiments:
             raise InvalidInput(
@@ -106,11 +104,9 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
 def tell(store: str, test: int, flight: Path | None, failed: str | None, aborted: str | None) -> None:
     """Tell what happened to a TEST: a FLIGHT as CSV or .npz, or why there is none."""
     if failed is not None and aborted is not None:
-        raise InvalidInput("twinloop tell: expected --failed or --aborted, found both; leave one out.")
+        raise InvalidInput("tell: expected --failed or --aborted, found both; leave one out.")
     if failed is None and flight is None:
-        raise InvalidInput(
-            "twinloop tell: expected a flight, found none; name its file, or say --failed REASON."
-        )
+        raise InvalidInput("tell: expected a flight, found none; name its file, or say --failed REASON.")
     with closing(_campaign(store)) as campaign:
         if failed is not None:
             asked = tell_failed(campaign, test, failed, flight)
@@ -183,6 +179,6 @@ def _first(store: str) -> dict[str, float]:
     if file is None or not file.exists():
         where = "a campaign file beside the store" if file is None else str(file)
         raise NotAvailable(
-            f"twinloop ask: expected the gains of the first test in {where}, found no such file; add it."
+            f"ask: expected the gains of the first test in {where}, found no such file; add it."
         )
     return dict(read_file(file).first)

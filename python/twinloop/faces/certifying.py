@@ -65,7 +65,7 @@ def _parameter_files(found: Certificate, autopilot: Autopilot | None) -> dict[st
         return {}
     if found.old is None:
         raise InvalidInput(
-            "twinloop certify: expected a flight under gains that can be restored, found none; tell one, or leave"
+            "certify: expected a flight under gains that can be restored, found none; tell one, or leave"
             " --autopilot out."
         )
     suffix = autopilot.suffix

@@ -226,7 +226,7 @@ def _refuse_beside_a_file(context: click.Context) -> None:
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
             option = f"--{SPELT.get(name, name.replace('_', '-'))}"
             raise InvalidInput(
-                f"twinloop run: expected {option} in the campaign file, found it beside it; write it there."
+                f"run: expected {option} in the campaign file, found it beside it; write it there."
             )
 
 

@@ -61,9 +61,7 @@ def identify(
     FILE.toml says dt, states and commands, as for a campaign; [options] counts, and other sections need not be there.
     """
     if not logs:
-        raise InvalidInput(
-            "twinloop identify: expected at least one log, found none; name CSV or .npz files."
-        )
+        raise InvalidInput("identify: expected at least one log, found none; name CSV or .npz files.")
     for path, suffix in ((output, ".json"), (report, ".html")):
         if path is not None:
             check_writable(path, [suffix])

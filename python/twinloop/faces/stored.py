@@ -52,7 +52,7 @@ def resume(
         wanted = held.experiments if experiments is None else experiments
         if wanted is None:
             raise InvalidInput(
-                "twinloop resume: expected --experiments N for a campaign that was flown by hand so far, found none;"
+                "resume: expected --experiments N for a campaign that was flown by hand so far, found none;"
                 " say how many runs there shall be in all."
             )
         context.exit(run_file(file, store, held.name, wanted, threads, output, plot, as_json))
@@ -137,7 +137,7 @@ def _system(held: Kept) -> Quadrotor:
     kind = None if held.system is None else held.system["kind"]
     if kind not in BUILT_IN:
         raise NotAvailable(
-            "twinloop resume: expected a campaign that flies a built-in system, or a campaign"
+            "resume: expected a campaign that flies a built-in system, or a campaign"
             " file beside the store that names one, found neither; write [system] into that file, fly"
             " yourself with twinloop ask, or go on from Python with the same arguments and store=."
         )
