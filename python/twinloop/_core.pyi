@@ -36,6 +36,7 @@ __all__ = [
     "Family",
     "Flights",
     "Gram",
+    "HoldBack",
     "Grammar",
     "Limits",
     "LookAhead",

@@ -191,7 +191,7 @@ fn case() -> impl Strategy<Value = Case> {
 }
 
 fn near(found: f64, expected: f64, scale: f64) -> bool {
-    (found - expected).abs() < 1e-7 * (scale + expected.abs())
+    (found - expected).abs() <= 1e-7 * (scale + expected.abs())
 }
 
 proptest! {
