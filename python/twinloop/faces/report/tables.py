@@ -307,16 +307,18 @@ def ranges(found: Examination) -> Table:
     """What was flown: where the twin's word holds."""
     runs = [run.trajectory for run in found.experiments]
     rows: list[list[object]] = []
-    of_states = [(state.name, state.unit) for state in found.signals.states]
-    of_commands = [(command.name, command.unit) for command in found.signals.commands]
+    of_states = [(state.name, *shown_unit(state.unit)) for state in found.signals.states]
+    # Commands keep their units, as in the figures: a rotor's speed is no angle.
+    of_commands = [(command.name, 1.0, command.unit or "1") for command in found.signals.commands]
     for signals, values in (
         (of_states, [run.states for run in runs]),
         (of_commands, [run.commands for run in runs]),
     ):
         every = np.concatenate(values)
-        for (name, unit), low, high in zip(signals, every.min(axis=0), every.max(axis=0), strict=True):
-            factor, shown = shown_unit(unit)
-            rows.append([words(name), shown, factor * float(low), factor * float(high)])
+        for (name, factor, unit), low, high in zip(
+            signals, every.min(axis=0), every.max(axis=0), strict=True
+        ):
+            rows.append([words(name), unit, factor * float(low), factor * float(high)])
     note = "Of all flights together. Beyond, the twin goes on from its equations, and nobody has looked."
     return _table("ranges", "The range that was flown", ["signal", "unit", "from", "to"], rows, note)
 
