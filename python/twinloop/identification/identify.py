@@ -9,7 +9,7 @@ the model has smoothed, and what parts of the only run have taught. What the sea
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -106,7 +106,9 @@ def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
     several = [found.best, *proposed]
     best = strongest(several)
     others = (other for other in several[1:] if other is not best and other.evidence.lasts)
-    return Found(best, (*found.rivals, *others))
+    # What is drawn from here on is nothing that one of those that are not believed has drawn.
+    drawn = max(other.searches for other in several if other.start == best.start)
+    return Found(replace(best, searches=drawn), (*found.rivals, *others))
 
 
 def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identified:
