@@ -6,9 +6,9 @@ import pytest
 from rich.console import Console
 
 from twinloop.campaign.history import Progress
-from twinloop.campaign.identify_and_plan.method import STEPS as DONE
 from twinloop.campaign.presets import options_of
-from twinloop.faces.console import STEPS, StepEstimate, Watch
+from twinloop.faces.console import USUAL, StepEstimate, Watch
+from twinloop.steps import STEPS
 
 
 def progress(phase, told, tests=(), errors=()):
@@ -27,23 +27,35 @@ def flown(experiments):
 
 
 def test_every_step_of_the_preset_has_words_and_a_share():
-    assert tuple(STEPS) == tuple(DONE)
+    assert tuple(USUAL) == STEPS
 
 
 def test_the_time_left_of_default_is_right_where_steps_take_their_usual_share(monkeypatch):
     clock = [0.0]
     monkeypatch.setattr("twinloop.faces.console.time.monotonic", lambda: clock[0])
     estimate = StepEstimate(experiments=3)
-    whole = sum(STEPS[p.phase][1] * (1 + p.told) for p in flown(3) if p.phase in STEPS)
+    whole = sum(USUAL[p.phase][1] * (1 + p.told) for p in flown(3) if p.phase in STEPS)
     told = []
     for now in flown(3):
         left = estimate.remaining(now)
         if left is not None:
             told.append((clock[0], left))
-        clock[0] += STEPS[now.phase][1] * (1 + now.told) if now.phase in STEPS else 0.0
+        clock[0] += USUAL[now.phase][1] * (1 + now.told) if now.phase in STEPS else 0.0
     assert len(told) > 20
     for moment, left in told:
         assert moment + left == pytest.approx(whole)
+
+
+def test_steps_that_were_passed_over_are_expected_no_more(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("twinloop.faces.console.time.monotonic", lambda: clock[0])
+    estimate, seen = StepEstimate(experiments=2), ("noise", "terms")
+    for step in seen:
+        estimate.remaining(progress(step, 1))
+        clock[0] += 2.0 * USUAL[step][1]
+    left = estimate.remaining(progress("candidates", 1))
+    steps = [*seen, "candidates"]
+    assert left == pytest.approx(2.0 * USUAL["candidates"][1] + 3.0 * sum(USUAL[s][1] for s in steps[:-1]))
 
 
 def test_nothing_is_said_of_the_time_left_before_anything_is_known():
@@ -67,5 +79,11 @@ def test_the_table_on_a_terminal_names_the_step_and_the_errors():
     screen = Console(file=io.StringIO(), width=120)
     screen.print(watch._now())
     shown = screen.file.getvalue()
-    for words in ("quadrotor", "2 of 4", "4 of 10, selecting terms", "closed loop", "2e-05"):
+    for words in (
+        "quadrotor",
+        "2 of 4",
+        f"{STEPS.index('terms') + 1} of {len(STEPS)}, selecting terms",
+        "closed loop",
+        "2e-05",
+    ):
         assert words in shown

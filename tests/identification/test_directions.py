@@ -36,7 +36,7 @@ def machine(count, outputs=1):
 def problem_of(pool, rows, fixed=None):
     """As much of a problem as directions are read from."""
     stages = SimpleNamespace(start=rows)
-    return SimpleNamespace(pool=pool, stages=stages, told=SimpleNamespace(fixed=fixed or {}, bounds={}))
+    return SimpleNamespace(pool=pool, stages=stages, priors=SimpleNamespace(fixed=fixed or {}, bounds={}))
 
 
 def driven(signals, count):

@@ -10,8 +10,10 @@ from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
 LENGTHS = st.one_of(st.floats(-1e4, 1e4), st.sampled_from([0.0, 0.5 * TIE, 2.0 * TIE, -0.5 * TIE]))
-EVIDENCE = st.builds(Evidence, st.booleans(), st.booleans(), st.booleans(), st.booleans(), LENGTHS)
+EVIDENCE = st.builds(Evidence, st.booleans(), st.booleans(), st.booleans(), LENGTHS)
 AT_ONCE, LATE = Actuation((Actuator(), Actuator())), Actuation((Actuator(), Actuator(0.1, 0, None)))
+BOTH_LATE = Actuation((Actuator(0.1), Actuator(0.1)))
+APART, TOGETHER = ((0,), (1,)), ((0, 1),)
 CLIMB = (HiddenState((0, 1), True, None, 2.0),)
 
 
@@ -39,7 +41,7 @@ def test_nobody_beats_the_strongest_and_it_is_the_first_of_its_kind(several):
 
 
 def evidence(length=0.0, **changes):
-    known = {"aligned": True, "fitted": True, "lasts": True, "smoothed": False, "length": length}
+    known = {"fitted": True, "lasts": True, "smoothed": False, "length": length}
     return Evidence(**{**known, **changes})
 
 
@@ -68,8 +70,14 @@ def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
     ],
 )
 def test_what_is_there_beside_terms_is_paid_for(form, actuation, expected):
-    assert price(form, actuation, 0) == expected
-    assert price(form, actuation, 2) == expected + 2 * LASTING
+    assert price(form, actuation, APART, 0) == expected
+    assert price(form, actuation, APART, 2) == expected + 2 * LASTING
+
+
+def test_each_group_of_commands_that_lags_pays_and_commands_of_one_group_pay_once():
+    assert price("acceleration", BOTH_LATE, APART, 0) == 2 * LAGGING
+    assert price("acceleration", BOTH_LATE, TOGETHER, 0) == LAGGING
+    assert price("acceleration", LATE, TOGETHER, 0) == LAGGING
 
 
 def test_rounding_alone_decides_nothing():

@@ -402,6 +402,27 @@ def test_a_lag_of_the_actuator_is_found():
     assert terms[0] == pytest.approx(-0.8, rel=0.1) and terms[1] == pytest.approx(3.0, rel=0.1)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_of_two_groups_of_commands_only_the_one_that_lags_is_believed_to(seed):
+    dt, lag = 0.02, 0.06
+    stream, runs = np.random.default_rng(seed), []
+    commands = [tl.Command("heat", "W", (0.0, 4.0), scale=2.0), tl.Command("u", "V", (-2.0, 2.0), scale=1.0)]
+    signals = tl.Signals([tl.State("speed", "m/s", 3.0)], commands, dt)
+    for _ in range(2):
+        given = np.repeat(stream.uniform((0.0, -2.0), (4.0, 2.0), (12, 2)), 10, axis=0)
+        effect, speed, states = given[0, 1], 0.0, [0.0]
+        for heat, u in given:
+            for _ in range(50):
+                effect += dt / 50 * (u - effect) / lag
+                speed += dt / 50 * (3.0 * effect + 0.7 * heat - 0.8 * speed)
+            states.append(speed)
+        readings = np.array(states)[:, None]
+        runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), given))
+    found = identified(runs, signals, lags=True, form="acceleration", longest_delay=1)
+    at_once, late = found.actuation.actuators
+    assert at_once.direct and late.lag == pytest.approx(lag, rel=0.1) and late.delay == 0
+
+
 def test_a_delay_beyond_the_longest_that_is_tried_is_found_where_a_lag_stands_in():
     dt, dead, stream, runs = 0.1, 3, np.random.default_rng(2), []
     signals = tl.Signals([tl.State("level", "m", 3.0)], [tl.Command("u", "V", (-2.0, 2.0), scale=1.0)], dt)

@@ -17,7 +17,7 @@ from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Told
+from twinloop.identification.terms.priors import Priors
 from twinloop.law.actuation import Actuation
 from twinloop.streams import Unit
 
@@ -88,7 +88,7 @@ def posed(slope, noise):
     run = Run.of(readings, np.zeros((steps - 1, 1)))
     pool = Pool(5, 10)
     inputs = stages([run], signals, Actuation.direct(signals))
-    problem = Problem(pool, [run], inputs, signals.dt, WORKERS, Told({}, {}))
+    problem = Problem(pool, [run], inputs, signals.dt, WORKERS, Priors({}, {}))
     terms = [pool.one, 0, 1, 2, 3, pool.add("sin", 2)]
     problem.usable(terms)
     known = []

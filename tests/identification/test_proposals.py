@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sameness import copied, same
+from sameness import copied, same, through_json
 from small_plants import fans, gravity, pendulum_like, swung
 from twinloop import _core
 from twinloop.campaign.presets import options_of
@@ -65,10 +65,10 @@ def test_no_proposal_changes_what_it_is_given_and_each_gives_the_same_again(cont
         assert same(found, before) and same(once, again)
         proposed += [propose.__name__] * bool(once)
         found = decided(found, once)
-    assert found.best.evidence.stage == (True, True, True, True)
+    assert found.best.evidence.stage == (True, True, True)
     proposed = [name for name in proposed if name != "calm"]
-    assert proposed == (["lags", "terms", "second_look"] + ["parts"] * (len(context.runs) == 1)) or (
-        proposed == ["lags", "hidden", "terms", "second_look"] and found.best.actuation.hidden
+    assert proposed == (["terms", "second_look"] + ["parts"] * (len(context.runs) == 1)) or (
+        proposed == ["hidden", "terms", "second_look"] and found.best.actuation.hidden
     )
 
 
@@ -108,10 +108,29 @@ def test_where_nothing_is_hidden_it_does_not_matter_when_that_is_looked_for():
     assert plain.actuation.hidden == () and all(same(other, plain) for other in others)
 
 
+def test_a_lag_search_that_finds_no_lag_proposes_nothing_and_moves_nothing():
+    context = pendulum(2)
+    start = start_of(context)
+    assert list(lags(context, start)) == []
+    with_lags, without = (searched(context, start, order).best for order in (PROPOSALS, PROPOSALS[1:]))
+    assert PROPOSALS[0] is lags and same(with_lags, without)
+
+
+@pytest.mark.parametrize("after", range(len(PROPOSALS)))
+def test_a_search_that_is_read_back_from_its_record_goes_on_with_the_same_bits(after):
+    context = two_fans(2)
+    found = searched(context, start_of(context), PROPOSALS[:after])
+    again = Found.from_record(through_json(found.to_record()), context.signals)
+    assert same(found, again)
+    propose = PROPOSALS[after]
+    one, other = (decided(known, propose(context, known.best)) for known in (found, again))
+    assert same(one, other)
+
+
 def test_what_an_option_switches_off_or_is_done_already_is_not_proposed():
     context = pendulum(2, lags=False, hidden=False, parts=False, passes=1)
     start = start_of(context)
-    assert start.aligned and not any(list(propose(context, start)) for propose in (lags, hidden))
+    assert not any(list(propose(context, start)) for propose in (lags, hidden))
     model = searched(context, start).best
     assert model.fit is not None and not model.smoothed
     assert [
@@ -130,10 +149,9 @@ def test_where_the_shortest_runs_away_the_modest_one_is_proposed_too(monkeypatch
         return replace(found, fit=replace(found.fit, left=np.inf)) if len(tried) == 1 else found
 
     monkeypatch.setattr(terms_file, "fitted", runs_away_once)
-    aligned = decided(Found(start), lags(context, start)).best
-    found = decided(Found(aligned), terms(context, aligned))
+    found = decided(Found(start), terms(context, start))
     assert len(tried) == 2 and found.best.evidence.lasts and found.rivals == ()
-    assert same(found.best, fitted(context, climbed(context, replace(aligned, sums=aligned.modest))))
+    assert same(found.best, fitted(context, climbed(context, replace(start, sums=start.modest))))
 
 
 def test_what_was_known_is_a_start_of_its_own_that_changes_no_other():

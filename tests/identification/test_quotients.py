@@ -24,7 +24,7 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.slopes import slopes
 from twinloop.identification.terms.denominators import denominators, over, quotient
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Told
+from twinloop.identification.terms.priors import Priors
 from twinloop.law.actuation import Actuation
 from twinloop.streams import Unit
 
@@ -55,7 +55,7 @@ def problem_of(readings, signals):
     pool = Pool(signals.n_x + signals.n_u, 10)
     inputs = stages([run], signals, Actuation.direct(signals))
     noise = guessed_noise([run], np.ones(signals.n_x))
-    return Problem(pool, [run], inputs, signals.dt, WORKERS, Told({}, {})), chains(
+    return Problem(pool, [run], inputs, signals.dt, WORKERS, Priors({}, {})), chains(
         signals, "acceleration", noise
     )
 

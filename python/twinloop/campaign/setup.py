@@ -21,7 +21,7 @@ from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.identification.terms.formulas import parsed_term
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import told
+from twinloop.identification.terms.priors import priors_of
 from twinloop.limits import Limits
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS, Quality, quality_of, weights_of
@@ -253,7 +253,7 @@ def _check_use(options: AnyOptions, signals: Signals) -> None:
         pool = Pool(signals.n_x + signals.n_u)
         for text in options.seed_terms:
             parsed_term(text, pool, signals)
-        told(options, pool, signals)
+        priors_of(options, pool, signals)
     if isinstance(options, Options):
         with engine_input():
             grammar(options, signals)

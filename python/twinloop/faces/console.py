@@ -14,22 +14,25 @@ from rich.table import Table
 
 from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import AnyOptions, Options
+from twinloop.steps import STEPS
 
 LINE_SECONDS = 5.0
 """Between two plain lines."""
-STEPS = {
-    "noise": ("estimating the noise", 0.2),
-    "actuators": ("searching lags and delays", 4.0),
-    "hidden": ("searching a hidden state", 1.0),
+USUAL: dict[str, tuple[str, float]] = {
+    "form": ("deciding what outputs mean", 2.0),
+    "noise": ("estimating the noise", 1.1),
+    "actuators": ("searching lags and delays", 3.5),
+    "hidden": ("searching a hidden state", 0.3),
     "terms": ("selecting terms", 1.2),
-    "evolution": ("growing terms", 0.7),
-    "smoothed": ("selecting again, on smoothed states", 0.5),
-    "parts": ("learning from parts of the flight", 0.8),
-    "committee": ("drawing a committee", 0.2),
-    "gains": ("tuning gains", 0.3),
-    "candidates": ("choosing the next flight", 0.1),
+    "evolution": ("growing terms", 2.0),
+    "smoothed": ("selecting again, on smoothed states", 0.8),
+    "parts": ("learning from parts of the flight", 1.9),
+    "disturbances": ("weighing disturbances", 0.02),
+    "committee": ("drawing a committee", 0.1),
+    "gains": ("tuning gains", 7.0),
+    "candidates": ("choosing the next flight", 0.4),
 }
-"""What the preset `default` does after each experiment, in order: for a person, and its usual share of the time."""
+"""Each step of the preset `default` for a person, and its usual share of the time."""
 
 
 class Remaining(Protocol):
@@ -110,7 +113,8 @@ class Estimate:
 class StepEstimate:
     """Time left of a campaign of the preset `default`, from how long each step took so far.
 
-    A step takes longer the more experiments are learnt; one that was not seen yet is believed to have its usual share.
+    A step takes longer the more experiments are learnt; one that was not seen yet is believed to have its usual share,
+    and none once it was passed over.
 
     Args:
         experiments: that the campaign will make.
@@ -120,8 +124,9 @@ class StepEstimate:
     def __init__(self, experiments: int, later: int = 0) -> None:
         self.experiments = experiments
         self.later = later
-        self._seconds = dict.fromkeys(STEPS, 0.0)
-        self._work = dict.fromkeys(STEPS, 0.0)
+        self._seconds: dict[str, float] = dict.fromkeys(STEPS, 0.0)
+        self._work: dict[str, float] = dict.fromkeys(STEPS, 0.0)
+        self._passed: set[str] = set()
         self._running: tuple[str, int] | None = None
         self._since = time.monotonic()
 
@@ -131,25 +136,31 @@ class StepEstimate:
         Args:
             progress: where the campaign is.
         """
-        now = time.monotonic()
+        now, names = time.monotonic(), list[str](STEPS)
         if self._running != (progress.phase, progress.told):
+            first = 0
             if self._running is not None and self._running[0] in STEPS:
                 step, told = self._running
                 self._seconds[step] += now - self._since
                 self._work[step] += _work(told)
+                first = names.index(step) + 1 if told == progress.told else 0
+            if progress.phase in STEPS:
+                self._passed |= set(names[first : names.index(progress.phase)])
             self._running, self._since = (progress.phase, progress.told), now
-        usual = sum(STEPS[step][1] * work for step, work in self._work.items())
+        usual = sum(USUAL[step][1] * work for step, work in self._work.items())
         if usual <= 0.0:
             return None
         pace = sum(self._seconds.values()) / usual
         rates = {
-            step: self._seconds[step] / work if work > 0.0 else pace * STEPS[step][1]
+            step: self._seconds[step] / work
+            if work > 0.0
+            else pace * USUAL[step][1] * (step not in self._passed)
             for step, work in self._work.items()
         }
         return max(0.0, self._seconds_ahead(progress, rates, now - self._since))
 
     def _seconds_ahead(self, progress: Progress, rates: dict[str, float], running: float) -> float:
-        names = list(STEPS)
+        names = list[str](STEPS)
         seconds = 0.0
         for told in range(1, self.experiments + 1):
             last = told == self.experiments
@@ -263,7 +274,7 @@ class Watch:
         facts = [("experiments", f"{progress.told} of {self.experiments}")]
         if progress.phase in STEPS:
             facts.append(
-                ("step", f"{progress.generation} of {progress.generations}, {STEPS[progress.phase][0]}")
+                ("step", f"{progress.generation} of {progress.generations}, {USUAL[progress.phase][0]}")
             )
             if progress.archive_size:
                 facts.append(("committee", str(progress.archive_size)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,11 +13,11 @@ from twinloop.identification.records import Run
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.limits import Limits
 from twinloop.signals import Signals
+from twinloop.steps import Watch, unwatched
 from twinloop.streams import Unit
 
-
-def _silent(step: str) -> None:
-    """Tells nobody."""
+SEARCHED_ANEW = 4
+"""Runs up to which form, lags, delays and offsets are searched anew with each run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Context:
         workers: how the work is carried out.
         rests: commands whose effect may be there at the start of a run (n_u,).
         known: what was learnt from fewer runs.
-        watch: called with the name of each step.
+        watch: called with each step that begins.
         as_integrated: whether chains on increments bear what integration leaves, too: where forms are compared, what a
             derivative could not show is no evidence for them.
     """
@@ -44,13 +44,23 @@ class Context:
     workers: _core.Workers
     rests: Sequence[Floats] = ()
     known: Identified | None = None
-    watch: Callable[[str], None] = _silent
+    watch: Watch = unwatched
     as_integrated: bool = False
 
     @cached_property
     def limits(self) -> Limits:
         """Where a simulated run counts as diverged."""
         return Limits(self.signals, self.options.divergence_factor)
+
+    @property
+    def settled(self) -> bool:
+        """Whether form, lags, delays and offsets that are known are searched no more; lags are tuned all the same."""
+        return self.known is not None and len(self.runs) > SEARCHED_ANEW
+
+    @property
+    def may_lag(self) -> bool:
+        """Whether lags and delays are looked for."""
+        return self.options.lags and not self.settled
 
     @property
     def may_hide(self) -> bool:
@@ -64,4 +74,4 @@ class Context:
 
     def brief(self, runs: Sequence[Run]) -> Context:
         """The same for a short look at some runs, of which nothing is known."""
-        return replace(self, runs=runs, options=self.options.brief(), known=None, watch=_silent)
+        return replace(self, runs=runs, options=self.options.brief(), known=None, watch=unwatched)

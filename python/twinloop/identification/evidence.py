@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -10,7 +10,7 @@ from twinloop.identification.search.description import shorter
 from twinloop.law.actuation import Actuation
 
 LAGGING = 12.0
-"""What a lag or a delay must gain in description length: its number, and the choice of having one."""
+"""What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
 HIDING = 30.0
 """What a hidden state must gain: its time, its kind, and what a search may find by luck."""
 LASTING = 16.0
@@ -26,7 +26,6 @@ class Evidence:
     Description lengths of the same stage compare; those of different stages do not, for they are of other features.
 
     Args:
-        aligned: whether lags and delays of its inputs were searched, or are known.
         fitted: whether its constants were tuned on predictions.
         lasts: whether its model stays near its own runs; where that is not known yet it is taken to.
         smoothed: whether its terms were selected on states that a model has smoothed.
@@ -34,7 +33,6 @@ class Evidence:
             what else it holds (`price`).
     """
 
-    aligned: bool
     fitted: bool
     lasts: bool
     smoothed: bool
@@ -43,7 +41,7 @@ class Evidence:
     @property
     def stage(self) -> tuple[bool, ...]:
         """How far it was worked out; what runs away is worth nothing, however its terms were selected."""
-        return self.aligned, self.fitted, self.lasts, self.lasts and self.smoothed
+        return self.fitted, self.lasts, self.lasts and self.smoothed
 
     def beats(self, other: Evidence) -> bool:
         """Whether this hypothesis is believed rather than the other; of two that run away neither is."""
@@ -73,15 +71,16 @@ def strongest(hypotheses: Iterable[Hypotheses]) -> Hypotheses:
     return best
 
 
-def price(form: str, actuation: Actuation, lasting: int) -> float:
+def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], lasting: int) -> float:
     """What a hypothesis pays for besides its terms, in units of χ².
 
     Args:
         form: what its outputs mean.
         actuation: between commands and its law.
+        alike: groups of commands; those of a group share one lag and one delay, and pay for them once.
         lasting: how many disturbances that last.
     """
-    lagging = not all(actuator.direct for actuator in actuation.actuators)
+    lagging = sum(any(not actuation.actuators[i].direct for i in group) for group in alike)
     return (
         STEPPING * (form == "increment")
         + LAGGING * lagging

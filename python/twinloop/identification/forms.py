@@ -18,7 +18,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Run
 from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.starts import FORMS, LAGS_AGAIN, begun
+from twinloop.identification.starts import FORMS, begun
 from twinloop.identification.terms.pool import Pool
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
@@ -95,7 +95,7 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
         The form, and a remark where there was a choice.
     """
     forms = candidates(context.options, context.signals, context.runs)
-    if context.known is not None and len(context.runs) > LAGS_AGAIN and context.known.model.form in forms:
+    if context.known is not None and context.settled and context.known.model.form in forms:
         forms = (context.known.model.form,)
     if len(forms) == 1:
         return forms[0], []

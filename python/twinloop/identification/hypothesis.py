@@ -16,10 +16,11 @@ from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
+from twinloop.records import Recorded
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Recorded, kind="fit"):
     """A model whose constants were tuned on predictions.
 
     Args:
@@ -43,7 +44,7 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class Hypothesis:
+class Hypothesis(Recorded, kind="hypothesis"):
     """What is believed. A proposal makes others of it by `replace`; nothing in it ever changes.
 
     Args:
@@ -52,13 +53,13 @@ class Hypothesis:
         runs: the records as they are read under it: moved by the offsets, with outliers weighed 0, and with the states
             that features are made of, once a model has smoothed them.
         actuation: lags, delays and hidden states between commands and the law.
+        alike: groups of commands that share a lag and a delay.
         candidates: the terms to choose from.
         driven: chains that outputs drive, with a first guess of their noise.
         given: chains that other states drive, with their noise.
         sums: terms that drive each of `driven`, with the noise under which they were found.
         modest: sums that were found with the noise from above, for where `sums` run away.
         fit: the model of the sums; None until it is tuned.
-        aligned: whether lags and delays were searched, or are known.
         smoothed: whether the states in `runs` were smoothed by a model.
         of_part: whether a part of the only run has led to it.
         start: number of the start that has led to it; what it draws is a part of the unit of work of that number.
@@ -69,6 +70,7 @@ class Hypothesis:
     offsets: Floats
     runs: tuple[Run, ...]
     actuation: Actuation
+    alike: tuple[tuple[int, ...], ...]
     candidates: Candidates
     driven: tuple[Chain, ...]
     given: tuple[Chain, ...]
@@ -76,7 +78,6 @@ class Hypothesis:
     sums: tuple[Sum, ...] = ()
     modest: tuple[Sum, ...] = ()
     fit: Fit | None = None
-    aligned: bool = False
     smoothed: bool = False
     of_part: bool = False
     searches: int = 0
@@ -96,8 +97,8 @@ class Hypothesis:
         """What the readings say for it."""
         lasts = self.fit is None or self.fit.lasts
         lasting = sum(found.chain.motion[1] > 0.0 for found in self.sums)
-        length = self.length + price(self.form, self.actuation, lasting)
-        return Evidence(self.aligned, self.fit is not None, lasts, self.smoothed, length)
+        length = self.length + price(self.form, self.actuation, self.alike, lasting)
+        return Evidence(self.fit is not None, lasts, self.smoothed, length)
 
     def searched(self, sums: Sequence[Sum]) -> Hypothesis:
         """The same with what one more search has found, which nobody has fitted yet."""

@@ -29,8 +29,10 @@ from twinloop.identification.records import Run
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import starts
+from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
+from twinloop.steps import Watch, unwatched
 from twinloop.streams import Unit
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
@@ -40,7 +42,7 @@ PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, second_look, parts, calm
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Found(Recorded, kind="found"):
     """What a search leaves.
 
     Args:
@@ -62,7 +64,7 @@ def identify_runs(
     iteration: int = 0,
     known: Identified | None = None,
     workers: _core.Workers,
-    watch: Callable[[str], None] = lambda step: None,
+    watch: Watch = unwatched,
 ) -> Identified:
     """Learns a model and a committee.
 
@@ -75,7 +77,7 @@ def identify_runs(
         iteration: of the campaign, which tells its random numbers from those of others.
         known: what was learnt from fewer runs; its terms are candidates again.
         workers: how the work is carried out.
-        watch: called with the name of each step.
+        watch: called with each step that begins.
 
     Returns:
         What was learnt.
@@ -139,6 +141,6 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
             *remarks(best.runs, pool, signals, sums, fit.left, fit.readings),
             *late_sensors(best.offsets, driven, signals),
             *other_noise(fit.observer, signals),
-            *held_at_bounds(sums, best.candidates.told.bounds, pool, signals, best.form),
+            *held_at_bounds(sums, best.candidates.priors.bounds, pool, signals, best.form),
         ],
     )

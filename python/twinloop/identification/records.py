@@ -11,6 +11,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.identification.interpolation import FALLS, FEWEST, integration_error, middles, points, segments
 from twinloop.law.actuation import Actuation
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 ORDERS = (3, 4, 5, 6)
@@ -22,7 +23,7 @@ HELD_IN_SQUARES = 2.0**-23
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Recorded, kind="run"):
     """One recorded run.
 
     Args:

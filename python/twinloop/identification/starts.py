@@ -11,6 +11,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
+from twinloop.identification.inputs.actuation import groups
 from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import guessed_noise
 from twinloop.identification.search.selection import from_both_sides
@@ -22,8 +23,6 @@ from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 
-LAGS_AGAIN = 4
-"""Runs up to which lags, delays and offsets are searched anew; from then on lags are only tuned and the others kept."""
 ANEW, PARTS, RENEWED, FORMS = 0, 1, 10, 100
 """Numbers of starts, by which what one draws is told from what others draw: whole runs anew, the first part of the only
 run, what was known, the first form; those of further parts and forms follow."""
@@ -54,18 +53,17 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
     """
     signals, options, runs = context.signals, context.options, tuple(context.runs)
     every = chains(signals, form, guessed_noise(runs, np.array([state.scale for state in signals.states])))
-    again = context.known is None or len(runs) <= LAGS_AGAIN
     seen = [node for node in _known_terms(context) if not pool.is_hidden(node)]
     return Hypothesis(
         form=form,
         offsets=np.zeros(signals.n_x),
         runs=runs,
         actuation=Actuation.direct(signals),
+        alike=groups(signals),
         candidates=Candidates.of(pool, signals, options, form, seen),
         driven=tuple(declared_noise(chain, signals) for chain in every if chain.output is not None),
         given=tuple(given_noise(chain, signals) for chain in every if chain.output is None),
         start=start,
-        aligned=not (options.lags and again),
     )
 
 
@@ -73,7 +71,7 @@ def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     """The hypothesis with runs as they would have been read had all sensors been read at once."""
     signals, runs, known = context.signals, context.runs, context.known
     offsets = hypothesis.offsets
-    if context.options.offsets and known is not None and len(runs) > LAGS_AGAIN:
+    if context.options.offsets and known is not None and context.settled:
         offsets = known.offsets
     elif context.options.offsets:
         scales = np.array([state.scale for state in signals.states])
@@ -100,7 +98,6 @@ def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothe
         actuation=known.actuation,
         candidates=with_hidden(context, aligned.candidates),
         sums=tuple(replace(found, others=[]) for found in known.sums),
-        aligned=True,
         start=RENEWED,
     )
     return fitted(context, begins)

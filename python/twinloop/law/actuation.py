@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -79,6 +80,11 @@ class Actuation(Recorded, kind="actuation"):
         """What arrives of commands (n, n_u), then hidden states, at the start, middle and end of each period."""
         scales = np.array([command.size for command in signals.commands])
         return _core.command_effects(self.actuators, self.hidden, scales, signals.dt, commands)
+
+    def at_once(self, commands: Sequence[int]) -> Actuation:
+        """The same with some commands that act at once."""
+        actuators = (Actuator() if i in commands else actuator for i, actuator in enumerate(self.actuators))
+        return replace(self, actuators=tuple(actuators))
 
     def bare(self) -> Actuation:
         """The same without hidden states."""

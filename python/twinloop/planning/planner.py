@@ -23,6 +23,7 @@ from twinloop.planning.judging import Committee, Judge, Judged, Task, expected, 
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.worth import apart, gain, limit
+from twinloop.steps import Watch, unwatched
 from twinloop.streams import Purpose
 
 Flags = NDArray[np.bool_]
@@ -98,7 +99,7 @@ class Planner(Judge):
         limits: where a flight counts as diverged.
         seed: of the campaign.
         workers: how the work is carried out.
-        watch: called now and then, with what is being done.
+        watch: called now and then, with the step that is under way.
     """
 
     def __init__(
@@ -111,7 +112,7 @@ class Planner(Judge):
         limits: Limits,
         seed: int,
         workers: _core.Workers,
-        watch: Callable[[str], None] = lambda step: None,
+        watch: Watch = unwatched,
     ) -> None:
         super().__init__(family, task, quality, limits=limits, seed=seed, workers=workers)
         self.options = options

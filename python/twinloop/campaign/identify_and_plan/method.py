@@ -42,22 +42,10 @@ from twinloop.objectives import normalised_error
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner
 from twinloop.records import Record, Recorded
+from twinloop.steps import STEPS, Step
 from twinloop.streams import Unit
 from twinloop.test import Test
 
-STEPS = (
-    "noise",
-    "actuators",
-    "hidden",
-    "terms",
-    "evolution",
-    "smoothed",
-    "parts",
-    "committee",
-    "gains",
-    "candidates",
-)
-"""What there is to see while it works, in order."""
 FEWEST = 4
 """Members of a committee that are kept in any case."""
 WRONG = 0.5
@@ -490,14 +478,14 @@ class IdentifyAndPlan:
             ),
         )
 
-    def _watch(self, step: str) -> None:
+    def _watch(self, step: Step) -> None:
         latest = self.memory.latest
         lesson = None if latest is None else latest.lessons[-1]
         self.report(
             Progress(
                 phase=step,
                 iteration=max(1, self.iteration),
-                generation=STEPS.index(step) + 1 if step in STEPS else 0,
+                generation=STEPS.index(step) + 1,
                 generations=len(STEPS),
                 told=len(self._told),
                 tests=() if lesson is None else lesson.tests,

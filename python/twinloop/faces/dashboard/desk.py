@@ -12,7 +12,7 @@ from pathlib import Path
 from twinloop.campaign import Campaign
 from twinloop.campaign.history import Progress
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
-from twinloop.faces.console import STEPS
+from twinloop.faces.console import USUAL
 from twinloop.faces.telling import attach, numbered, tell, tell_failed
 from twinloop.store import approve, approved, kept, opened, state
 
@@ -224,7 +224,7 @@ class Desk:
         begun = time.monotonic()
 
         def seen(progress: Progress) -> None:
-            words = STEPS.get(progress.phase, (progress.phase, 0.0))[0]
+            words = USUAL.get(progress.phase, (progress.phase, 0.0))[0]
             if progress.generations > 1:
                 words += f", {progress.generation} of {progress.generations}"
             self._work[name] = Work(words, begun)

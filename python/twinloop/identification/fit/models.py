@@ -35,7 +35,7 @@ def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:
     Constants inside nodes come first, then, output after output, a 1 for each known node and the weights.
     """
     pool, absolute = hypothesis.pool, hypothesis.form == "absolute"
-    known = [node for nodes in hypothesis.candidates.told.fixed.values() for node in nodes]
+    known = [node for nodes in hypothesis.candidates.priors.fixed.values() for node in nodes]
     used = [term for found in hypothesis.sums for term in found.weights if term != pool.one]
     held = pool.held([*used, *known])
     kept = {pool.one, *pool.needed(known)}
@@ -66,9 +66,9 @@ def limits_of(hypothesis: Hypothesis) -> dict[int, Bounds]:
 
 def bounds_of(hypothesis: Hypothesis, found: Sum) -> Limits:
     """Bounds of a sum's coefficients, by node."""
-    return hypothesis.candidates.told.bounds.get(found.chain.states[0], {})
+    return hypothesis.candidates.priors.bounds.get(found.chain.states[0], {})
 
 
 def _fixed(hypothesis: Hypothesis, found: Sum) -> Sequence[int]:
     """Nodes that are known to drive what a sum drives."""
-    return hypothesis.candidates.told.fixed.get(found.chain.states[0], ())
+    return hypothesis.candidates.priors.fixed.get(found.chain.states[0], ())

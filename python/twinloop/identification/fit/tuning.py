@@ -12,7 +12,6 @@ from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.fit.models import layout, limits_of
 from twinloop.identification.hypothesis import Fit, Hypothesis
-from twinloop.identification.inputs.actuation import groups
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.bounds import bounded_model
 from twinloop.law.actuation import Actuation
@@ -44,7 +43,7 @@ def tune(
     signals, tuning = context.signals, context.options.tuning
     free = list(range(len(model.constants))) if hypothesis.form == "absolute" else layout(hypothesis)[0]
     actuation = Actuation.of(model, signals)
-    lags = [group for group in groups(signals) if actuation.actuators[group[0]].lag > 0.0]
+    lags = [list(group) for group in hypothesis.alike if actuation.actuators[group[0]].lag > 0.0]
     lags += [[signals.n_u + j] for j in range(len(actuation.hidden))]
     limits = limits_of(hypothesis) if tuning else {}
     # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from twinloop.signals import Signals
 
 
-def groups(signals: Signals) -> list[list[int]]:
+def groups(signals: Signals) -> tuple[tuple[int, ...], ...]:
     """Commands that are alike, by unit and bounds."""
     found: dict[tuple[object, ...], list[int]] = {}
     for i, command in enumerate(signals.commands):
         found.setdefault((command.unit, command.bounds, command.size), []).append(i)
-    return list(found.values())
+    return tuple(tuple(group) for group in found.values())

@@ -27,6 +27,7 @@ def calm(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """
     if hypothesis.fit is None or not hypothesis.fit.lasts:
         return
+    context.watch("disturbances")
     problem = posed(context, hypothesis)
     sums = tuple(_calmed(problem, found) for found in hypothesis.sums)
     if all(new is old for new, old in zip(sums, hypothesis.sums, strict=True)):

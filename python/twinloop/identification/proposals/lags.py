@@ -1,16 +1,20 @@
-"""Lags and delays of the actuators: searched on a grid, one group of commands after another, from none of them on."""
+"""Lags and delays of the actuators: searched on a grid, one group of commands after another, from none of them on.
+
+A group that is searched early may stand in for one that is searched later, so in the end each is tried without.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.arrays import Floats
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.inputs.actuation import groups
-from twinloop.identification.search.selection import from_both_sides, posed, selected
+from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.structure import search
 from twinloop.law.actuation import Actuation, Actuator
 from twinloop.signals import Signals
 
@@ -18,86 +22,95 @@ LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 """Time constants that are tried, in periods."""
 MOST_DELAY = 50
 """Periods beyond which no delay is tried."""
+GRID = 0
+"""Number of the unit of work that tries them; the searches that a hypothesis counts begin at 1."""
+Trial = Callable[[Actuation], Hypothesis]
+"""The hypothesis behind other actuators, with sums of the first rung."""
 
 
 def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with actuators of the shortest description, those that act at once among them."""
-    if hypothesis.aligned:
+    if hypothesis.fit is not None or not context.may_lag:
         return
     context.watch("actuators")
-    best = _behind(context, hypothesis, Actuation.direct(context.signals), hypothesis.searches)
-    for group in groups(context.signals):
+    trial = _trials(context, hypothesis)
+    best = trial(Actuation.direct(context.signals))
+    for group in hypothesis.alike:
         for delay in range(context.options.longest_delay + 1):
-            best = _best_lag(context, hypothesis, best, group, delay, LAGS)
-        best = _longer(context, hypothesis, best, group)
+            best = _best_lag(context, trial, best, group, delay)
+        best = _longer(context, trial, best, group)
+    best = _without(trial, best)
     if best.actuation != hypothesis.actuation:
         # The noise was that of other actuators, and a disturbance may still stand in for terms.
-        best = from_both_sides(context, best, best.sums)
-    yield best
+        yield from_both_sides(context, best, best.sums)
+
+
+def _trials(context: Context, hypothesis: Hypothesis) -> Trial:
+    """What tries actuators for a hypothesis; the searches of each trial are a part of one unit of work."""
+    unit, number = context.unit.part(hypothesis.start, GRID), itertools.count()
+    driven = [found.chain for found in hypothesis.sums]
+
+    def trial(actuation: Actuation) -> Hypothesis:
+        behind = replace(hypothesis, actuation=actuation)
+        sums = search(
+            posed(context, behind), driven, behind.candidates.ladder[0], [None] * len(driven),
+            moves=context.options.moves // 4, starts=1, largest=context.options.largest,
+            unit=unit.part(next(number)),
+        )  # fmt: skip
+        return replace(behind, sums=tuple(sums))
+
+    return trial
 
 
 def _best_lag(
-    context: Context,
-    hypothesis: Hypothesis,
-    best: Hypothesis,
-    group: Sequence[int],
-    delay: int,
-    lags: Sequence[float],
+    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int
 ) -> Hypothesis:
-    """The best so far, or a better one with this delay; what it draws follows the searches of both."""
-    searches, rising = best.searches, 0
-    for lag in lags:
+    """The best so far, or a better one with this delay."""
+    rising = 0
+    for lag in LAGS:
         if lag == 0.0 and delay == 0:
             continue
-        tried = _at(context, hypothesis, replace(best, searches=searches), group, delay, lag)
-        searches = tried.searches
-        found = strongest([best, tried])
+        found = strongest([best, _at(context, trial, best, group, delay, lag)])
         best, rising = found, 0 if found is not best else rising + 1
         # Past the best lag the fit only gets worse.
         if rising >= 2:
             break
-    return replace(best, searches=searches)
+    return best
 
 
-def _longer(context: Context, hypothesis: Hypothesis, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
+def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
     """The same, or one with a longer delay, for as long as a period more is better with a lag that is no longer."""
     while not (now := best.actuation.actuators[group[0]]).direct and now.delay < MOST_DELAY:
         at_it: Hypothesis | None = None
-        searches = best.searches
         for lag in (lag for lag in reversed(LAGS) if lag * context.signals.dt <= now.lag):
-            tried = _at(context, hypothesis, replace(best, searches=searches), group, now.delay + 1, lag)
-            searches = tried.searches
+            tried = _at(context, trial, best, group, now.delay + 1, lag)
             if at_it is not None and strongest([at_it, tried]) is at_it:
                 break
             at_it = tried
         assert at_it is not None  # a lag of 0 is always tried
         found = strongest([best, at_it])
         if found is best:
-            return replace(best, searches=searches)
-        best = replace(found, searches=searches)
+            return best
+        best = found
+    return best
+
+
+def _without(trial: Trial, best: Hypothesis) -> Hypothesis:
+    """The best so far, or a better one in which groups act at once that stood in for those searched after them."""
+    lagging = [group for group in best.alike if not best.actuation.actuators[group[0]].direct]
+    for group in lagging if len(lagging) > 1 else ():
+        best = strongest([best, trial(best.actuation.at_once(group))])
     return best
 
 
 def _at(
-    context: Context, hypothesis: Hypothesis, best: Hypothesis, group: Sequence[int], delay: int, lag: float
+    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int, lag: float
 ) -> Hypothesis:
     """The hypothesis behind the best actuators so far, those of a group with this delay and lag: the better rest."""
-    searches, tried = best.searches, []
-    for rest in (None, *context.rests):
-        actuation = _with(best.actuation, group, lag, delay, rest, context.signals)
-        tried.append(_behind(context, hypothesis, actuation, searches))
-        searches = tried[-1].searches
-    return replace(strongest(tried), searches=searches)
-
-
-def _behind(context: Context, hypothesis: Hypothesis, actuation: Actuation, searches: int) -> Hypothesis:
-    """The hypothesis behind other actuators, with sums of the first rung; what it draws follows so many searches."""
-    behind = replace(hypothesis, actuation=actuation, aligned=True, searches=searches)
-    driven = [found.chain for found in hypothesis.sums]
-    return selected(
-        context, behind, posed(context, behind), behind.candidates.ladder[0], [None] * len(driven), driven,
-        moves=context.options.moves // 4, starts=1,
-    )  # fmt: skip
+    return strongest(
+        trial(_with(best.actuation, group, lag, delay, rest, context.signals))
+        for rest in (None, *context.rests)
+    )
 
 
 def _with(

@@ -102,7 +102,7 @@ def implicit(
 
 def bounded(problem: Problem, found: Sum) -> bool:
     """Whether coefficients of a chain's terms have bounds, which a term over a denominator would evade."""
-    return found.chain.states[0] in problem.told.bounds
+    return found.chain.states[0] in problem.priors.bounds
 
 
 def explained(problem: Problem, found: Sum) -> bool:

@@ -92,7 +92,7 @@ def with_joints(
 
 def _told(problem: Problem, found: Sum) -> bool:
     """Whether anything is known of a chain's terms beforehand."""
-    return bounded(problem, found) or found.chain.states[0] in problem.told.fixed
+    return bounded(problem, found) or found.chain.states[0] in problem.priors.fixed
 
 
 class _Joints:

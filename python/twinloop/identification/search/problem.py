@@ -12,7 +12,7 @@ from twinloop.errors import engine_input
 from twinloop.identification.records import Run, Stages
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Told
+from twinloop.identification.terms.priors import Priors
 from twinloop.signals import Bounds
 
 Columns = Floats
@@ -28,7 +28,7 @@ class Problem:
         stages: their inputs within each period.
         dt: period, s.
         workers: how the work is carried out.
-        told: what is known of the law.
+        priors: what is known of the law.
         as_integrated: whether chains on increments bear what integration leaves, too: where forms are compared, what a
             derivative could not show is no evidence for them.
     """
@@ -40,10 +40,10 @@ class Problem:
         stages: Stages,
         dt: float,
         workers: _core.Workers,
-        told: Told,
+        priors: Priors,
         as_integrated: bool = False,
     ) -> None:
-        self.told = told
+        self.priors = priors
         self.as_integrated = as_integrated
         self.pool = pool
         self.runs = runs
@@ -83,7 +83,7 @@ class Problem:
 
     def regression_on(self, chain: Chain, columns: Columns, taken: Columns | None = None) -> _core.Regression:
         """Of one chain on features that need not be terms (3, rows, p), where others are taken to be what they are."""
-        known = self.usable(self.told.fixed.get(chain.states[0], ()))
+        known = self.usable(self.priors.fixed.get(chain.states[0], ()))
         readings = [run.states[:, list(chain.states)] for run in self.runs]
         if known:
             readings = self._of(chain, self.values(known), readings).residuals(np.ones(len(known)))
@@ -126,7 +126,7 @@ class Problem:
 
     def limits(self, chain: Chain, terms: Sequence[int]) -> dict[int, Bounds]:
         """Bounds of a chain's coefficients, by place among terms."""
-        bounds = self.told.bounds.get(chain.states[0], {})
+        bounds = self.priors.bounds.get(chain.states[0], {})
         return {place: bounds[term] for place, term in enumerate(terms) if term in bounds}
 
     def integration(self, chain: Chain) -> float:

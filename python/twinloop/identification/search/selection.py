@@ -36,7 +36,7 @@ def posed(context: Context, hypothesis: Hypothesis, inputs: Stages | None = None
     if inputs is None:
         inputs = stages(hypothesis.runs, context.signals, hypothesis.actuation)
     return Problem(
-        hypothesis.pool, hypothesis.runs, inputs, context.signals.dt, context.workers, hypothesis.candidates.told,
+        hypothesis.pool, hypothesis.runs, inputs, context.signals.dt, context.workers, hypothesis.candidates.priors,
         context.as_integrated,
     )  # fmt: skip
 

@@ -18,8 +18,10 @@ def with_what_must_be(
     subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
 ) -> list[tuple[int, ...]]:
     """Subsets that hold every term whose bounds exclude 0, as far as the runs can tell those terms apart."""
-    told = (place for place, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[place]))
-    must = _told_apart(gram, told)
+    required = (
+        place for place, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[place])
+    )
+    must = _distinguishable(gram, required)
     if not must:
         return subsets
     forced = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
@@ -44,12 +46,12 @@ def all_judged(
     """
     found = [_judged(gram, subset, costs, limits) for subset in dict.fromkeys(subsets)]
     if not any(found):
-        parts = dict.fromkeys(_told_apart(gram, subset) for subset in subsets)
+        parts = dict.fromkeys(_distinguishable(gram, subset) for subset in subsets)
         found = [_judged(gram, subset, costs, limits) for subset in parts]
     return [judged for judged in found if judged]
 
 
-def _told_apart(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]:
+def _distinguishable(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]:
     """The features of a subset, in order, that those before them do not already span."""
     kept: list[int] = []
     for feature in subset:

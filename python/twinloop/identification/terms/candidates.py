@@ -11,7 +11,8 @@ from twinloop.identification.terms.directions import Direction, terms_of, unequa
 from twinloop.identification.terms.formulas import parsed_term
 from twinloop.identification.terms.libraries import rungs
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Told, told
+from twinloop.identification.terms.priors import Priors, priors_of
+from twinloop.records import Recorded
 from twinloop.signals import Signals
 
 Ladder = tuple[tuple[int, ...], ...]
@@ -19,18 +20,18 @@ Ladder = tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(Recorded, kind="candidates"):
     """Terms to choose from, as a value: who adds some makes another one, with a pool of its own.
 
     Args:
         pool: of all expressions.
         ladder: terms, rung by rung.
-        told: terms and bounds that a user knows.
+        priors: terms and bounds that a user knows.
     """
 
     pool: Pool
     ladder: Ladder
-    told: Told
+    priors: Priors
 
     @staticmethod
     def of(
@@ -50,7 +51,7 @@ class Candidates:
         seeds = [parsed_term(formula, pool, signals) for formula in options.seed_terms]
         pool.rungs.update(dict.fromkeys(seeds, 0))
         ladder = [list(dict.fromkeys([*terms, *seeds, *known])) for terms in base]
-        priors = told(replace(options, form=form), pool, signals)
+        priors = priors_of(replace(options, form=form), pool, signals)
         # A bounded term that no rung has stands on the first one.
         bounded = dict.fromkeys(node for limits in priors.bounds.values() for node in limits)
         strangers = [node for node in bounded if node not in ladder[-1]]
@@ -71,7 +72,7 @@ class Candidates:
     def with_directions(self, found: Sequence[Direction], signals: Signals) -> Candidates:
         """The same with terms of directions on the first rung; none that would evade the bounds of a plain one."""
         pool = self.pool.copy()
-        bounded = {node for limits in self.told.bounds.values() for node in limits}
+        bounded = {node for limits in self.priors.bounds.values() for node in limits}
         admitted = []
         for direction in found:
             # A direction is one of those found, and a share that is not that of all others a constant.

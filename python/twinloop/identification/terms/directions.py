@@ -87,7 +87,7 @@ def terms_of(pool: Pool, direction: Direction, signals: Signals) -> dict[int, li
 
 def _answers(problem: Problem, found: Sum, rows: Floats) -> Floats:
     """How strongly an output answers to each command, from rows a step above and a step below its middle in turn."""
-    known = dict.fromkeys(problem.told.fixed.get(found.chain.states[0], ()), 1.0)
+    known = dict.fromkeys(problem.priors.fixed.get(found.chain.states[0], ()), 1.0)
     terms = [*found.weights.items(), *known.items()]
     # Summed row by row: a product of matrices rounds differently from processor to processor.
     weighted = problem.pool.values([term for term, _ in terms], rows) * np.array([w for _, w in terms])

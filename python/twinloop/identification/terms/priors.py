@@ -1,4 +1,4 @@
-"""What a user has told of the law: terms that are known, and bounds on constants."""
+"""Priors: terms of the law that a user knows, and bounds on constants."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.bounds import Limits
 from twinloop.identification.terms.formulas import bare_term, bounded_term, fixed_term
 from twinloop.identification.terms.pool import Pool
+from twinloop.records import Recorded
 from twinloop.signals import Bounds, Signals
 
 
 @dataclass(frozen=True)
-class Told:
-    """What is known before anything is learnt.
+class Priors(Recorded, kind="priors"):
+    """What a user knows of a law before anything is learnt.
 
     Args:
         fixed: nodes that drive a state as they are, by the state.
@@ -27,8 +28,8 @@ class Told:
     bounds: Mapping[int, Limits]
 
 
-def told(options: IdentificationOptions, pool: Pool, signals: Signals) -> Told:
-    """What the options say of the law.
+def priors_of(options: IdentificationOptions, pool: Pool, signals: Signals) -> Priors:
+    """The priors that options state.
 
     Args:
         options: with `fixed_terms` and `bounded_terms`.
@@ -70,7 +71,7 @@ def told(options: IdentificationOptions, pool: Pool, signals: Signals) -> Told:
         # Under "absolute" sums are what is added to a state.
         itself = float(form == "absolute" and node == state)
         found[state][node] = (bounds[0] - itself, bounds[1] - itself)
-    return Told(fixed, found)
+    return Priors(fixed, found)
 
 
 def _check_driven(what: str, state: int, form: str, signals: Signals) -> None:
