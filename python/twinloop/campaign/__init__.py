@@ -1,6 +1,7 @@
 """The campaign: ask and tell, what was told, and the two ways of learning from it."""
 
-from twinloop.campaign.campaign import Campaign, controller_to_fly
+from twinloop.campaign.assessment import controller_to_fly
+from twinloop.campaign.campaign import Campaign
 from twinloop.campaign.from_logs import identify
 from twinloop.campaign.persistence import available_threads
 

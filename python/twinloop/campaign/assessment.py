@@ -1,21 +1,26 @@
-"""What a campaign's twin leaves of its flights, and what another experiment would bring."""
+"""What a campaign's twin leaves of its flights, which controller flies, and what another experiment would bring."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.setup import Setup
+from twinloop.errors import NotAvailable
 from twinloop.identification.sensors.noise import exact
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
 from twinloop.streams import Unit
 from twinloop.test import Test
+
+if TYPE_CHECKING:
+    from twinloop.campaign.campaign import Campaign
 
 REPEATS = 32
 """Flights on the twin from which the scatter of a measurement is taken."""
@@ -188,3 +193,15 @@ def _repeated(twin: Twin, setup: Setup, test: Test, gusts: bool) -> list[float]:
         lasted = run.steps == test.steps
         values.append(setup.quality.flown(run, test.target_state) if lasted else math.nan)
     return values
+
+
+def controller_to_fly(campaign: Campaign) -> tuple[Test | None, str]:
+    """The best test of a campaign, if there is any, and why there is none.
+
+    Args:
+        campaign: with at least one experiment.
+    """
+    try:
+        return campaign.best_test, ""
+    except NotAvailable as reason:
+        return None, str(reason)

@@ -5,32 +5,34 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, share, whole
-from twinloop.campaign.assessment import Advice, advice, rmse
+from twinloop.arrays import Floats, floats, whole
+from twinloop.campaign.assessment import Advice, advice, controller_to_fly, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Earlier, Examination
 from twinloop.campaign.examination.loops import loops_around
+from twinloop.campaign.flying import checked_budget, checked_risk, fly
+from twinloop.campaign.guarding import guard_of
 from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, Progress
 from twinloop.campaign.persistence import Persistent
 from twinloop.campaign.presets import AnyOptions
 from twinloop.campaign.ranking import ranked
+from twinloop.campaign.reporting import plots, reported
 from twinloop.campaign.setup import checked, refuse_arguments
+from twinloop.campaign.taking_away import taken_controller, taken_twin
 from twinloop.campaign.twin_errors import free_runs
 from twinloop.controllers import Controller, Family, UnboundFamily
-from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
+from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard import Guard, Guarded
-from twinloop.law.exports.export import asked, delivered, exported_controller
-from twinloop.law.exports.gymnasium_source import Episode
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.objectives import closed_loop
@@ -38,28 +40,9 @@ from twinloop.remarks import warn
 from twinloop.showing import Shown
 from twinloop.signals import Signals
 from twinloop.systems import System
-from twinloop.systems.patience import run_within
-from twinloop.test import Test, check_signals
+from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
-ARGUMENTS = (
-    "signals",
-    "controller",
-    "initial_state",
-    "target_state",
-    "duration",
-    "preset",
-    "seed",
-    "options",
-    "goal",
-    "quality",
-    "weights",
-    "operators",
-    "threads",
-    "progress",
-    "store",
-    "name",
-)
 GENTLE = "gentle"
 """The excitation of a first test where nothing else is asked for: the preset's own."""
 
@@ -118,21 +101,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
         name: str = "campaign",
         **other: object,
     ) -> None:
-        refuse_arguments("Campaign", other, ARGUMENTS)
+        refuse_arguments("Campaign", other, list(signature(Campaign).parameters)[:-1])
         setup = checked(
-            signals,
-            controller,
-            initial_state,
-            target_state,
-            duration,
-            preset,
-            options,
-            seed,
-            goal,
-            quality,
-            operators,
-            weights,
-        )
+            signals, controller, initial_state, target_state, duration, preset, options, seed, goal, quality,
+            operators, weights,
+        )  # fmt: skip
         self._begin(setup, threads, progress)
         if store is not None:
             self._open(store, name)
@@ -347,55 +320,13 @@ class Campaign(Shown, Persistent, kind="campaign"):
             SystemFailure: the first test failed, or two in a row; both are told.
             TooRisky: a test is riskier than `max_risk`; it waits. Raise `max_risk`, fly it by hand, or abandon it.
         """
-        budget = whole("Campaign.run, experiments", experiments, least=1)
-        allowed = 1.0 if max_risk is None else share("Campaign.run, max_risk", max_risk)
-        described = isinstance(getattr(system, "signals", None), Signals)
-        if not (described and callable(getattr(system, "run", None))):
-            raise InvalidInput(
-                "Campaign.run, system: expected an object with twinloop.Signals as `signals` and with `run(test)`, "
-                f"found {type(system).__name__}; add them."
-            )
-        told = self._book.runs
-        if budget < told:
-            raise InvalidInput(
-                f"Campaign.run, experiments: expected at least the {told} runs that were told already, found {budget};"
-                f" every run counts, so for one more say {told + 1}."
-            )
+        budget, allowed = checked_budget(self, system, experiments), checked_risk(max_risk)
         self.interrupted = False
         if self._keeping is not None:
             self._keeping.fly(system, budget)
-        failed = False
         with self._interruptible():
-            while self._book.runs < budget:
-                test = self._next(system, last=self._book.runs + 1 == budget)
-                check_signals(test, system.signals)
-                if test.risk is not None and test.risk > allowed:
-                    raise TooRisky(
-                        f"Campaign.run: expected a test that leaves the envelope with a probability of at most"
-                        f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; it waits and was not flown:"
-                        " fly it by hand, abandon it, or raise max_risk."
-                    )
-                self._report_experiment()
-                failed = self._fly(system, test, timeout, failed)
+            fly(self, system, budget, timeout, allowed, self._report_experiment)
         return self
-
-    def _fly(self, system: System, test: Test, timeout: float | None, again: bool) -> bool:
-        """One run, told as what became of it: whether the system failed, which it may not do `again`."""
-        try:
-            trajectory = run_within(system, test, timeout)
-        except NoAnswer:
-            raise
-        except SystemFailure as failure:
-            self.tell_failed(test, str(failure))
-            if again or not self._book.experiments:
-                raise
-            return True
-        if isinstance(trajectory, Trajectory) and trajectory.ended == "aborted" and trajectory.steps < 2:
-            # Ended before there was anything to learn from: that it was is the result.
-            self.tell_failed(test, trajectory.reason or "ended at once")
-        else:
-            self.tell(test, trajectory)
-        return False
 
     # Guarding
 
@@ -430,25 +361,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
             InvalidInput: a test for other signals, or arguments that do not fit.
             NotAvailable: controllers in Python, in whose memory nobody can look ahead; pass horizon=0.
         """
-        check_signals(test, self.signals)
-        if fallback is None:
-            first = self._book.first_flown()
-            genes = test.genes if first is None or first.test is None else first.test.genes
-            instead: Controller | ArrayLike = self.family.controller(genes)
-        elif isinstance(fallback, Mapping):
-            instead = self.family.controller(self.family.genes(fallback))
-        else:
-            instead = fallback
-        twin = self.twin if self._book.experiments else None
-        return Guard(
-            test,
-            instead,
-            twin=None if twin is None or not twin.follows else twin,
-            flown=[(run.test, run.trajectory) for run in self._book.experiments if run.test is not None],
-            horizon=horizon,
-            false_alarms=false_alarms,
-            overrun=overrun,
-            clock=clock,
+        return guard_of(
+            self, test, fallback, horizon=horizon, false_alarms=false_alarms, overrun=overrun, clock=clock
         )
 
     def guarded(
@@ -586,17 +500,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             InvalidInput: no such kind, or a path that cannot be written.
             NotAvailable: the twin fails a check, or the export could not be checked on its flights.
         """
-        failed = [] if force else [check for check in self.checks().failed if check.subject == "twin"]
-        if failed:
-            raise NotAvailable(
-                f"Export: expected a twin that holds its checks, found: {' '.join(map(str, failed))} Learn from more"
-                " tests, or pass force=True (--force)."
-            )
-        setup = self.setup
-        episode = Episode(
-            setup.initial_state, setup.final_target, setup.steps, setup.options.divergence_factor
-        )
-        return self.twin.export(to, kind=kind, precision=precision, force=force, episode=episode)
+        return taken_twin(self, to, kind, precision, force)
 
     def export_controller(
         self,
@@ -624,13 +528,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             InvalidInput: unknown gains, no such kind, or a path that cannot be written.
             NotAvailable: a family of one's own, or an export that could not be checked.
         """
-        kind, path = asked(to, None)
-        genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
-        name = "controller" if path is None else path.stem
-        flights = [] if force else [run.trajectory for run in self.experiments]
-        described, target = self.setup.controller, self.setup.target_state
-        texts = exported_controller(described, self.family, genes, kind, name, precision, flights, target)
-        return delivered(texts, name, path)
+        return taken_controller(self, to, parameters, precision, force)
 
     @property
     def committee(self) -> tuple[_core.Model, ...]:
@@ -669,6 +567,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return tuple(self._book.waiting())
 
     @property
+    def runs(self) -> int:
+        """Runs of tests on the system, the failed ones too; those that were attached are none of a test."""
+        return self._book.runs
+
+    @property
     def failures(self) -> tuple[Failure, ...]:
         """Tests that failed, in the order they were told."""
         return tuple(self._book.failures)
@@ -688,7 +591,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
     @property
     def plot(self) -> Any:
         """Figures by name, such as `campaign.plot.unseen()`; `campaign.plot(path)` draws all flights, .svg or .png."""
-        return _face("figures.plots").Plots(self)
+        return plots(self)
 
     def report(self, to: str | Path | None = None, name: str = "campaign") -> str:
         """The whole result for a person, beginning with a verdict of three sentences; `print(campaign)` shows it.
@@ -704,14 +607,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             InvalidInput: a file that cannot be written.
             NotAvailable: nothing was told, or Jinja2 is missing.
         """
-        if to is None:
-            text: str = _face("text").render(_face("result").summary(self, {"name": name}, {}))
-            return text
-        files, path = _face("files"), Path(to)
-        files.check_writable(path, [".html"])
-        page: str = _face("report.page").report_page(self, name, {"name": name}, {})
-        files.write_text(path, page)
-        return page
+        return reported(self, to, name)
 
     def __str__(self) -> str:
         return self.report() if self._book.experiments else repr(self)
@@ -755,47 +651,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
             self._keep()
             raise
 
-    def _next(self, system: System, last: bool) -> Test:
-        waiting = self._book.waiting()
-        if waiting:
-            return waiting[0]
-        made = self._book.made()
-        if made is not None:
-            return made
-        if self._book.experiments:
-            return self.ask(last)
-        if self._book.failures:
-            raise NotAvailable(
-                "Campaign.run: expected a first test that has not failed, found none; make one with"
-                " campaign.test(gains), from another controller that you trust."
-            )
-        gains = getattr(system, "default_gains", None)
-        if gains is None:
-            raise NotAvailable(
-                "Campaign.run: expected a first test, found none and no `default_gains` of "
-                f"{type(system).__name__}; make one with campaign.test(gains), from a controller you trust."
-            )
-        return self.test(gains)
-
     def _report_experiment(self) -> None:
         progress = Progress(
             "experiment", self._method.iteration, 0, 0, len(self._book.experiments), (), (), (), 0, 0
         )
         self._report(progress)
-
-
-def _face(name: str) -> Any:
-    """What shows a campaign stands above it, and is loaded when something is shown."""
-    return import_module(f"twinloop.faces.{name}")
-
-
-def controller_to_fly(campaign: Campaign) -> tuple[Test | None, str]:
-    """The best test of a campaign, if there is any, and why there is none.
-
-    Args:
-        campaign: with at least one experiment.
-    """
-    try:
-        return campaign.best_test, ""
-    except NotAvailable as reason:
-        return None, str(reason)

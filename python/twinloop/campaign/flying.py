@@ -1,0 +1,136 @@
+"""Flying: the loop of `Campaign.run`, from the test that is next to what became of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from twinloop.arrays import share, whole
+from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
+from twinloop.signals import Signals
+from twinloop.systems import System
+from twinloop.systems.patience import run_within
+from twinloop.test import Test, check_signals
+from twinloop.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from twinloop.campaign.campaign import Campaign
+
+
+def checked_budget(campaign: Campaign, system: object, experiments: int) -> int:
+    """The runs on the system in all, once they can be made.
+
+    Args:
+        campaign: that shall fly.
+        system: to be flown.
+        experiments: runs on it in all, those told before included.
+
+    Raises:
+        InvalidInput: no system, or fewer experiments than were told already.
+    """
+    budget = whole("Campaign.run, experiments", experiments, least=1)
+    described = isinstance(getattr(system, "signals", None), Signals)
+    if not (described and callable(getattr(system, "run", None))):
+        raise InvalidInput(
+            "Campaign.run, system: expected an object with twinloop.Signals as `signals` and with `run(test)`, "
+            f"found {type(system).__name__}; add them."
+        )
+    if budget < campaign.runs:
+        raise InvalidInput(
+            f"Campaign.run, experiments: expected at least the {campaign.runs} runs that were told already, found"
+            f" {budget}; every run counts, so for one more say {campaign.runs + 1}."
+        )
+    return budget
+
+
+def checked_risk(max_risk: float | None) -> float:
+    """The risk above which no test is flown.
+
+    Args:
+        max_risk: a probability; None: any risk is taken.
+
+    Raises:
+        InvalidInput: no probability.
+    """
+    return 1.0 if max_risk is None else share("Campaign.run, max_risk", max_risk)
+
+
+def fly(
+    campaign: Campaign,
+    system: System,
+    budget: int,
+    timeout: float | None,
+    allowed: float,
+    announce: Callable[[], None],
+) -> None:
+    """Flies and tells one test after another until the budget is spent.
+
+    Args:
+        campaign: that asks and is told.
+        system: to be flown.
+        budget: runs on it in all.
+        timeout: seconds that it may take for a test; None: as long as it wants.
+        allowed: probability above which a test that may leave the envelope is not flown.
+        announce: called before each flight.
+    """
+    failed = False
+    while campaign.runs < budget:
+        test = _next(campaign, system, last=campaign.runs + 1 == budget)
+        check_signals(test, system.signals)
+        if test.risk is not None and test.risk > allowed:
+            raise TooRisky(
+                f"Campaign.run: expected a test that leaves the envelope with a probability of at most"
+                f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; it waits and was not flown:"
+                " fly it by hand, abandon it, or raise max_risk."
+            )
+        announce()
+        failed = _flown(campaign, system, test, timeout, failed)
+
+
+def _next(campaign: Campaign, system: System, last: bool) -> Test:
+    """What waits; a first test that was made; or one that is asked for now."""
+    if campaign.waiting:
+        return campaign.waiting[0]
+    made = _made(campaign)
+    if made is not None:
+        return made
+    if campaign.experiments:
+        return campaign.ask(last)
+    if campaign.failures:
+        raise NotAvailable(
+            "Campaign.run: expected a first test that has not failed, found none; make one with"
+            " campaign.test(gains), from another controller that you trust."
+        )
+    gains = getattr(system, "default_gains", None)
+    if gains is None:
+        raise NotAvailable(
+            "Campaign.run: expected a first test, found none and no `default_gains` of "
+            f"{type(system).__name__}; make one with campaign.test(gains), from a controller you trust."
+        )
+    return campaign.test(gains)
+
+
+def _made(campaign: Campaign) -> Test | None:
+    """Before there is a run of any test: the last one that was made, and neither failed nor was abandoned."""
+    if any(not run.attached for run in campaign.experiments):
+        return None
+    return next((test for test in reversed(campaign.tests) if campaign.status(test) == "asked"), None)
+
+
+def _flown(campaign: Campaign, system: System, test: Test, timeout: float | None, again: bool) -> bool:
+    """One run, told as what became of it: whether the system failed, which it may not do `again`."""
+    try:
+        trajectory = run_within(system, test, timeout)
+    except NoAnswer:
+        raise
+    except SystemFailure as failure:
+        campaign.tell_failed(test, str(failure))
+        if again or not campaign.experiments:
+            raise
+        return True
+    if isinstance(trajectory, Trajectory) and trajectory.ended == "aborted" and trajectory.steps < 2:
+        # Ended before there was anything to learn from: that it was is the result.
+        campaign.tell_failed(test, trajectory.reason or "ended at once")
+    else:
+        campaign.tell(test, trajectory)
+    return False

@@ -1,0 +1,52 @@
+"""Guarding: what a campaign knows of a test, for the guard that watches its flight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from twinloop.controllers import Controller
+from twinloop.guard import Guard
+from twinloop.test import Test, check_signals
+
+if TYPE_CHECKING:
+    from twinloop.campaign.campaign import Campaign
+
+
+def guard_of(
+    campaign: Campaign,
+    test: Test,
+    fallback: Mapping[str, float] | ArrayLike | None,
+    *,
+    horizon: float | None,
+    false_alarms: float,
+    overrun: float = 0.5,
+    clock: Callable[[], float] | None,
+) -> Guard:
+    """The guard of a test, as `Campaign.guard` describes it; with a twin only where that follows the flights so far."""
+    check_signals(test, campaign.signals)
+    flown = [(run.test, run.trajectory) for run in campaign.experiments if run.test is not None]
+    twin = campaign.twin if campaign.experiments else None
+    return Guard(
+        test,
+        _instead(campaign, flown[0][0] if flown else test, fallback),
+        twin=None if twin is None or not twin.follows else twin,
+        flown=flown,
+        horizon=horizon,
+        false_alarms=false_alarms,
+        overrun=overrun,
+        clock=clock,
+    )
+
+
+def _instead(
+    campaign: Campaign, trusted: Test, fallback: Mapping[str, float] | ArrayLike | None
+) -> Controller | ArrayLike:
+    """What commands once the guard has tripped: gains by name, a held command, or the controller of a trusted test."""
+    if fallback is None:
+        return campaign.family.controller(trusted.genes)
+    if isinstance(fallback, Mapping):
+        return campaign.family.controller(campaign.family.genes(fallback))
+    return fallback

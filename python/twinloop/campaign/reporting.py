@@ -1,0 +1,31 @@
+"""Reporting: the result of a campaign as text or as a page; what shows it stands above and is loaded when asked."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from twinloop.campaign.campaign import Campaign
+
+
+def reported(campaign: Campaign, to: str | Path | None, name: str) -> str:
+    """The whole result, as `Campaign.report` describes it."""
+    if to is None:
+        text: str = _face("text").render(_face("result").summary(campaign, {"name": name}, {}))
+        return text
+    files, path = _face("files"), Path(to)
+    files.check_writable(path, [".html"])
+    page: str = _face("report.page").report_page(campaign, name, {"name": name}, {})
+    files.write_text(path, page)
+    return page
+
+
+def plots(campaign: Campaign) -> Any:
+    """Figures by name, as `Campaign.plot` describes them."""
+    return _face("figures.plots").Plots(campaign)
+
+
+def _face(name: str) -> Any:
+    return import_module(f"twinloop.faces.{name}")

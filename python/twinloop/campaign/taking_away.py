@@ -1,0 +1,50 @@
+"""Taking away: the twin and the controller of a campaign for use elsewhere, checked before they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from twinloop.errors import NotAvailable
+from twinloop.law.exports.export import asked, delivered, exported_controller
+from twinloop.law.exports.gymnasium_source import Episode
+
+if TYPE_CHECKING:
+    from twinloop.campaign.campaign import Campaign
+
+
+def taken_twin(
+    campaign: Campaign, to: str | Path, kind: str | None, precision: str, force: bool
+) -> str | tuple[Path, ...]:
+    """The twin as `Campaign.export_twin` describes it, with the campaign's task as the episode of an environment."""
+    failed = [] if force else [check for check in campaign.checks().failed if check.subject == "twin"]
+    if failed:
+        raise NotAvailable(
+            f"Export: expected a twin that holds its checks, found: {' '.join(map(str, failed))} Learn from more"
+            " tests, or pass force=True (--force)."
+        )
+    setup = campaign.setup
+    episode = Episode(setup.initial_state, setup.final_target, setup.steps, setup.options.divergence_factor)
+    return campaign.twin.export(to, kind=kind, precision=precision, force=force, episode=episode)
+
+
+def taken_controller(
+    campaign: Campaign,
+    to: str | Path,
+    parameters: Mapping[str, float] | ArrayLike | None,
+    precision: str,
+    force: bool,
+) -> str | tuple[Path, ...]:
+    """A controller as `Campaign.export_controller` describes it, compared on the flights of the campaign."""
+    kind, path = asked(to, None)
+    genes = campaign.best_test.genes if parameters is None else campaign.family.genes(parameters)
+    name = "controller" if path is None else path.stem
+    flights = [] if force else [run.trajectory for run in campaign.experiments]
+    setup = campaign.setup
+    texts = exported_controller(
+        setup.controller, setup.family, genes, kind, name, precision, flights, setup.target_state
+    )
+    return delivered(texts, name, path)
