@@ -12,8 +12,8 @@ from pathlib import Path
 import click
 
 from twinloop.arrays import whole
+from twinloop.campaign.remaining import duration
 from twinloop.errors import InvalidInput, NotAvailable, unknown
-from twinloop.faces.console import duration
 from twinloop.faces.files import write_text
 from twinloop_exam.kinds import Fitter, Tuner
 from twinloop_exam.learners import LEARNERS, for_smoke, learner

@@ -7,7 +7,8 @@ from rich.console import Console
 
 from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import options_of
-from twinloop.faces.console import USUAL, StepEstimate, Watch
+from twinloop.campaign.remaining import USUAL, StepEstimate
+from twinloop.faces.console import Watch
 from twinloop.steps import STEPS
 
 
@@ -32,7 +33,7 @@ def test_every_step_of_the_preset_has_words_and_a_share():
 
 def test_the_time_left_of_default_is_right_where_steps_take_their_usual_share(monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr("twinloop.faces.console.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("twinloop.campaign.remaining.time.monotonic", lambda: clock[0])
     estimate = StepEstimate(experiments=3)
     whole = sum(USUAL[p.phase][1] * (1 + p.told) for p in flown(3) if p.phase in STEPS)
     told = []
@@ -64,7 +65,7 @@ def test_nothing_is_said_of_the_time_left_before_anything_is_known():
 
 def test_a_slow_step_never_makes_the_time_left_negative(monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr("twinloop.faces.console.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("twinloop.campaign.remaining.time.monotonic", lambda: clock[0])
     estimate = StepEstimate(experiments=1)
     estimate.remaining(progress("noise", 1))
     clock[0] = 0.1

@@ -1,9 +1,7 @@
 """The dashboard as people and strangers meet it: over HTTP, and in a browser."""
 
 import contextlib
-import http.client
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -16,6 +14,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
+from dashboards import begun, call, flight, look, served
 from lives import PLANT, stored
 
 pytest.importorskip("starlette", reason="twinloop[dashboard] is not installed")
@@ -23,62 +22,13 @@ pytest.importorskip("uvicorn", reason="twinloop[dashboard] is not installed")
 
 from twinloop.faces.dashboard import app, desk
 from twinloop.faces.dashboard.command import prepared
-from twinloop.logs import write_columns
 
 HOSTILE = "<script>alert(1)</script> & ../../etc"
 
 
-@contextlib.contextmanager
-def served(store, **how):
-    """A dashboard that runs, and its address."""
-    server, address = prepared(str(store), 0, threads=1, **how)
-    thread = threading.Thread(target=server.run, daemon=True)
-    thread.start()
-    for _ in range(100):
-        if server.server.started:
-            break
-        time.sleep(0.05)
-    try:
-        yield address
-    finally:
-        server.stop()
-        thread.join(10.0)
-
-
-def call(address, method, path, body=None, **headers):
-    """Status, headers and text of an answer."""
-    where = urlsplit(address)
-    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=60)
-    sent = {"Origin": f"http://{where.netloc}"} if method == "POST" else {}
-    connection.request(method, path, body, {**sent, **{k.replace("_", "-"): v for k, v in headers.items()}})
-    answer = connection.getresponse()
-    text = answer.read().decode()
-    connection.close()
-    return answer.status, dict(answer.getheaders()), text
-
-
-def flight(path, test, steps=None):
-    """The log of a test, as a rig would have written it."""
-    run = PLANT.run(test)
-    n = run.steps if steps is None else steps
-    columns = {"t": run.t[: n + 1], "angle": run.states[: n + 1, 0], "rate": run.states[: n + 1, 1]}
-    write_columns(path, {**columns, "torque": run.commands[:n, 0]})
-    return path.read_bytes()
-
-
 @pytest.fixture
 def store(tmp_path):
-    path = tmp_path / "hover.db"
-    campaign = stored(path, preset="default")
-    test = campaign.test(PENDULUM_GAINS)
-    campaign.tell(test, PLANT.run(test))
-    campaign.ask()
-    campaign.close()
-    return path
-
-
-def look(store, name="campaign"):
-    return tl.Campaign.load(store, name, read_only=True)
+    return begun(tmp_path / "hover.db")
 
 
 def test_a_test_is_approved_told_and_the_next_one_planned(store, tmp_path):
@@ -274,49 +224,3 @@ def test_only_one_long_thing_goes_on_at_a_time(store, monkeypatch):
             break
         time.sleep(0.05)
     table.abandon("campaign", 1)
-
-
-# In a browser
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    browser = pytest.importorskip("browser")
-    with browser.browser() as started:
-        yield started
-
-
-@pytest.mark.parametrize("size", ["desktop", "phone", "dark"])
-def test_a_log_is_dropped_and_the_page_follows(chromium, store, tmp_path, size):
-    from browser import SIZES, kept, serious
-
-    width, height, scheme = SIZES[size]
-    with served(store) as address:
-        context = chromium.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
-        page, said = context.new_page(), []
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.goto(address)
-        page.get_by_role("heading", name="Test 1").wait_for()
-        page.get_by_role("button", name="Approve").click()
-        page.get_by_text("Approved 20").wait_for()
-        page.frame_locator("#report").locator("svg.plot").first.wait_for()
-        page.wait_for_timeout(300)
-        kept(page, f"dashboard-{size}")
-        assert serious(page) == []
-        bad = tmp_path / "bad.csv"
-        bad.write_text("a,b\n1,2\n")
-        page.locator(".test input[type=file]").set_input_files(bad)
-        page.get_by_role("alert").get_by_text("column").wait_for()
-        flight(tmp_path / "flight.csv", look(store).tests[1])
-        page.locator(".test input[type=file]").set_input_files(tmp_path / "flight.csv")
-        page.get_by_text("2 experiments are kept").wait_for()
-        page.get_by_text("None waits to be flown").wait_for(timeout=30_000)
-        page.get_by_role("button", name="Plan the next test").click()
-        page.get_by_role("heading", name="Test 2").wait_for(timeout=60_000)
-        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
-        assert wide[0] <= wide[1]
-        # A refused upload is an answer that the browser reports by itself.
-        assert [text for text in said if "422" not in text] == []
-        context.close()
-    assert os.path.exists(store) and len(look(store).experiments) == 2

@@ -8,7 +8,7 @@ import pytest
 
 from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import options_of
-from twinloop.faces.console import Estimate, duration
+from twinloop.campaign.remaining import Estimate, duration
 from twinloop.faces.result import plain, to_json
 from twinloop.faces.text import quality_words, render, table
 
@@ -49,7 +49,7 @@ def progress(phase, iteration, generation, generations):
 
 def test_the_time_left_shrinks_to_nothing_with_the_work(monkeypatch):
     clock = iter(range(100))
-    monkeypatch.setattr("twinloop.faces.console.time.monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr("twinloop.campaign.remaining.time.monotonic", lambda: float(next(clock)))
     options = options_of("paper", {"model_generations": 10, "test_generations": 5})
     estimate = Estimate(options, experiments=1)
     assert estimate.remaining(progress("experiment", 0, 0, 0)) is None

@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from lives import LIFE, OTHER_GAINS, SMALL, flown, lived, plain, stored
 from sameness import same
 from twinloop.campaign import keeping
 from twinloop.records import to_text
-from twinloop.store import found, kept, opened
+from twinloop.store import Keeper, doing, found, kept, opened
 
 
 def rows(path, table):
@@ -447,3 +448,48 @@ def test_without_its_packages_the_store_says_what_to_install(path, monkeypatch, 
 def test_a_campaign_needs_a_name_in_its_store(path, name):
     with pytest.raises(tl.InvalidInput, match="name"):
         stored(path, name=name)
+
+
+# Watched
+
+
+def test_what_is_being_done_is_said_to_whoever_looks_and_ends_with_it(path, pendulum, monkeypatch):
+    monkeypatch.setattr(keeping, "BEAT", 0.0)
+    campaign, seen = flown(stored(path, preset="default"), pendulum), []
+
+    def look(progress):
+        with closing(opened(path, read_only=True)) as store:
+            now = doing(store, "campaign")
+        assert now.record["phase"] == progress.phase and 0.0 <= now.silent < 60.0
+        seen.append((now.record["phase"], now.record["generation"], now.record["left"]))
+
+    campaign.progress = look
+    campaign.run(pendulum, 3)
+    assert {"terms", "gains", "experiment"} <= {phase for phase, _, _ in seen}
+    # The time left is known once a step was seen to end.
+    assert seen[0][2] is None and all(left >= 0.0 for _, _, left in seen[3:])
+    with closing(opened(path, read_only=True)) as store:
+        assert doing(store, "campaign") is None
+    campaign.close()
+
+
+def test_who_was_killed_is_known_by_the_time_that_he_has_been_silent(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    campaign.close()
+    row = "insert into progress values (1, '2020-01-01T00:00:00+00:00', '{}')"
+    with sqlite3.connect(path) as connection:
+        connection.execute(row)
+    with closing(opened(path, read_only=True)) as store:
+        assert doing(store, "campaign").silent > 1e6
+
+
+def test_a_store_that_cannot_be_written_says_nothing_of_what_is_done_and_goes_on(path, pendulum, monkeypatch):
+    campaign = flown(stored(path), pendulum)
+    monkeypatch.setattr(keeping, "BEAT", 0.0)
+
+    def refused(self, doing):
+        raise tl.errors.StoreFailure("no room")
+
+    monkeypatch.setattr(Keeper, "say", refused)
+    assert campaign.ask().number == 1
+    campaign.close()

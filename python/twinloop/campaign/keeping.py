@@ -6,6 +6,7 @@ import platform
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,10 +14,12 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import whole
+from twinloop.campaign.history import Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
+from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
-from twinloop.errors import InvalidInput, unknown
+from twinloop.errors import InvalidInput, StoreFailure, unknown
 from twinloop.records import Record, Recorded
 from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened, shown_name
 
@@ -24,6 +27,8 @@ Answer = TypeVar("Answer")
 
 SECONDS = 30.0
 """Between two checkpoints of a search that is under way, at most."""
+BEAT = 1.0
+"""Seconds between two times that it is said what is being done, at least."""
 
 
 class Keeping:
@@ -44,6 +49,7 @@ class Keeping:
 
     def __init__(self, where: str | Path, name: str, setup: Setup, identity: str, threads: int) -> None:
         _check_name(name)
+        self._said: float | None = None
         asked = setup.to_record()
         store = opened(where, create=True)
         try:
@@ -66,6 +72,8 @@ class Keeping:
         self._flown: object = None
         self._memory: object = None
         self._saved = time.monotonic()
+        self._budget = held.experiments
+        self._remaining = estimate(setup.options, held.experiments or 1)
 
     def keep(self, book: Logbook, method: Method) -> None:
         """Commits what is new in the book, and what was learnt since.
@@ -81,6 +89,7 @@ class Keeping:
         record = None if memory is self._memory else method.to_record()
         self._keeper.keep(book.entries(self._keeper.rows), record, self._count())
         self._memory, self._saved = memory, time.monotonic()
+        self.rest()
 
     def restored(self, memory: object) -> None:
         """Says that what is remembered now is what the store holds."""
@@ -98,6 +107,30 @@ class Keeping:
         if time.monotonic() - self._saved >= SECONDS and method.memory is not self._memory:
             self._keeper.keep({}, method.to_record())
             self._memory, self._saved = method.memory, time.monotonic()
+
+    def say(self, progress: Progress) -> None:
+        """Lets those who look at the store know what is being done, now and then.
+
+        Args:
+            progress: of the campaign.
+        """
+        experiments = max(self._budget or 1, progress.told)
+        self._remaining.experiments = experiments
+        left, now = self._remaining.remaining(progress), time.monotonic()
+        if self._said is not None and abs(now - self._said) < BEAT:
+            return
+        self._said = now
+        doing = {"phase": progress.phase, "generation": progress.generation, "generations": progress.generations,
+                 "told": progress.told, "experiments": experiments, "left": left}  # fmt: skip
+        with suppress(StoreFailure):  # what has to be kept will tell it
+            self._keeper.say(doing)
+
+    def rest(self) -> None:
+        """Lets them know that nothing is being done any more."""
+        if self._said is not None:
+            self._said = None
+            with suppress(StoreFailure):
+                self._keeper.say(None)
 
     def fly(self, system: object, experiments: int) -> None:
         """Takes up a system where the campaign left it: one that counts its runs, as its noise depends on them.
@@ -119,6 +152,7 @@ class Keeping:
         elif record is not None:
             self._system = record
         self._keeper.fly(self._system, experiments)
+        self._budget = experiments
         runs = getattr(system, "runs", None)
         if not isinstance(runs, int) or isinstance(runs, bool):
             self._flown = None
@@ -139,6 +173,7 @@ class Keeping:
 
     def close(self) -> None:
         """Lets others write."""
+        self.rest()
         self._keeper.close()
 
     def _count(self) -> int | None:

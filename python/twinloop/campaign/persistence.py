@@ -234,6 +234,7 @@ class Persistent(Recorded):
     def _report(self, progress: Progress) -> None:
         if self._keeping is not None:
             self._keeping.checkpoint(self._method)
+            self._keeping.say(progress)
         if self.progress is not None:
             self.progress(progress)
 

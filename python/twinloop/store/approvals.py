@@ -1,4 +1,4 @@
-"""What people say of tests that a campaign has asked for: this one may be flown. And whether anything has changed."""
+"""What people say of tests that a campaign has asked for: this one may be flown."""
 
 from __future__ import annotations
 
@@ -46,24 +46,3 @@ def approved(store: Store, name: str) -> dict[int, str]:
             select(approvals.c.number, approvals.c.approved).join(campaigns).where(campaigns.c.name == name)
         )
         return {number: when for number, when in connection.execute(chosen.order_by(approvals.c.number))}
-
-
-def state(store: Store, name: str) -> str:
-    """A text that is another one whenever anything of a campaign was kept since; it reads no record.
-
-    Args:
-        store: open.
-        name: of the campaign.
-    """
-    from sqlalchemy import func, select
-
-    from twinloop.store.schema import ENTRIES, approvals, campaigns, checkpoints
-
-    of_this = select(campaigns.c.id).where(campaigns.c.name == name).scalar_subquery()
-    counts = [
-        select(func.count()).select_from(table).where(table.c.campaign == of_this).scalar_subquery()
-        for table in (*ENTRIES.values(), approvals)
-    ]
-    saved = select(checkpoints.c.saved).where(checkpoints.c.campaign == of_this).scalar_subquery()
-    with store.transaction() as connection:
-        return " ".join(str(value) for value in connection.execute(select(*counts, saved)).one())

@@ -261,6 +261,25 @@ class Keeper:
             row = update(campaigns).where(campaigns.c.id == self._id)
             connection.execute(row.values(system=flown, experiments=experiments))
 
+    def say(self, doing: Record | None) -> None:
+        """Enters what is being done, for those who look; nothing depends on it.
+
+        Args:
+            doing: phase, step and so on; None: nothing any more.
+
+        Raises:
+            StoreFailure: the database refuses.
+        """
+        from sqlalchemy import delete
+
+        from twinloop.store.schema import progress
+
+        with self.store.transaction() as connection:
+            connection.execute(delete(progress).where(progress.c.campaign == self._id))
+            if doing is not None:
+                row = {"campaign": self._id, "said": _now(), "record": to_text(doing)}
+                connection.execute(progress.insert(), row)
+
     def close(self) -> None:
         """Lets others write."""
         if self._lock is not None:

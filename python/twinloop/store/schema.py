@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import Column, ForeignKey, Integer, MetaData, String, Table, Text
 
-REVISION = "0002"
+REVISION = "0003"
 """Of these tables; the newest migration makes them."""
 
 metadata = MetaData()
@@ -76,3 +76,12 @@ checkpoints = Table(
     Column("record", Text, nullable=False),
 )
 """What was learnt, and a search that is under way: the last one of each campaign."""
+
+progress = Table(
+    "progress",
+    metadata,
+    Column("campaign", Integer, ForeignKey("campaigns.id"), primary_key=True),
+    Column("said", String(40), nullable=False),
+    Column("record", Text, nullable=False),
+)
+"""What the writer of a campaign is doing, said every other second; there is no row where nobody works."""

@@ -15,7 +15,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from twinloop.faces.console import duration
+from twinloop.campaign.remaining import duration
 
 
 class JobBar:

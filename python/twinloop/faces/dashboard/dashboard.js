@@ -85,9 +85,9 @@
     try {
       const now = await (await fetch(at + "/state")).json();
       get("ask").disabled = now.working !== null;
-      get("status").textContent = now.working === null ? "Up to date." : "Working: " + now.working + " (" + now.seconds + " s)";
+      get("status").textContent = now.working === null ? "Up to date." : now.working;
       if (now.failed) say(now.failed, true);
-      if (now.state !== state && now.working === null) {
+      if (now.state !== state) {
         await show();
         state = now.state;
       }

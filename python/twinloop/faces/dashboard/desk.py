@@ -3,31 +3,18 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.history import Progress
+from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
-from twinloop.faces.console import USUAL
 from twinloop.faces.telling import attach, numbered, tell, tell_failed
-from twinloop.store import approve, approved, kept, opened, state
+from twinloop.store import Doing, approve, approved, doing, kept, opened, state
 
-
-@dataclass(frozen=True)
-class Work:
-    """Something long that goes on.
-
-    Args:
-        what: in a few words.
-        since: seconds on the monotonic clock.
-    """
-
-    what: str
-    since: float
+LOST = 120.0
+"""Seconds after which a writer that says nothing may have ended without a word: no step is silent for much longer."""
 
 
 class Desk:
@@ -47,7 +34,7 @@ class Desk:
         self.store = store
         self.threads = threads
         self._turn = threading.Lock()
-        self._work: dict[str, Work] = {}
+        self._busy: set[str] = set()
         self._failed: dict[str, str] = {}
         with closing(opened(store)):  # an older store is brought up to date, and what is none is refused
             pass
@@ -75,12 +62,10 @@ class Desk:
             name: of the campaign.
         """
         with closing(opened(self.store, read_only=True)) as base:
-            text = state(base, name)
-        work = self._work.get(name)
+            text, seen = state(base, name), doing(base, name)
         return {
             "state": text,
-            "working": None if work is None else work.what,
-            "seconds": None if work is None else round(time.monotonic() - work.since),
+            "working": in_words(seen) if seen is not None else "Working." if name in self._busy else None,
             "failed": self._failed.get(name),
         }
 
@@ -188,7 +173,7 @@ class Desk:
         """
 
         def plan() -> None:
-            with self._writing(name, self._progress(name)) as campaign:
+            with self._campaign(name) as campaign:
                 if not campaign.experiments:
                     raise NotAvailable(
                         "Ask: expected a flight that was told, found none; tell the first test, or attach a flight."
@@ -201,10 +186,10 @@ class Desk:
             )
         try:
             self._failed.pop(name, None)
-            self._work[name] = Work("opening the campaign", time.monotonic())
+            self._busy.add(name)
             threading.Thread(target=self._behind, args=(name, plan), daemon=True).start()
         except BaseException:
-            self._work.pop(name, None)
+            self._busy.discard(name)
             self._turn.release()
             raise
         return "Learning, and planning the next test."
@@ -217,30 +202,41 @@ class Desk:
         except Exception as failure:  # whatever it is, the page has to say that it is over
             self._failed[name] = f"It failed: {type(failure).__name__}: {failure}"
         finally:
-            self._work.pop(name, None)
+            self._busy.discard(name)
             self._turn.release()
 
-    def _progress(self, name: str) -> Callable[[Progress], None]:
-        begun = time.monotonic()
-
-        def seen(progress: Progress) -> None:
-            words = USUAL.get(progress.phase, (progress.phase, 0.0))[0]
-            if progress.generations > 1:
-                words += f", {progress.generation} of {progress.generations}"
-            self._work[name] = Work(words, begun)
-
-        return seen
-
     @contextmanager
-    def _writing(self, name: str, progress: Callable[[Progress], None] | None = None) -> Iterator[Campaign]:
-        """The campaign, with this process as its only writer; the turn is held already where progress is told."""
-        if progress is None and not self._turn.acquire(blocking=False):
+    def _writing(self, name: str) -> Iterator[Campaign]:
+        """The campaign, with this process as its only writer, one thing at a time."""
+        if not self._turn.acquire(blocking=False):
             raise InvalidInput("Expected nothing else under way, found something; wait until it is done.")
         try:
-            with closing(
-                Campaign.load(self.store, name, threads=self.threads, progress=progress)
-            ) as campaign:
+            with self._campaign(name) as campaign:
                 yield campaign
         finally:
-            if progress is None:
-                self._turn.release()
+            self._turn.release()
+
+    def _campaign(self, name: str) -> closing[Campaign]:
+        return closing(Campaign.load(self.store, name, threads=self.threads))
+
+
+def in_words(seen: Doing) -> str:
+    """What the writer of a campaign is doing, whatever process it is, for a person.
+
+    Args:
+        seen: in the store.
+    """
+    record = seen.record
+    told, experiments, left = record["told"], record["experiments"], record["left"]
+    phase, step, steps = str(record["phase"]), record["generation"], record["generations"]
+    if phase == "experiment":
+        said = f"flying experiment {told + 1} of {experiments}"
+    else:
+        names = {"models": "evolving models", "tests": "evolving tests"}
+        what, turn = (USUAL[phase][0], "step") if phase in USUAL else (names.get(phase, phase), "generation")
+        said = f"{what}, {turn} {step} of {steps}; experiments told: {told} of {experiments}"
+    if left is not None:
+        said += f"; about {duration(left)} left"
+    if seen.silent > LOST:
+        said += f"; nothing was heard of it for {duration(seen.silent)}, it may have ended without a word"
+    return f"Working: {said}."

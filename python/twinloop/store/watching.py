@@ -1,0 +1,66 @@
+"""What is to be seen of a campaign without reading it: whether anything has changed, and what its writer is doing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timezone
+
+from twinloop.records import Record, from_text
+from twinloop.store.database import Store
+
+
+@dataclass(frozen=True)
+class Doing:
+    """What the writer of a campaign has said last that it does.
+
+    Args:
+        record: of its progress.
+        silent: seconds since then, by the clocks of both; a writer that was killed stays silent for good.
+    """
+
+    record: Record
+    silent: float
+
+
+def state(store: Store, name: str) -> str:
+    """A text that is another one whenever anything of a campaign was kept since; it reads no record.
+
+    Args:
+        store: open.
+        name: of the campaign.
+    """
+    from sqlalchemy import func, select
+
+    from twinloop.store.schema import ENTRIES, approvals, campaigns, checkpoints
+
+    of_this = select(campaigns.c.id).where(campaigns.c.name == name).scalar_subquery()
+    counts = [
+        select(func.count()).select_from(table).where(table.c.campaign == of_this).scalar_subquery()
+        for table in (*ENTRIES.values(), approvals)
+    ]
+    saved = select(checkpoints.c.saved).where(checkpoints.c.campaign == of_this).scalar_subquery()
+    with store.transaction() as connection:
+        return " ".join(str(value) for value in connection.execute(select(*counts, saved)).one())
+
+
+def doing(store: Store, name: str) -> Doing | None:
+    """What the writer of a campaign is doing, in whatever process.
+
+    Args:
+        store: open.
+        name: of the campaign.
+
+    Returns:
+        None where nobody works on it.
+    """
+    from sqlalchemy import select
+
+    from twinloop.store.schema import campaigns, progress
+
+    wanted = select(progress.c.said, progress.c.record).join(campaigns).where(campaigns.c.name == name)
+    with store.transaction() as connection:
+        row = connection.execute(wanted).one_or_none()
+    if row is None:
+        return None
+    silent = (datetime.now(timezone.utc) - datetime.fromisoformat(row.said)).total_seconds()
+    return Doing(from_text(row.record, f"Store {store.name}, progress of {name}"), max(0.0, silent))
