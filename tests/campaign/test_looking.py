@@ -7,8 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
-from lives import FULL_LIFE, LIFE, PLANT, StopAt, lived, new, outcome
+from conftest import PENDULUM_GAINS
+from lives import FULL_LIFE, LIFE, PLANT, StopAt, lived, new, outcome, stored
+from sameness import same
 from twinloop.faces.result import summary
+from twinloop.planning.planner import Planner
 
 LOOKS = {
     "twin": lambda campaign: campaign.twin.simulate(campaign.experiments[0].test),
@@ -123,3 +126,52 @@ def test_a_look_that_was_interrupted_changes_nothing():
             return campaign
 
         assert outcome(lived(new(preset), LIFE, look)) == unseen(preset)
+
+
+# From a store
+
+
+def refuse(*_):
+    raise AssertionError("a look has tuned gains")
+
+
+def looked(path, monkeypatch):
+    """The controller to fly, as whoever reads the store sees it; tuning fails."""
+    monkeypatch.setattr(Planner, "tune", refuse)
+    campaign = tl.Campaign.load(path, read_only=True, threads=1)
+    campaign.interrupted = True
+    best = campaign.best_test
+    monkeypatch.undo()
+    return best
+
+
+def test_whoever_looks_at_a_store_tunes_nothing(tmp_path, monkeypatch):
+    """The controller stands there with what was learnt; after a flight that is not learnt yet it is still the one."""
+    path = tmp_path / "hover.db"
+    campaign = stored(path, "default")
+    first = campaign.test(PENDULUM_GAINS)
+    campaign.tell(first, PLANT.run(first))
+    best = campaign.best_test
+    assert same(looked(path, monkeypatch), best)
+    asked = campaign.ask()
+    known = looked(path, monkeypatch)
+    assert same(known.genes, best.genes) and known.predicted == best.predicted
+    campaign.tell(asked, PLANT.run(asked))
+    assert looked(path, monkeypatch).reason
+    campaign.tell_failed(campaign.ask(), "the motor cut out")
+    assert looked(path, monkeypatch).reason
+    campaign.close()
+
+
+def test_a_twin_on_which_nothing_was_tuned_yet_shows_the_gains_known_before(tmp_path, monkeypatch):
+    path = tmp_path / "hover.db"
+    campaign = stored(path, "default")
+    first = campaign.test(PENDULUM_GAINS)
+    campaign.tell(first, PLANT.run(first))
+    _ = campaign.twin
+    assert "Nothing was tuned on this twin yet." in looked(path, monkeypatch).reason
+    assert same(looked(path, monkeypatch).genes, first.genes)
+    campaign.tell(campaign.ask(), PLANT.run(campaign.tests[1]))
+    _ = campaign.twin
+    assert "Nothing was tuned on this twin yet." in looked(path, monkeypatch).reason
+    campaign.close()

@@ -412,7 +412,9 @@ class Campaign(Shown, Persistent, kind="campaign"):
         """
         self._learn()
         with self._interruptible():
-            return self._method.best_test(self._book)
+            best = self._method.best_test(self._book, at_once=self.interrupted)
+            self._keep()  # who looks later need not tune again
+            return best
 
     @property
     def controller(self) -> Controller:

@@ -66,8 +66,16 @@ class Method(Protocol):
         """
         ...
 
-    def best_test(self, book: Logbook) -> Test:
-        """The controller to fly; everything told is learnt."""
+    def best_test(self, book: Logbook, at_once: bool = False) -> Test:
+        """The controller to fly; everything told is learnt.
+
+        Args:
+            book: with at least one experiment.
+            at_once: whether the gains that were tuned last are enough.
+
+        Raises:
+            NotAvailable: there is none.
+        """
         ...
 
     def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:

@@ -120,7 +120,7 @@ class Coevolution:
         self.memory = replace(self.memory, asked=self.memory.latest)
         return test
 
-    def best_test(self, book: Logbook) -> Test:
+    def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The flown test that ended nearest to its target."""
         best = book.best()
         assert best is not None  # the paper learns tests only

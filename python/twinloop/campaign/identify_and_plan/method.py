@@ -18,7 +18,7 @@ from twinloop.campaign.identify_and_plan.calibration import (
     needed_factor,
     residuals_of_flights,
 )
-from twinloop.campaign.identify_and_plan.choice import Choice
+from twinloop.campaign.identify_and_plan.choice import UNKNOWN, Choice
 from twinloop.campaign.identify_and_plan.diagnostics import doubts, other_commands
 from twinloop.campaign.identify_and_plan.following import following, foretold, unexplained
 from twinloop.campaign.identify_and_plan.selection import learnt_from
@@ -253,12 +253,17 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned))
         return test
 
-    def best_test(self, book: Logbook) -> Test:
+    def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
         if self.memory.best is not None and self.memory.best[0] == book.revision:
             return self.memory.best[1]
+        best = book.best()
         choice = Choice(self.planner, self._committee(), book, self.options.draws, self.options.confidence)
-        answer = choice.between(self._gains(book), book.best())
+        if at_once:
+            tuned, note = self._known_gains(best)
+            found = choice.between(tuned, best)
+            return replace(found, reason=f"{found.reason}{note}")
+        answer = choice.between(self._gains(book), best)
         self.memory = replace(self.memory, best=(book.revision, answer))
         return answer
 
@@ -417,6 +422,21 @@ class IdentifyAndPlan:
         if self._latest().told == told:
             self.memory = replace(self.memory, gains=(book.outcomes, genes))
         return genes
+
+    def _known_gains(self, best: Test | None) -> tuple[Floats, str]:
+        """Gains as they were tuned last, or the best flown where none were, and what to say of it; nothing is tuned.
+
+        Raises:
+            NotAvailable: there are neither.
+        """
+        if self.memory.gains is not None:
+            return self.memory.gains[1], ""
+        asked = self.memory.asked
+        known = [] if asked is None or asked.gains is None else [asked.gains]
+        known += [] if best is None else [best.genes]
+        if not known:
+            raise NotAvailable(f"{UNKNOWN}none has flown, and none was tuned yet. Let it learn to its end.")
+        return known[0], " Nothing was tuned on this twin yet."
 
     def _linear_gains(self, committee: Committee) -> list[Floats]:
         """Gains of a full state feedback by LQR on the linearised twin; none for other families, or where it fails."""
