@@ -19,6 +19,7 @@ from twinloop.identification.fit.committee import committee
 from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
+from twinloop.identification.outliers import cleaned
 from twinloop.identification.proposals.calm import calm
 from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
@@ -86,6 +87,7 @@ def identify_runs(
     context = Context(
         continued, signals, options, Unit(seed, (iteration,)), workers, rests=rests, known=known, watch=watch
     )
+    context = cleaned(context)
     form, said = likeliest(context)
     context = context.under(form)
     context.watch("noise")
