@@ -1,6 +1,7 @@
 """Which controller to fly: the gate of confidence, doubt about qualities, envelopes, and starts by LQR."""
 
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import twinloop as tl
 from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
+from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
@@ -44,14 +46,17 @@ def chosen(
 
     runs = [experiment(), *experiments]
     book = SimpleNamespace(
-        experiments=runs, tests=[FLOWN], setup=SimpleNamespace(signals=SIGNALS), finishes=lambda test: True,
-        flies=lambda test: flies, unfit=lambda: list(unfit), on_task=lambda test: True,
-        measured=lambda test: measured if test == 0 else None,
+        experiments=runs, tests=[FLOWN], setup=SimpleNamespace(signals=SIGNALS),
         of_task=lambda genes, number: tl.Test(FAMILY, genes, np.zeros(2), np.array([1.0, 0.0]), 20, number=number),
     )  # fmt: skip
     planner = SimpleNamespace(family=FAMILY, judge=judge, lasting=lambda members, genes: members)
     choice = Choice(planner, Committee([None], np.zeros(2), trusted), book, 4, confidence)
-    found = choice.between(TUNED, best)
+    with mock.patch.multiple(
+        standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
+        unfit=lambda book: list(unfit), on_task=lambda book, test: True,
+        measured=lambda book, test: measured if test == 0 else None,
+    ):  # fmt: skip
+        found = choice.between(TUNED, best)
     return ("tuned" if (found.genes == TUNED).all() else "flown"), found.reason
 
 

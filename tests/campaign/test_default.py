@@ -9,8 +9,8 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
 from lives import CONTROLLER, SIGNALS, THOROUGH, StopAt
 from oracles import rk4, same_bits
-from twinloop.campaign import controller_to_fly
-from twinloop.campaign.logbook import _check_first_reading
+from twinloop.campaign import controller_to_fly, standing
+from twinloop.campaign.entering import check_first_reading
 from twinloop.faces.result import summary
 from twinloop.law.noise import Noise
 
@@ -321,9 +321,9 @@ def test_a_first_reading_that_no_state_was_near_is_refused_and_a_noisy_one_is_no
     assert campaign.experiments == ()
     for seed in range(200):
         noisy = run.states + np.random.default_rng(seed).normal(0.0, 0.3, run.states.shape)
-        _check_first_reading(changed(run, noisy), test)
+        check_first_reading(changed(run, noisy), test)
     # A run that began elsewhere, and stayed there, is a run.
-    _check_first_reading(changed(run, run.states + np.array([0.5, 0.0])), test)
+    check_first_reading(changed(run, run.states + np.array([0.5, 0.0])), test)
 
 
 def test_the_same_test_twice_is_a_replicate(begin, pendulum):
@@ -508,4 +508,4 @@ def test_a_flight_of_another_task_is_not_given_back_as_the_best(begin, pendulum)
     flown = [run for run in campaign.experiments if (run.test.target_state == [1.0, 0.0]).all()]
     # What was measured on the way to another target is not the quality of this one.
     assert best.measured in [None, *(run.quality for run in flown)]
-    assert campaign._book.best().number == min(flown, key=lambda run: run.quality).test.number
+    assert standing.best_flown(campaign._book).number == min(flown, key=lambda run: run.quality).test.number

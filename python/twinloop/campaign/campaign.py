@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop.arrays import Floats, floats, whole
+from twinloop.campaign import standing
 from twinloop.campaign.assessment import Advice, advice, controller_to_fly, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
@@ -281,7 +282,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         Raises:
             InvalidInput: a test of another campaign.
         """
-        return self._book.status(test)
+        return standing.status(self._book, test)
 
     def run(
         self,

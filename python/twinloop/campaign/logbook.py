@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 import uuid
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Any
 
-import numpy as np
-
-from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, TestLoop
+from twinloop.campaign.entering import (
+    Judge,
+    attached_run,
+    flown_test,
+    partial_run,
+    replay_of_record,
+    with_run,
+)
+from twinloop.campaign.history import Experiment, Failure, Planned, TestLoop
 from twinloop.campaign.setup import Setup
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.hold_back import HoldBack
-from twinloop.objectives import frozen_error
 from twinloop.records import Record, Recorded, checked_record, plain, read
-from twinloop.replay import Replay
-from twinloop.test import Test, check_signals, final_distance
-from twinloop.trajectory import Trajectory, check_recorded, continued
-
-FAR = 5.0
-"""A first reading is refused if it is this many times further off than the second, and than the next readings move."""
-NEXT = 9
-"""Readings after the first that are looked at for this."""
-Asked = TypeVar("Asked", TestLoop, Planned)
-Judge = Callable[[_core.SelectedTests], float | None]
-"""The error, on the one test of a set, of what is known so far; None where nothing is."""
+from twinloop.test import Test, check_signals
+from twinloop.trajectory import Trajectory, check_recorded
 
 
 class Logbook(Recorded, kind="logbook"):
@@ -89,7 +82,7 @@ class Logbook(Recorded, kind="logbook"):
         runs = read(list[tuple[int | None, Any]], found["experiments"], f"{where}.experiments")
         for i, (number, run) in enumerate(runs):
             at = f"{where}.experiments[{i}]"
-            replayed = _attached(run, setup) if number is None else book._numbered(number, at)
+            replayed = replay_of_record(run, setup) if number is None else book._numbered(number, at)
             book._enter(Experiment.from_record(run, replayed))
         failures = read(list[tuple[int, Any]], found["failures"], f"{where}.failures")
         for i, (number, failure) in enumerate(failures):
@@ -196,59 +189,18 @@ class Logbook(Recorded, kind="logbook"):
         ends = setup.initial_state, setup.target_state
         return Test(setup.family, genes, *ends, setup.steps, number=number, campaign=self.identity)
 
-    def enter_loop(self, iteration: int, test: Test, search: _core.TestSearch) -> None:
-        """Enters the test loop that gave a test.
-
-        Args:
-            iteration: of the models that judged it.
-            test: that it gave.
-            search: at its end.
-        """
-        assert test.predicted is not None
-        loop = TestLoop(
-            test=test.number,
-            genes=tuple(test.genes.tolist()),
-            objectives=tuple(search.best_objectives.tolist()),
-            flat=search.flat,
-            generations=search.generation,
-            archive_size=search.archive_size,
-            evaluations=search.evaluations,
-            predicted=test.predicted,
-        )
-        self.asked.append((iteration, loop))
-
-    def enter_plan(self, iteration: int, planned: Planned) -> None:
-        """Enters a test that was planned, and why.
-
-        Args:
-            iteration: of the models that judged it.
-            planned: what was expected of it.
-        """
-        self.asked.append((iteration, planned))
-
-    def tell(self, test: object, trajectory: object, judge: Judge, least: int = 2) -> None:
-        """Enters an experiment.
+    def tell(self, test: object, trajectory: object, judge: Judge) -> None:
+        """Enters a run of a test.
 
         Args:
             test: that was run.
             trajectory: what the system answered.
             judge: the error on it of what is known so far.
-            least: steps that it must have.
 
         Raises:
             InvalidInput: a test of another campaign, or a trajectory that cannot be learnt from.
         """
-        known, signals = self.known(test), self.setup.signals
-        recorded = check_recorded(trajectory, self.setup.limits, known.steps, least)
-        recorded = continued(recorded, signals, known.initial_state)
-        _check_first_reading(recorded, known)
-        before = judge(_with_run(self.setup.none_selected(), known, recorded))
-        distance = quality = None
-        if recorded.ended == "completed" and recorded.steps == known.steps:
-            distance = quality = final_distance(recorded.states[-1], known.target(known.steps), signals)
-            if self.setup.preset != "paper":
-                quality = self.setup.quality.flown(recorded, known.target_state)
-        self._enter(Experiment(known, recorded, before, frozen_error(recorded, signals), distance, quality))
+        self._enter(flown_test(self.setup, self.known(test), trajectory, judge))
 
     def attach(self, trajectory: object, judge: Judge) -> None:
         """Enters a run that nobody asked for.
@@ -260,14 +212,7 @@ class Logbook(Recorded, kind="logbook"):
         Raises:
             InvalidInput: a trajectory that cannot be learnt from.
         """
-        signals = self.setup.signals
-        recorded = check_recorded(trajectory, self.setup.limits, None)
-        recorded = continued(recorded, signals, recorded.states[0])
-        replayed = Replay(signals, recorded.states[0], recorded.commands)
-        before = judge(_with_run(self.setup.none_selected(), replayed, recorded))
-        self._enter(
-            Experiment(replayed, recorded, before, frozen_error(recorded, signals), None, None, attached=True)
-        )
+        self._enter(attached_run(self.setup, trajectory, judge))
 
     def fail(self, test: object, reason: str, partial: Trajectory | None, judge: Judge) -> None:
         """Enters that a test failed on the system.
@@ -282,16 +227,10 @@ class Logbook(Recorded, kind="logbook"):
             InvalidInput: a test of another campaign, no reason, or a record that cannot be learnt from.
         """
         known = self.known(test)
-        if not isinstance(reason, str) or not reason.strip():
-            raise InvalidInput(
-                f"Campaign.tell_failed, reason: expected what happened, in words, found {reason!r}; write it down."
-            )
-        if isinstance(partial, Trajectory):
-            ended = "diverged" if partial.ended == "diverged" else "aborted"
-            partial = dataclasses.replace(partial, ended=ended, reason=reason)
-        if partial is not None:
-            self.tell(known, partial, judge, least=1)
-        self.failures.append(Failure(known, reason, recorded=partial is not None))
+        recorded = partial_run(partial, reason)
+        if recorded is not None:
+            self._enter(flown_test(self.setup, known, recorded, judge, least=1))
+        self.failures.append(Failure(known, reason, recorded=recorded is not None))
 
     def abandon(self, test: object) -> None:
         """Enters that a test will not be flown.
@@ -327,139 +266,14 @@ class Logbook(Recorded, kind="logbook"):
         told = sum(run.test is not None for run in self.experiments)
         return told + sum(not failure.recorded for failure in self.failures)
 
-    def status(self, test: object) -> str:
-        """Where a test is in its life: "asked", "flown", "aborted", "failed" or "abandoned".
-
-        Args:
-            test: of this campaign.
-        """
-        number = self.known(test).number
-        runs = [run for run in self.experiments if run.number == number]
-        if any(failure.test.number == number for failure in self.failures):
-            return "failed"
-        if runs:
-            return "flown" if any(run.complete for run in runs) else "aborted"
-        return "abandoned" if number in self.abandoned else "asked"
-
-    def measured(self, test: int) -> float | None:
-        """Quality of a test on the system, mean over complete runs; None if there was none.
-
-        Args:
-            test: its number.
-        """
-        values = [run.quality for run in self.experiments if run.number == test and run.quality is not None]
-        return math.fsum(values) / len(values) if values else None
-
-    def best(self) -> Test | None:
-        """The flown test of the best quality; the first one if no run was complete, None if no test was flown.
-
-        Tests that are not known to fly, of which the paper knows nothing, come after all others; then those that began
-        or led elsewhere than the campaign's own task, whose quality says nothing of it.
-        """
-
-        def rank(test: Test) -> tuple[bool, bool, bool, float]:
-            measured = self.measured(test.number)
-            if measured is None:
-                return True, True, True, math.inf
-            unfit = self.setup.preset != "paper" and not self.flies(test.number)
-            return False, unfit, not self.on_task(test), measured
-
-        flown = (run.test for run in self.experiments if run.test is not None)
-        return min(flown, key=rank, default=None)
-
-    def first_flown(self) -> Experiment | None:
-        """The first run of a test, if there is any."""
-        return next((run for run in self.experiments if run.test is not None), None)
-
-    def flies(self, test: int) -> bool:
-        """Whether a test is known to fly: each of its runs went to its end inside the envelope.
-
-        Args:
-            test: its number.
-        """
-        runs = [run for run in self.experiments if run.number == test]
-        return bool(runs) and all(run.kept_envelope for run in runs) and not self.failed(test)
-
-    def finishes(self, test: int) -> bool:
-        """Whether each run of a test went to its end, inside the envelope or not.
-
-        Args:
-            test: its number.
-        """
-        runs = [run for run in self.experiments if run.number == test]
-        return bool(runs) and all(run.complete for run in runs) and not self.failed(test)
-
-    def unfit(self) -> list[Floats]:
-        """Genes of tests that failed on the system, or were cut."""
-        return [self.tests[number].genes for number in sorted(self.flown) if not self.finishes(number)]
-
-    def failed(self, test: int) -> bool:
-        """Whether a test has failed on the system.
-
-        Args:
-            test: its number.
-        """
-        return any(failure.test.number == test for failure in self.failures)
-
-    def on_task(self, test: Test) -> bool:
-        """Whether a test begins and leads where the campaign does.
-
-        Args:
-            test: of the campaign.
-        """
-        ends = (test.initial_state, self.setup.initial_state), (test.target_state, self.setup.target_state)
-        return all(np.array_equal(*pair) for pair in ends)
-
     def waiting(self) -> list[Test]:
         """Tests that were asked for, and neither told nor abandoned, in their order."""
         done = self.flown | set(self.abandoned)
         return [self.tests[entry.test] for _, entry in self.asked if entry.test not in done]
 
-    def made(self) -> Test | None:
-        """Before there is a run of any test: the last one that was made, and neither failed nor was abandoned."""
-        done = self.flown | set(self.abandoned)
-        undone = [test for test in self.tests if test.number not in done]
-        return undone[-1] if undone and self.first_flown() is None else None
-
-    def with_plans(self, records: Sequence[Lesson]) -> tuple[Lesson, ...]:
-        """Lessons with the tests that were planned after each.
-
-        Args:
-            records: of the identifications.
-
-        Returns:
-            The same, complete.
-        """
-        return tuple(
-            dataclasses.replace(record, asked=self._asked_after(record.iteration, Planned))
-            for record in records
-        )
-
-    def with_loops(self, records: Sequence[Iteration]) -> tuple[Iteration, ...]:
-        """Iterations with the test loops that followed each.
-
-        Args:
-            records: of the model loop.
-
-        Returns:
-            The same, complete.
-        """
-        return tuple(
-            dataclasses.replace(record, asked=self._asked_after(record.iteration, TestLoop))
-            for record in records
-        )
-
-    def _asked_after(self, iteration: int, kind: type[Asked]) -> tuple[Asked, ...]:
-        """What was asked for after an iteration, with the quality flown so far."""
-        return tuple(
-            dataclasses.replace(asked, flown=self.measured(asked.test))
-            for after, asked in self.asked
-            if after == iteration and isinstance(asked, kind)
-        )
-
     def _enter(self, run: Experiment) -> None:
         check_recorded(run.trajectory, self.setup.limits, run.replayed.steps, least=1)
-        self.selected = _with_run(self.selected, run.replayed, run.trajectory)
+        self.selected = with_run(self.selected, run.replayed, run.trajectory)
         self.experiments.append(run)
 
     def _numbered(self, number: int, where: str) -> Test:
@@ -485,38 +299,3 @@ class Logbook(Recorded, kind="logbook"):
                 "tell it to the campaign that made it, or make it here with campaign.test(gains)."
             )
         return self.tests[test.number]
-
-
-def _attached(record: object, setup: Setup) -> Replay:
-    """What a twin flies to be compared with a recorded run that nobody asked for."""
-    found = record.get("trajectory") if isinstance(record, Mapping) else None
-    trajectory = Trajectory.from_record(found)
-    return Replay(setup.signals, trajectory.states[0], trajectory.commands)
-
-
-def _with_run(selected: _core.SelectedTests, test: Test | Replay, run: Trajectory) -> _core.SelectedTests:
-    with engine_input():
-        if isinstance(test, Replay):
-            return selected.with_record(run.states, run.commands)
-        held = None if test.hold_back is None else test.hold_back.engine
-        return selected.with_test(
-            test.genes, test.target_state, run.states, run.commands, test.excitation, held
-        )
-
-
-def _check_first_reading(trajectory: Trajectory, test: Test) -> None:
-    """Refuses a first reading that only a sensor that was not ready can have given: free runs begin there."""
-    if trajectory.steps < NEXT:
-        return
-    scales = np.array([state.scale for state in test.family.signals.states])
-    first, second = np.abs(trajectory.states[:2] - test.initial_state)
-    # What the next readings do of themselves: their noise, and what the system does in a period.
-    usual = np.abs(np.diff(trajectory.states[1 : NEXT + 1], axis=0)).max(axis=0)
-    wrong = (first > 0.01 * scales) & (first > FAR * second) & (first > FAR * usual)
-    for i in np.flatnonzero(wrong):
-        state = test.family.signals.states[int(i)]
-        raise InvalidInput(
-            f"Campaign.tell: expected {state.name} to begin near {test.initial_state[i]:g} {state.unit}, found"
-            f" {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the sensor"
-            " was not ready: put into the first row what the state was, or run the test again."
-        )

@@ -9,11 +9,12 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.campaign import standing
 from twinloop.campaign.coevolution.learning import Learner, Learning
 from twinloop.campaign.coevolution.search import chunks, committee, start_tests
 from twinloop.campaign.coevolution.written import WrittenMemory
 from twinloop.campaign.examination.rivals import Rival
-from twinloop.campaign.history import Iteration, Progress
+from twinloop.campaign.history import Iteration, Progress, TestLoop
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
@@ -116,16 +117,16 @@ class Coevolution:
             search = moved
             self._report("tests", total - ahead, total, search.archive_size, search.evaluations)
         test = book.new_test(search.best_genes, predicted=self._predicted(search.best_genes))
-        book.enter_loop(self.iteration, test, search)
+        book.asked.append((self.iteration, _turn(test, search)))
         self.memory = replace(self.memory, asked=self.memory.latest)
         return test
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The flown test that ended nearest to its target."""
-        best = book.best()
+        best = standing.best_flown(book)
         assert best is not None  # the paper learns tests only
         best = best.quiet()
-        return best.judged(self._predicted(best.genes), book.measured(best.number))
+        return best.judged(self._predicted(best.genes), standing.measured(book, best.number))
 
     def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
         """None: the paper adds none."""
@@ -169,7 +170,11 @@ class Coevolution:
     def history(self, book: Logbook) -> tuple[Iteration, ...]:
         """One record for each iteration, from 0."""
         latest = self.memory.latest
-        return () if latest is None else book.with_loops(latest.records(self.options.model_generations))
+        return (
+            ()
+            if latest is None
+            else standing.with_asked(book, latest.records(self.options.model_generations))
+        )
 
     def committee(self) -> Sequence[_core.Model]:
         """Members of the non-dominated set, the best trade-off first."""
@@ -204,3 +209,18 @@ class Coevolution:
                 evaluations=evaluations,
             )
         )
+
+
+def _turn(test: Test, search: _core.TestSearch) -> TestLoop:
+    """The record of a test loop that gave a test."""
+    assert test.predicted is not None
+    return TestLoop(
+        test=test.number,
+        genes=tuple(test.genes.tolist()),
+        objectives=tuple(search.best_objectives.tolist()),
+        flat=search.flat,
+        generations=search.generation,
+        archive_size=search.archive_size,
+        evaluations=search.evaluations,
+        predicted=test.predicted,
+    )

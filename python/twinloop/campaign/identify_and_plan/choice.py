@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.campaign import standing
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.logbook import Logbook
@@ -54,7 +55,7 @@ class Choice:
         Raises:
             NotAvailable: neither can be answered for.
         """
-        flown = best if best is not None and self.book.finishes(best.number) else None
+        flown = best if best is not None and standing.finishes(self.book, best.number) else None
         genes = np.stack([tuned] if flown is None else [tuned, flown.genes])
         members = self.planner.lasting(self.committee.members, genes)
         judged = self._judge(members, genes)
@@ -67,7 +68,7 @@ class Choice:
                 )
             reason = "Tuned on the twin, which sees them keep the envelope; none is known to fly to the end."
             return self._tuned(tuned, judged, recorded, reason)
-        flies = self.book.flies(flown.number)
+        flies = standing.flies(self.book, flown.number)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < old).mean())
         if flies and not refused:
@@ -91,7 +92,7 @@ class Choice:
         """Why tuned gains cannot be answered for; nothing if they can."""
         if not self.committee.trusted:
             return "the twin does not follow the runs that it was learnt from"
-        if nearby(self.planner.family, tuned[np.newaxis], self.book.unfit())[0]:
+        if nearby(self.planner.family, tuned[np.newaxis], standing.unfit(self.book))[0]:
             return "a flight with gains close to those that the twin prefers failed or was cut"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
@@ -105,7 +106,7 @@ class Choice:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         if tuned.tobytes() == flown.genes.tobytes():
             return "the twin knows no better ones"
-        measured = self.book.measured(flown.number) if self.book.on_task(flown) else None
+        measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
         if measured is not None and self._doubtful(members, flown, recorded, measured):
             return (
                 "the twin expects worse of others than was measured of these, but of these it expects worse, too, and"
@@ -142,14 +143,14 @@ class Choice:
 
     def _tuned(self, genes: Floats, judged: Judged, recorded: Floats, reason: str) -> Test:
         same = next((test for test in self.book.tests if test.genes.tobytes() == genes.tobytes()), None)
-        quiet = same is not None and same.excitation is None and self.book.on_task(same)
+        quiet = same is not None and same.excitation is None and standing.on_task(self.book, same)
         number = len(self.book.tests) if same is None else same.number
-        measured = self.book.measured(number) if quiet else None
+        measured = standing.measured(self.book, number) if quiet else None
         return self._answer(self.book.of_task(genes, number), measured, judged, recorded, 0, reason)
 
     def _flown(self, flown: Test, judged: Judged, recorded: Floats, reason: str) -> Test:
         # That of another task says nothing of the campaign's own, and is none to be given back.
-        measured = self.book.measured(flown.number) if self.book.on_task(flown) else None
+        measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
         test = self.book.of_task(flown.genes, flown.number)
         return self._answer(test, measured, judged, recorded, 1, reason)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
+from twinloop.campaign import standing
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.calibration import (
@@ -202,10 +203,10 @@ class IdentifyAndPlan:
             plan = Planned(
                 test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
             )
-            book.enter_plan(self.iteration, plan)
+            book.asked.append((self.iteration, plan))
             self.memory = replace(self.memory, asked=self._latest())
             return test
-        committee, best = self._committee(), book.best()
+        committee, best = self._committee(), standing.best_flown(book)
         if best is None and not committee.trusted:
             raise NotAvailable(
                 "Campaign.ask: expected a twin that follows the runs that it was learnt from, or a flown test, found"
@@ -217,10 +218,10 @@ class IdentifyAndPlan:
             tuned,
             Flown(
                 tuned if best is None else best.genes,
-                best is not None and book.flies(best.number),
+                best is not None and standing.flies(book, best.number),
                 [run.usage for run in book.experiments],
                 self._good(book, best),
-                book.unfit(),
+                standing.unfit(book),
             ),
             self.setup.goal,
             number,
@@ -249,7 +250,7 @@ class IdentifyAndPlan:
             gain=found.gain,
             reason=found.reason,
         )
-        book.enter_plan(self.iteration, plan)
+        book.asked.append((self.iteration, plan))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned))
         return test
 
@@ -257,7 +258,7 @@ class IdentifyAndPlan:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
         if self.memory.best is not None and self.memory.best[0] == book.revision:
             return self.memory.best[1]
-        best = book.best()
+        best = standing.best_flown(book)
         choice = Choice(self.planner, self._committee(), book, self.options.draws, self.options.confidence)
         if at_once:
             tuned, note = self._known_gains(best)
@@ -364,7 +365,7 @@ class IdentifyAndPlan:
 
     def history(self, book: Logbook) -> tuple[Lesson, ...]:
         """One record for each identification."""
-        return () if self.memory.latest is None else book.with_plans(self.memory.latest.lessons)
+        return () if self.memory.latest is None else standing.with_asked(book, self.memory.latest.lessons)
 
     def committee(self) -> Sequence[_core.Model]:
         """Members that follow the flown tests, the best first."""
@@ -399,9 +400,9 @@ class IdentifyAndPlan:
 
     def _first_genes(self, book: Logbook) -> Floats:
         """Of the first test that was flown; the middle of the box where none was."""
-        first = book.first_flown()
-        if first is not None and first.test is not None:
-            return first.test.genes
+        first = standing.first_flown(book)
+        if first is not None:
+            return first.genes
         return self.setup.family.from_unit(np.full(self.setup.family.size, 0.5))
 
     def _gains(self, book: Logbook) -> Floats:
@@ -410,7 +411,7 @@ class IdentifyAndPlan:
         if self.memory.gains is not None and self.memory.gains[0] == book.outcomes:
             return self.memory.gains[1]
         committee, asked = self._committee(), self.memory.asked
-        best, first = book.best(), self._first_genes(book)
+        best, first = standing.best_flown(book), self._first_genes(book)
         starts = [first if best is None else best.genes]
         if asked is not None and asked.gains is not None:
             starts.append(asked.gains)
@@ -450,9 +451,9 @@ class IdentifyAndPlan:
 
     def _good(self, book: Logbook, best: Test | None) -> float:
         """Quality of the best test flown for the campaign's own task inside the envelope; infinite where none was."""
-        if best is None or not (book.flies(best.number) and book.on_task(best)):
+        if best is None or not (standing.flies(book, best.number) and standing.on_task(book, best)):
             return float("inf")
-        measured = book.measured(best.number)
+        measured = standing.measured(book, best.number)
         return float("inf") if measured is None else measured
 
     def _rests(self) -> list[Floats]:

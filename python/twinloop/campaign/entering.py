@@ -1,0 +1,154 @@
+"""Entering: what a recorded run must be before a campaign learns from it, and the experiment that it makes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.campaign.history import Experiment
+from twinloop.campaign.setup import Setup
+from twinloop.errors import InvalidInput, engine_input
+from twinloop.objectives import frozen_error
+from twinloop.replay import Replay
+from twinloop.test import Test, final_distance
+from twinloop.trajectory import Trajectory, check_recorded, continued
+
+FAR = 5.0
+"""A first reading is refused if it is this many times further off than the second, and than the next readings move."""
+NEXT = 9
+"""Readings after the first that are looked at for this."""
+Judge = Callable[[_core.SelectedTests], float | None]
+"""The error, on the one test of a set, of what is known so far; None where nothing is."""
+
+
+def flown_test(setup: Setup, test: Test, trajectory: object, judge: Judge, least: int = 2) -> Experiment:
+    """The experiment of a test that was flown.
+
+    Args:
+        setup: of the campaign.
+        test: of the campaign.
+        trajectory: what the system answered.
+        judge: the error on it of what is known so far.
+        least: steps that it must have.
+
+    Raises:
+        InvalidInput: a trajectory that cannot be learnt from.
+    """
+    recorded = check_recorded(trajectory, setup.limits, test.steps, least)
+    recorded = continued(recorded, setup.signals, test.initial_state)
+    check_first_reading(recorded, test)
+    distance = quality = None
+    if recorded.ended == "completed" and recorded.steps == test.steps:
+        distance = quality = final_distance(recorded.states[-1], test.target(test.steps), setup.signals)
+        if setup.preset != "paper":
+            quality = setup.quality.flown(recorded, test.target_state)
+    return _experiment(setup, test, recorded, judge, distance, quality)
+
+
+def attached_run(setup: Setup, trajectory: object, judge: Judge) -> Experiment:
+    """The experiment of a run that nobody asked for.
+
+    Args:
+        setup: of the campaign.
+        trajectory: what was recorded, of any length.
+        judge: the error on it of what is known so far.
+
+    Raises:
+        InvalidInput: a trajectory that cannot be learnt from.
+    """
+    recorded = check_recorded(trajectory, setup.limits, None)
+    recorded = continued(recorded, setup.signals, recorded.states[0])
+    replayed = Replay(setup.signals, recorded.states[0], recorded.commands)
+    return _experiment(setup, replayed, recorded, judge, None, None)
+
+
+def partial_run(partial: Trajectory | None, reason: str) -> Trajectory | None:
+    """What was recorded of a test that failed, as a run that was cut for a reason.
+
+    Args:
+        partial: what was recorded until then; None: nothing.
+        reason: what happened.
+
+    Raises:
+        InvalidInput: no reason.
+    """
+    if not isinstance(reason, str) or not reason.strip():
+        raise InvalidInput(
+            f"Campaign.tell_failed, reason: expected what happened, in words, found {reason!r}; write it down."
+        )
+    if isinstance(partial, Trajectory):
+        ended = "diverged" if partial.ended == "diverged" else "aborted"
+        return dataclasses.replace(partial, ended=ended, reason=reason)
+    return partial
+
+
+def replay_of_record(record: object, setup: Setup) -> Replay:
+    """What a twin flies to be compared with a run that nobody asked for, from the record of the experiment.
+
+    Args:
+        record: of an experiment, from anywhere.
+        setup: of the campaign.
+    """
+    found = record.get("trajectory") if isinstance(record, Mapping) else None
+    trajectory = Trajectory.from_record(found)
+    return Replay(setup.signals, trajectory.states[0], trajectory.commands)
+
+
+def with_run(selected: _core.SelectedTests, replayed: Test | Replay, run: Trajectory) -> _core.SelectedTests:
+    """The engine's tests with one more.
+
+    Args:
+        selected: those before.
+        replayed: the test, or the commands as they were recorded.
+        run: what the system answered.
+    """
+    with engine_input():
+        if isinstance(replayed, Replay):
+            return selected.with_record(run.states, run.commands)
+        held = None if replayed.hold_back is None else replayed.hold_back.engine
+        return selected.with_test(
+            replayed.genes, replayed.target_state, run.states, run.commands, replayed.excitation, held
+        )
+
+
+def check_first_reading(trajectory: Trajectory, test: Test) -> None:
+    """Refuses a first reading that only a sensor that was not ready can have given: free runs begin there.
+
+    Args:
+        trajectory: what the system answered.
+        test: that was flown.
+
+    Raises:
+        InvalidInput: a state that begins far off, with the next readings where they should be.
+    """
+    if trajectory.steps < NEXT:
+        return
+    scales = np.array([state.scale for state in test.family.signals.states])
+    first, second = np.abs(trajectory.states[:2] - test.initial_state)
+    # What the next readings do of themselves: their noise, and what the system does in a period.
+    usual = np.abs(np.diff(trajectory.states[1 : NEXT + 1], axis=0)).max(axis=0)
+    wrong = (first > 0.01 * scales) & (first > FAR * second) & (first > FAR * usual)
+    for i in np.flatnonzero(wrong):
+        state = test.family.signals.states[int(i)]
+        raise InvalidInput(
+            f"Campaign.tell: expected {state.name} to begin near {test.initial_state[i]:g} {state.unit}, found"
+            f" {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the sensor"
+            " was not ready: put into the first row what the state was, or run the test again."
+        )
+
+
+def _experiment(
+    setup: Setup,
+    replayed: Test | Replay,
+    recorded: Trajectory,
+    judge: Judge,
+    distance: float | None,
+    quality: float | None,
+) -> Experiment:
+    before = judge(with_run(setup.none_selected(), replayed, recorded))
+    frozen = frozen_error(recorded, setup.signals)
+    attached = isinstance(replayed, Replay)
+    return Experiment(replayed, recorded, before, frozen, distance, quality, attached=attached)

@@ -1,0 +1,149 @@
+"""Standing: where tests are in their lives, and how those that were flown have fared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment, Iteration, Lesson
+from twinloop.campaign.logbook import Logbook
+from twinloop.test import Test
+
+Turn = TypeVar("Turn", Lesson, Iteration)
+
+
+def status(book: Logbook, test: object) -> str:
+    """Where a test is in its life: "asked", "flown", "aborted", "failed" or "abandoned".
+
+    Args:
+        book: of the campaign.
+        test: of the campaign.
+
+    Raises:
+        InvalidInput: a test of another campaign.
+    """
+    number = book.known(test).number
+    runs = _runs(book, number)
+    if failed(book, number):
+        return "failed"
+    if runs:
+        return "flown" if any(run.complete for run in runs) else "aborted"
+    return "abandoned" if number in book.abandoned else "asked"
+
+
+def measured(book: Logbook, test: int) -> float | None:
+    """Quality of a test on the system, mean over complete runs; None if there was none.
+
+    Args:
+        book: of the campaign.
+        test: its number.
+    """
+    values = [run.quality for run in _runs(book, test) if run.quality is not None]
+    return math.fsum(values) / len(values) if values else None
+
+
+def best_flown(book: Logbook) -> Test | None:
+    """The flown test of the best quality; the first one if no run was complete, None if no test was flown.
+
+    Tests that are not known to fly, of which the paper knows nothing, come after all others; then those that began or
+    led elsewhere than the campaign's own task, whose quality says nothing of it.
+
+    Args:
+        book: of the campaign.
+    """
+
+    def rank(test: Test) -> tuple[bool, bool, bool, float]:
+        quality = measured(book, test.number)
+        if quality is None:
+            return True, True, True, math.inf
+        unfit = book.setup.preset != "paper" and not flies(book, test.number)
+        return False, unfit, not on_task(book, test), quality
+
+    return min((run.test for run in book.experiments if run.test is not None), key=rank, default=None)
+
+
+def first_flown(book: Logbook) -> Test | None:
+    """The first test that was flown; None where none was.
+
+    Args:
+        book: of the campaign.
+    """
+    return next((run.test for run in book.experiments if run.test is not None), None)
+
+
+def flies(book: Logbook, test: int) -> bool:
+    """Whether a test is known to fly: each of its runs went to its end inside the envelope.
+
+    Args:
+        book: of the campaign.
+        test: its number.
+    """
+    runs = _runs(book, test)
+    return bool(runs) and all(run.kept_envelope for run in runs) and not failed(book, test)
+
+
+def finishes(book: Logbook, test: int) -> bool:
+    """Whether each run of a test went to its end, inside the envelope or not.
+
+    Args:
+        book: of the campaign.
+        test: its number.
+    """
+    runs = _runs(book, test)
+    return bool(runs) and all(run.complete for run in runs) and not failed(book, test)
+
+
+def failed(book: Logbook, test: int) -> bool:
+    """Whether a test has failed on the system.
+
+    Args:
+        book: of the campaign.
+        test: its number.
+    """
+    return any(failure.test.number == test for failure in book.failures)
+
+
+def unfit(book: Logbook) -> list[Floats]:
+    """Genes of tests that failed on the system, or were cut.
+
+    Args:
+        book: of the campaign.
+    """
+    return [book.tests[number].genes for number in sorted(book.flown) if not finishes(book, number)]
+
+
+def on_task(book: Logbook, test: Test) -> bool:
+    """Whether a test begins and leads where the campaign does.
+
+    Args:
+        book: of the campaign.
+        test: of the campaign.
+    """
+    ends = (test.initial_state, book.setup.initial_state), (test.target_state, book.setup.target_state)
+    return all(np.array_equal(*pair) for pair in ends)
+
+
+def with_asked(book: Logbook, turns: Sequence[Turn]) -> tuple[Turn, ...]:
+    """Turns of the loop with the tests that were asked for after each, and the quality that these have flown.
+
+    Args:
+        book: of the campaign.
+        turns: in order.
+    """
+    return tuple(replace(turn, asked=_asked_after(book, turn.iteration)) for turn in turns)
+
+
+def _asked_after(book: Logbook, iteration: int) -> tuple[Any, ...]:
+    """Of the kind that the preset asks for: a campaign has no other."""
+    return tuple(
+        replace(asked, flown=measured(book, asked.test)) for after, asked in book.asked if after == iteration
+    )
+
+
+def _runs(book: Logbook, test: int) -> list[Experiment]:
+    return [run for run in book.experiments if run.number == test]
