@@ -7,7 +7,7 @@ from small_plants import pendulum_like, swung
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
-from twinloop.identification.identify import PROPOSALS, searched
+from twinloop.identification.identify import PROPOSALS, Found, searched
 from twinloop.identification.proposals.calm import calm
 from twinloop.identification.search.selection import posed
 from twinloop.identification.starts import starts
@@ -38,7 +38,9 @@ def learnt(runs, proposals):
     context = Context(
         runs, pendulum_like(), options_of("default", QUICK), Unit(3, (len(runs),)), _core.Workers(1)
     )
-    return context, searched(context, next(iter(starts(context, "acceleration"))), proposals).best
+    start, *_ = starts(context, "acceleration")
+    *_, found = searched(context, Found(start()), proposals)
+    return context, found.best
 
 
 def lasting(hypothesis):

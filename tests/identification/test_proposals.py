@@ -53,7 +53,15 @@ def two_fans(count=3, fading=3.0, **changes):
 
 
 def start_of(context):
-    return next(iter(starts(context, "acceleration")))
+    return starts(context, "acceleration")[0]()
+
+
+def end_of(context, start, proposals=PROPOSALS):
+    """What a search from a start leaves."""
+    found = Found(start)
+    for step in searched(context, found, proposals):
+        found = step
+    return found
 
 
 @pytest.mark.parametrize("context", [pendulum(1), pendulum(2), two_fans(3)], ids=["one", "two", "fans"])
@@ -93,18 +101,18 @@ def test_what_finds_nothing_changes_nothing_wherever_it_is_proposed():
         more = (replace(found, energy=found.energy + 1.0) for found in hypothesis.sums)
         return [hypothesis, replace(hypothesis, sums=tuple(more))]
 
-    plain = searched(context, start).best
+    plain = end_of(context, start).best
     for place in range(len(PROPOSALS) + 1):
         for idle in (silent, longer):
             several = (*PROPOSALS[:place], idle, *PROPOSALS[place:])
-            assert same(searched(context, start, several).best, plain)
+            assert same(end_of(context, start, several).best, plain)
 
 
 def test_where_nothing_is_hidden_it_does_not_matter_when_that_is_looked_for():
     context = two_fans(2, fading=0.0)
     start = start_of(context)
     orders = [(lags, hidden, terms), (hidden, lags, terms), (lags, hidden, hidden, terms), (lags, terms)]
-    plain, *others = (searched(context, start, order).best for order in orders)
+    plain, *others = (end_of(context, start, order).best for order in orders)
     assert plain.actuation.hidden == () and all(same(other, plain) for other in others)
 
 
@@ -112,14 +120,14 @@ def test_a_lag_search_that_finds_no_lag_proposes_nothing_and_moves_nothing():
     context = pendulum(2)
     start = start_of(context)
     assert list(lags(context, start)) == []
-    with_lags, without = (searched(context, start, order).best for order in (PROPOSALS, PROPOSALS[1:]))
+    with_lags, without = (end_of(context, start, order).best for order in (PROPOSALS, PROPOSALS[1:]))
     assert PROPOSALS[0] is lags and same(with_lags, without)
 
 
 @pytest.mark.parametrize("after", range(len(PROPOSALS)))
 def test_a_search_that_is_read_back_from_its_record_goes_on_with_the_same_bits(after):
     context = two_fans(2)
-    found = searched(context, start_of(context), PROPOSALS[:after])
+    found = end_of(context, start_of(context), PROPOSALS[:after])
     again = Found.from_record(through_json(found.to_record()), context.signals)
     assert same(found, again)
     propose = PROPOSALS[after]
@@ -131,7 +139,7 @@ def test_what_an_option_switches_off_or_is_done_already_is_not_proposed():
     context = pendulum(2, lags=False, hidden=False, parts=False, passes=1)
     start = start_of(context)
     assert not any(list(propose(context, start)) for propose in (lags, hidden))
-    model = searched(context, start).best
+    model = end_of(context, start).best
     assert model.fit is not None and not model.smoothed
     assert [
         name for name, propose in zip(NAMES, PROPOSALS, strict=True) if list(propose(context, model))
@@ -163,15 +171,15 @@ def test_what_was_known_is_a_start_of_its_own_that_changes_no_other():
     assert known.model.form == "acceleration" and known.actuation.hidden
     context = context_of(signals, runs, rests=[np.ones(2)], known=known)
     before = copied(known)
-    one, two = starts(context, "acceleration")
+    one, two = (start() for start in starts(context, "acceleration"))
     assert same(known, before)
     assert one.fit is None and one.actuation.hidden == () and two.start == RENEWED
     assert two.evidence.lasts and two.actuation.hidden
-    assert len(list(starts(replace(context, known=None), "acceleration"))) == 1
+    assert len(starts(replace(context, known=None), "acceleration")) == 1
     # The order in which they are searched does not matter, for they share nothing that changes.
-    late = searched(context, two)
-    assert same(searched(context, one).best, searched(context, one).best)
-    assert same(late.best, searched(context, two).best)
+    late = end_of(context, two)
+    assert same(end_of(context, one).best, end_of(context, one).best)
+    assert same(late.best, end_of(context, two).best)
 
 
 def test_a_newcomer_is_a_function_and_a_line():
@@ -185,7 +193,7 @@ def test_a_newcomer_is_a_function_and_a_line():
         first = replace(first, weights={**first.weights, entered[0]: 0.5}, energy=first.energy - 1e3)
         return [fitted(context, replace(grown, sums=(first, *others), fit=None))]
 
-    found = searched(context, start_of(context), (*PROPOSALS, believer))
+    found = end_of(context, start_of(context), (*PROPOSALS, believer))
     learnt = concluded(context, found, [])
     assert learnt.of_parts and learnt.pool.text(entered[0], ["angle", "rate", "torque"]).startswith("tanh")
     assert all(node < len(learnt.pool) for found in learnt.sums for node in found.weights)

@@ -57,18 +57,49 @@ def test_a_refused_call_leaves_no_row(path, pendulum):
     assert len(rows(path, "experiments")) == 1 and len(campaign.experiments) == 1
 
 
-def test_a_search_that_is_under_way_is_kept_now_and_then(path, pendulum, monkeypatch):
+class Killed(BaseException):
+    """Nothing of the campaign's own catches it: what is kept is what was kept before."""
+
+
+class KillAt:
+    """A progress callback that ends everything at its n-th call, and remembers how far each was."""
+
+    def __init__(self, call=0):
+        self.call, self.seen = call, []
+
+    def __call__(self, progress):
+        self.seen.append((progress.phase == "tests", progress.generation, progress.phase))
+        if len(self.seen) == self.call:
+            raise Killed
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_what_is_under_way_is_kept_now_and_then_and_goes_on_from_there(path, pendulum, monkeypatch, preset):
+    """Killed at each look in turn: it goes on with no step that was behind it, and to the same bits."""
     monkeypatch.setattr(keeping, "SECONDS", 0.0)
-    campaign, left = flown(stored(path, options={**TINY, "model_generations": 60}), pendulum), []
+    options = {**TINY, "model_generations": 60, "test_generations": 40} if preset == "paper" else SMALL
 
-    def look(progress):
-        if progress.phase == "models":
-            memory = found(opened(path, read_only=True), None).memory
-            left.append(memory["latest"]["left"])
+    def begun(name):
+        return flown(stored(path.with_name(name), preset, options=options), pendulum)
 
-    campaign.progress = look
-    campaign.ask()
-    assert len(left) > 1 and left[0] > 0 and left[-1] == 0
+    whole = begun("whole.db")
+    whole.progress = watched = KillAt()
+    whole.ask()
+    assert {phase for *_, phase in watched.seen} >= (
+        {"models", "tests"} if preset == "paper" else {"smoothed", "parts", "committee", "gains"}
+    )
+    for call in range(1, len(watched.seen) + 1):
+        campaign = begun(f"{call}.db")
+        campaign.progress = killer = KillAt(call)
+        with pytest.raises(Killed):
+            campaign.ask()
+        campaign.close()
+        again = tl.Campaign.load(path.with_name(f"{call}.db"), threads=1)
+        again.progress = rest = KillAt()
+        again.ask()
+        assert not rest.seen or rest.seen[0] >= killer.seen[-1]
+        assert plain(again) == plain(whole)
+        again.close()
 
 
 # Resumed

@@ -25,8 +25,8 @@ from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened, show
 
 Answer = TypeVar("Answer")
 
-SECONDS = 30.0
-"""Between two checkpoints of a search that is under way, at most."""
+SECONDS = 10.0
+"""After which a search that is under way is kept again, as soon as it has come further."""
 BEAT = 1.0
 """Seconds between two times that it is said what is being done, at least."""
 
@@ -96,7 +96,7 @@ class Keeping:
         self._memory = memory
 
     def checkpoint(self, method: Method) -> None:
-        """Commits a search that is under way, if the last time was a while ago.
+        """Commits a search that is under way, if the last time was a while ago and it has come further since.
 
         Args:
             method: of the campaign.

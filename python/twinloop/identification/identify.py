@@ -8,7 +8,7 @@ the model has smoothed, and what parts of the only run have taught. What the sea
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from twinloop import _core
@@ -44,15 +44,34 @@ PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, second_look, parts, calm
 
 @dataclass(frozen=True, eq=False)
 class Found(Recorded, kind="found"):
-    """What a search leaves.
+    """What a search has found so far.
 
     Args:
         best: what is believed.
         rivals: what else was proposed on the way and lasts on the runs, in order; from other starts, too.
+        made: how many proposals were made.
     """
 
     best: Hypothesis
     rivals: tuple[Hypothesis, ...] = ()
+    made: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class UnderWay(Recorded, kind="identification"):
+    """An identification between two proposals; what is left of it is a function of this and of its context.
+
+    Args:
+        runs: as they are read, without single readings that are wrong.
+        form: what outputs mean.
+        said: remarks on that.
+        searches: one for each start that was made, in their order.
+    """
+
+    runs: tuple[Run, ...]
+    form: str
+    said: tuple[Remark, ...]
+    searches: tuple[Found, ...] = ()
 
 
 def identify_runs(
@@ -66,6 +85,8 @@ def identify_runs(
     known: Identified | None = None,
     workers: _core.Workers,
     watch: Watch = unwatched,
+    under_way: UnderWay | None = None,
+    keep: Callable[[UnderWay], None] = lambda under_way: None,
 ) -> Identified:
     """Learns a model and a committee.
 
@@ -79,30 +100,49 @@ def identify_runs(
         known: what was learnt from fewer runs; its terms are candidates again.
         workers: how the work is carried out.
         watch: called with each step that begins.
+        under_way: what was kept of the same identification, from where it goes on; None: it begins.
+        keep: called with what there is once the form is known, and after each start and each proposal.
 
     Returns:
-        What was learnt.
+        What was learnt, the same bits wherever it went on from.
     """
     continued = [run.continued(signals) for run in runs]
     context = Context(
         continued, signals, options, Unit(seed, (iteration,)), workers, rests=rests, known=known, watch=watch
     )
-    context = cleaned(context)
-    form, said = likeliest(context)
-    context = context.under(form)
-    context.watch("noise")
-    first, *others = [searched(context, start) for start in starts(context, form)]
+    if under_way is None:
+        context = cleaned(context)
+        form, said = likeliest(context)
+        under_way = UnderWay(tuple(context.runs), form, tuple(said))
+        keep(under_way)
+    context = replace(context, runs=under_way.runs).under(under_way.form)
+    for step in advanced(context, under_way):
+        under_way = step
+        keep(step)
+    first, *others = under_way.searches
     found = decided(first, [found for other in others for found in (other.best, *other.rivals)])
     context.watch("committee")
-    return concluded(context, found, said)
+    return concluded(context, found, under_way.said)
 
 
-def searched(context: Context, start: Hypothesis, proposals: Sequence[Proposal] = PROPOSALS) -> Found:
-    """What is believed once every proposal was made, one after another, each to what is believed by then."""
-    found = Found(start)
-    for propose in proposals:
-        found = decided(found, propose(context, found.best))
-    return found
+def advanced(context: Context, under_way: UnderWay) -> Iterator[UnderWay]:
+    """What is left of the searches from all starts, after each start that is made and each proposal."""
+    for number, start in enumerate(starts(context, under_way.form)):
+        before = under_way.searches[:number]
+        if number == len(under_way.searches):
+            context.watch("noise")
+            under_way = replace(under_way, searches=(*before, Found(start())))
+            yield under_way
+        for found in searched(context, under_way.searches[number]):
+            under_way = replace(under_way, searches=(*before, found))
+            yield under_way
+
+
+def searched(context: Context, found: Found, proposals: Sequence[Proposal] = PROPOSALS) -> Iterator[Found]:
+    """What is believed after each proposal that is still to be made, each made to what is believed by then."""
+    for propose in proposals[found.made :]:
+        found = replace(decided(found, propose(context, found.best)), made=found.made + 1)
+        yield found
 
 
 def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
@@ -112,7 +152,7 @@ def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
     others = (other for other in several[1:] if other is not best and other.evidence.lasts)
     # What is drawn from here on is nothing that one of those that are not believed has drawn.
     drawn = max(other.searches for other in several if other.start == best.start)
-    return Found(replace(best, searches=drawn), (*found.rivals, *others))
+    return replace(found, best=replace(best, searches=drawn), rivals=(*found.rivals, *others))
 
 
 def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identified:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -28,18 +29,19 @@ ANEW, PARTS, RENEWED, FORMS = 0, 1, 10, 100
 run, what was known, the first form; those of further parts and forms follow."""
 
 
-def starts(context: Context, form: str) -> Iterator[Hypothesis]:
-    """What the search begins with: the runs anew, and what was known of fewer of them.
+def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:
+    """What the search begins with, each made when it is called: the runs anew, and what was known of fewer of them.
 
     Args:
         context: of the identification.
         form: what outputs mean.
     """
-    aligned = with_offsets(context, begun(context, form, _first_pool(context), ANEW))
-    yield anew(context, aligned)
-    if context.known is not None and context.known.actuation.hidden:
-        # What is hidden shows when terms are nearly right, and these when it shows.
-        yield renewed(context, context.known, aligned)
+    aligned = cache(lambda: with_offsets(context, begun(context, form, _first_pool(context), ANEW)))
+    known = context.known
+    if known is None or not known.actuation.hidden:
+        return (lambda: anew(context, aligned()),)
+    # What is hidden shows when terms are nearly right, and these when it shows.
+    return lambda: anew(context, aligned()), lambda: renewed(context, known, aligned())
 
 
 def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:

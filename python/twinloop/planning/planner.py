@@ -18,7 +18,7 @@ from twinloop.hold_back import HoldBack
 from twinloop.limits import Limits
 from twinloop.planning.candidates import Candidates, candidates
 from twinloop.planning.excitation import binary, chirps, first_chirps
-from twinloop.planning.gains import nearby, tune_gains
+from twinloop.planning.gains import Scored, nearby, tune_gains
 from twinloop.planning.judging import Committee, Judge, Judged, Task, expected, risk
 from twinloop.planning.quality import Quality
 from twinloop.planning.settings import PlanningOptions
@@ -118,13 +118,16 @@ class Planner(Judge):
         self.options = options
         self.watch = watch
 
-    def tune(self, committee: Committee, starts: Sequence[Floats], number: int) -> Floats:
+    def tune(
+        self, committee: Committee, starts: Sequence[Floats], number: int, scored: Scored | None = None
+    ) -> Floats:
         """Genes of the best quality on the committee, inside the envelope with its margin.
 
         Args:
             committee: that judges.
             starts: genes to start from.
             number: of runs told, for its streams.
+            scored: what was judged of the same before it was cut, and who keeps what is judged; None: it begins.
         """
         options = self.options
         stream = self.unit.part(number).stream("starts")
@@ -134,10 +137,13 @@ class Planner(Judge):
             # The middle between what is known and anywhere: basins that no flight has seen.
             other = 0.5 * places[0] + 0.5 * stream.uniforms(self.family.size)
             all_starts.append(self.family.from_unit(other))
-        best = self._searched(committee.members[:1], committee.sds, 1, all_starts, 0.2, number, "gains")
+        scored = scored or Scored()
+        best = self._searched(
+            committee.members[:1], committee.sds, 1, all_starts, 0.2, number, "gains", scored
+        )
         members = committee.members[: max(1, options.tuning_members)]
         fine = [best, starts[0]]
-        return self._searched(members, committee.sds, options.draws, fine, 0.08, number, "fine_gains")
+        return self._searched(members, committee.sds, options.draws, fine, 0.08, number, "fine_gains", scored)
 
     def _searched(
         self,
@@ -148,6 +154,7 @@ class Planner(Judge):
         spread: float,
         number: int,
         purpose: Purpose,
+        scored: Scored,
     ) -> Floats:
         """One of two searches, with half of the evaluations."""
         options = self.options
@@ -165,7 +172,7 @@ class Planner(Judge):
             return np.stack([judged.lost, mean + excess * (10.0 * mean + unit)], axis=1)
 
         return tune_gains(
-            self.family, score, starts, evaluations=options.evaluations // 2, spread=spread,
+            self.family, scored(score), starts, evaluations=options.evaluations // 2, spread=spread,
             unit=self.unit.part(number), purpose=purpose, watch=lambda: self.watch("gains"),
         )  # fmt: skip
 

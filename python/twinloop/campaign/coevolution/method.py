@@ -34,10 +34,13 @@ class Memory:
         asked: what was learnt when the last test was asked for. Learning begins here, whoever looks in between.
         latest: what was learnt last, or is being learnt; shown to whoever looks, and gone on with if it is of all that
             was told.
+        choosing: the test loop that is under way over the models of `latest`, and how many generations are still to be
+            run.
     """
 
     asked: Learning | None = None
     latest: Learning | None = None
+    choosing: tuple[_core.TestSearch, int] | None = None
 
 
 class Coevolution:
@@ -63,12 +66,17 @@ class Coevolution:
 
     def to_record(self) -> Record:
         """What is remembered, as plain values; an iteration that is running too."""
-        return WrittenMemory.of(self.memory.asked, self.memory.latest).to_record()
+        memory = self.memory
+        return WrittenMemory.of(memory.asked, memory.latest, memory.choosing).to_record()
 
     def restore(self, record: object, book: Logbook) -> None:
         """Remembers what a record holds."""
         written = WrittenMemory.from_record(record)
-        self.memory = Memory(*written.restored(book, self.learner))
+        asked, latest = written.restored(book, self.learner)
+        choosing = None
+        if written.choosing is not None and latest is not None:
+            choosing = written.choosing.restored(latest.models, self.setup, self.options, self.workers)
+        self.memory = Memory(asked, latest, choosing)
 
     @property
     def iteration(self) -> int:
@@ -85,10 +93,10 @@ class Coevolution:
         if latest is None or len(latest.experiments) != told:
             latest = self._begun(book)
         if at_once:
-            self.memory = replace(self.memory, latest=latest)
+            self.memory = replace(self.memory, latest=latest, choosing=None)
             return
         for moved in self.learner.advanced(latest):
-            self.memory = replace(self.memory, latest=moved)
+            self.memory = replace(self.memory, latest=moved, choosing=None)
             self._watch_models(moved)
 
     def _begun(self, book: Logbook) -> Learning:
@@ -102,24 +110,33 @@ class Coevolution:
 
     def ask(self, book: Logbook, last: bool) -> Test:
         """The test loop over the committee; that an experiment is the last means nothing to the paper."""
-        models = self.models
-        search = start_tests(
-            models,
-            self.setup.family,
-            self.setup.task,
-            self.options,
-            seed=self.setup.seed,
-            iteration=len(book.asked) + 1,
-            workers=self.workers,
-        )
-        total = self.options.generations_of_tests
-        for moved, ahead in chunks(search, lambda s, n: s.advance(n, self.workers), total):
-            search = moved
-            self._report("tests", total - ahead, total, search.archive_size, search.evaluations)
+        search = self._chosen(len(book.asked) + 1)
         test = book.new_test(search.best_genes, predicted=self._predicted(search.best_genes))
         book.asked.append((self.iteration, _turn(test, search)))
-        self.memory = replace(self.memory, asked=self.memory.latest)
+        self.memory = Memory(self.memory.latest, self.memory.latest)
         return test
+
+    def _chosen(self, iteration: int) -> _core.TestSearch:
+        """The test loop at its end; one that was under way goes on."""
+        total, choosing = self.options.generations_of_tests, self.memory.choosing
+        if choosing is None or choosing[0].counters[1] != iteration:
+            setup = self.setup
+            search = start_tests(
+                self.models,
+                setup.family,
+                setup.task,
+                self.options,
+                seed=setup.seed,
+                iteration=iteration,
+                workers=self.workers,
+            )
+            choosing = search, total
+        search, left = choosing
+        for moved, ahead in chunks(search, lambda s, n: s.advance(n, self.workers), left):
+            search = moved
+            self.memory = replace(self.memory, choosing=(search, ahead))
+            self._report("tests", total - ahead, total, search.archive_size, search.evaluations)
+        return search
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The flown test that ended nearest to its target."""

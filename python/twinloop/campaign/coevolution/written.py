@@ -1,13 +1,16 @@
-"""What the preset `paper` remembers, written down: the model loop when the last test was asked for, and now."""
+"""What the preset `paper` remembers, written down: the model loop when a test was asked for, and now; the test loop."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from twinloop import _core
 from twinloop.campaign.coevolution.learning import Learner, Learning
-from twinloop.campaign.coevolution.snapshots import ModelSnapshot
+from twinloop.campaign.coevolution.snapshots import ModelSnapshot, TestSnapshot
 from twinloop.campaign.history import Iteration
 from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.presets import Options
+from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
 
@@ -74,6 +77,40 @@ class WrittenLearning(Recorded, kind="model_loop"):
 
 
 @dataclass(frozen=True, eq=False)
+class WrittenChoosing(Recorded, kind="choosing"):
+    """A test loop that is under way.
+
+    Args:
+        tests: population, archive and counters.
+        left: generations that are still to be run.
+    """
+
+    tests: TestSnapshot
+    left: int
+
+    def restored(
+        self, models: _core.ModelSearch, setup: Setup, options: Options, workers: _core.Workers
+    ) -> tuple[_core.TestSearch, int]:
+        """The test loop that was written down, and the generations that are left.
+
+        Args:
+            models: the model loop whose committee judges.
+            setup: of the campaign.
+            options: of the preset.
+            workers: how the work is carried out.
+
+        Raises:
+            InvalidInput: it is none of this campaign, or more generations are left than there were.
+        """
+        if not 0 <= self.left <= options.generations_of_tests:
+            raise InvalidInput(
+                f"Record choosing: expected at most {options.generations_of_tests} generations left, found"
+                f" {self.left}."
+            )
+        return self.tests.restored(models, setup.family, setup.task, options, workers), self.left
+
+
+@dataclass(frozen=True, eq=False)
 class WrittenMemory(Recorded, kind="memory_of_paper"):
     """What the preset `paper` remembers.
 
@@ -81,24 +118,31 @@ class WrittenMemory(Recorded, kind="memory_of_paper"):
         asked: what was learnt when the last test was asked for; None: none was.
         latest: what was learnt last, or is being learnt; None: nothing was.
         same: whether both are one, and only `latest` is written.
+        choosing: the test loop that is under way over the models of `latest`; None: none is.
     """
+
+    VERSION = 2
 
     asked: WrittenLearning | None
     latest: WrittenLearning | None
     same: bool
+    choosing: WrittenChoosing | None = None
 
     @staticmethod
-    def of(asked: Learning | None, latest: Learning | None) -> WrittenMemory:
-        """Both, to be written down."""
+    def of(
+        asked: Learning | None, latest: Learning | None, choosing: tuple[_core.TestSearch, int] | None
+    ) -> WrittenMemory:
+        """All of them, to be written down."""
         same = asked is latest
         return WrittenMemory(
             None if asked is None or same else WrittenLearning.of(asked),
             None if latest is None else WrittenLearning.of(latest),
             same,
+            None if choosing is None else WrittenChoosing(TestSnapshot.of(choosing[0]), choosing[1]),
         )
 
     def restored(self, book: Logbook, learner: Learner) -> tuple[Learning | None, Learning | None]:
-        """Both, as they were.
+        """What was learnt, as it was.
 
         Args:
             book: with all that was told.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -33,13 +34,14 @@ from twinloop.elementary import log
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.hold_back import HoldBack
 from twinloop.identification.identified import Identified
-from twinloop.identification.identify import identify_runs
+from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.remarks import symbols_of
 from twinloop.identification.sensors.offsets import moved
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
+from twinloop.planning.gains import Scored
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Flown, Planner
 from twinloop.records import Record, Recorded
@@ -88,12 +90,18 @@ class Memory(Recorded, kind="memory_of_default"):
         latest: what was learnt last; shown to whoever looks, and used by `ask` if it is of all that was told.
         gains: tuned on the latest committee, after so many experiments and failures.
         best: the controller to fly, at the revision of the logbook that it was chosen at.
+        under_way: an identification that is not finished, and of how many experiments it is.
+        scores: of the gains that were judged, of a tuning on the latest committee that is not finished.
     """
+
+    VERSION = 2
 
     asked: Learnt | None = None
     latest: Learnt | None = None
     gains: tuple[int, Floats] | None = None
     best: tuple[int, Test] | None = None
+    under_way: tuple[int, UnderWay] | None = None
+    scores: tuple[int, tuple[Floats, ...]] | None = None
 
 
 class IdentifyAndPlan:
@@ -156,11 +164,15 @@ class IdentifyAndPlan:
         self._told = tuple(run.number for run in book.experiments)
         self.memory = Memory(asked=self.memory.asked, latest=self._learnt(book))
 
+    def _keep(self, told: int, under_way: UnderWay) -> None:
+        self.memory = replace(self.memory, under_way=(told, under_way))
+
     def _learnt(self, book: Logbook) -> Learnt:
         asked, told = self.memory.asked, len(book.experiments)
         needed = () if asked is None else self._calibrated(asked, book)
         flights = learnt_from(book.experiments, self.options.most_readings)
         runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights]
+        begun = self.memory.under_way
         identified = identify_runs(
             runs,
             self.setup.signals,
@@ -171,6 +183,8 @@ class IdentifyAndPlan:
             known=None if asked is None else asked.identified,
             workers=self.workers,
             watch=self._watch,
+            under_way=begun[1] if begun is not None and begun[0] == told else None,
+            keep=partial(self._keep, told),
         )
         followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
         free, frozen = followed.free, followed.frozen
@@ -204,7 +218,7 @@ class IdentifyAndPlan:
                 test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
             )
             book.asked.append((self.iteration, plan))
-            self.memory = replace(self.memory, asked=self._latest())
+            self.memory = replace(self.memory, asked=self._latest(), under_way=None)
             return test
         committee, best = self._committee(), standing.best_flown(book)
         if best is None and not committee.trusted:
@@ -251,7 +265,7 @@ class IdentifyAndPlan:
             reason=found.reason,
         )
         book.asked.append((self.iteration, plan))
-        self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned))
+        self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
         return test
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
@@ -418,11 +432,24 @@ class IdentifyAndPlan:
         if first.tobytes() != starts[0].tobytes():
             starts.append(first)
         starts += self._linear_gains(committee)
-        genes = self.planner.tune(committee, starts, told) if committee.trusted else starts[0]
+        genes = starts[0]
+        if committee.trusted:
+            genes = self.planner.tune(committee, starts, told, self._scored(book))
         # What an interruption has left unlearnt must not show in what is tuned afterwards.
         if self._latest().told == told:
-            self.memory = replace(self.memory, gains=(book.outcomes, genes))
+            self.memory = replace(self.memory, gains=(book.outcomes, genes), scores=None)
         return genes
+
+    def _scored(self, book: Logbook) -> Scored:
+        """Scores of a tuning that was cut; what is judged from here on is remembered."""
+        outcomes, before = book.outcomes, self.memory.scores
+        if self._latest().told != len(book.experiments):
+            return Scored()
+
+        def keep(scores: tuple[Floats, ...]) -> None:
+            self.memory = replace(self.memory, scores=(outcomes, scores))
+
+        return Scored(before[1] if before is not None and before[0] == outcomes else (), keep)
 
     def _known_gains(self, best: Test | None) -> tuple[Floats, str]:
         """Gains as they were tuned last, or the best flown where none were, and what to say of it; nothing is tuned.

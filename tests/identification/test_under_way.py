@@ -1,0 +1,48 @@
+"""An identification that is kept between two proposals and read back goes on to the same bits."""
+
+import numpy as np
+import pytest
+
+from sameness import same, through_json
+from small_plants import fans, gravity, pendulum_like, swung
+from twinloop import _core
+from twinloop.campaign.presets import options_of
+from twinloop.identification.identify import PROPOSALS, UnderWay, identify_runs
+
+QUICK = {"moves": 1500, "starts": 2, "generations": 1, "population": 20, "committee_size": 4, "tuning_steps": 5,
+         "form": "acceleration"}  # fmt: skip
+
+
+def one_run():
+    return pendulum_like(), [swung(gravity, 0, noise=1e-3)], [], None
+
+
+def with_a_hidden_state():
+    """What was known of two runs is a second start on three."""
+    signals, runs = fans(3, fading=3.0)
+    known = learnt(signals, runs[:2], [np.ones(2)], None)
+    assert known.actuation.hidden
+    return signals, runs, [np.ones(2)], known
+
+
+def learnt(signals, runs, rests, known, **more):
+    options = options_of("default", QUICK)
+    return identify_runs(
+        runs, signals, options, rests=rests, seed=3, iteration=len(runs), known=known,
+        workers=_core.Workers(1), **more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("posed", "starts"), [(one_run, 1), (with_a_hidden_state, 2)])
+def test_it_goes_on_from_every_step_that_was_kept_to_the_same_bits(posed, starts):
+    signals, runs, rests, known = posed()
+    kept = []
+    whole = learnt(signals, runs, rests, known, keep=kept.append)
+    assert len(kept) == 1 + starts * (1 + len(PROPOSALS))
+    for step in kept[:: 2 * starts - 1]:
+        read = UnderWay.from_record(through_json(step.to_record()), signals)
+        assert same(read, step)
+        rest = []
+        again = learnt(signals, runs, rests, known, under_way=read, keep=rest.append)
+        assert same(again, whole)
+        assert len(rest) == len(kept) - 1 - kept.index(step)
