@@ -12,7 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 import twinloop as tl
-from lives import LIFE, PLANT, begun, flown, lived, plain, stored
+from lives import FULL_LIFE, LIFE, PLANT, begun, flown, lived, plain, stored
+from old_store import old_store
 from sameness import same
 from twinloop.faces.cli import main
 from twinloop.logs import write_columns
@@ -172,3 +173,15 @@ def test_the_death_of_a_writer_lets_the_next_one_in(server):
 def test_a_server_that_is_not_there_is_said(tmp_path):
     with pytest.raises(tl.StoreFailure, match="nothing that was kept is lost"):
         stored(f"postgresql+psycopg://hover:secret@/postgres?host={tmp_path}")
+
+
+def test_a_store_of_the_first_version_on_a_server_is_brought_up_to_date_with_all_that_is_in_it(
+    server, tmp_path
+):
+    new, address = tmp_path / "new.db", fresh(server, "migrated")
+    lived(stored(new, "default"), FULL_LIFE).close()
+    old_store(address, new)
+    in_file, on_server = tl.Campaign.load(new, threads=1), tl.Campaign.load(address, threads=1)
+    assert plain(on_server) == plain(in_file)
+    assert same(on_server.ask().genes, in_file.ask().genes)
+    on_server.close()
