@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from contextlib import closing
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -290,6 +291,9 @@ def test_the_store_says_what_results_come_from(path, pendulum):
     stored(path).close()
     held = found(opened(path, read_only=True), None)
     assert [session["versions"]["twinloop"] for session in held.sessions] == [tl.__version__] * 2
+    for name in ("numpy", "sqlalchemy", "alembic"):
+        assert held.sessions[0]["versions"][name] == metadata.version(name)
+    assert held.sessions[0]["versions"]["sqlite"] == sqlite3.sqlite_version
     assert held.sessions[0]["processor"] and held.setup["seed"] == 0
     assert len(rows(path, "experiments")[0][4]) == 64
 

@@ -10,8 +10,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from twinloop import _core
 from twinloop.arrays import whole
 from twinloop.campaign.history import Progress
@@ -22,6 +20,7 @@ from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
 from twinloop.records import Record, Recorded
 from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened, shown_name
+from twinloop.versions import versions
 
 Answer = TypeVar("Answer")
 
@@ -247,11 +246,7 @@ def provenance(threads: int) -> Record:
         "vectors": _core.vector_widths(),
         "system": platform.platform(),
         "command": [shown_name(word) for word in sys.argv],
-        "versions": {
-            "twinloop": _core.__version__,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
+        "versions": versions(),
     }
 
 

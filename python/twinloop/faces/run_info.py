@@ -7,9 +7,7 @@ import sys
 import time
 from datetime import datetime, timezone
 
-import numpy as np
-
-from twinloop import _core
+from twinloop.versions import versions
 
 
 class Stopwatch:
@@ -33,9 +31,5 @@ class Stopwatch:
             "host": platform.node(),
             "machine": platform.machine(),
             "command": sys.argv,
-            "versions": {
-                "twinloop": _core.__version__,
-                "python": platform.python_version(),
-                "numpy": np.__version__,
-            },
+            "versions": versions(),
         }
