@@ -36,6 +36,7 @@ test: $(VENV)/.installed-test $(VENV)/.installed-others $(NATIVE) ## all tests, 
 	$(BIN)/python -m pytest
 	$(BIN)/python benchmarks/speed.py --smoke
 	$(BIN)/python benchmarks/long_campaign.py --smoke
+	$(BIN)/python benchmarks/report.py --smoke
 	$(BIN)/python benchmarks/laws.py --smoke
 	$(BIN)/twinloop bench power --smoke
 	$(BIN)/twinloop bench zoo --smoke

@@ -6,6 +6,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,16 +141,13 @@ def require() -> None:
     Raises:
         NotAvailable: one is missing.
     """
-    try:
-        import alembic
-        import sqlalchemy
-
-        _ = alembic, sqlalchemy
-    except ModuleNotFoundError as missing:
-        raise NotAvailable(
-            f"Store: expected the packages sqlalchemy and alembic, found that {missing.name} is missing; install them"
-            " with: pip install 'twinloop[store]'."
-        ) from missing
+    # Alembic takes most of a second to import, and only a store that is made or brought up to date needs it.
+    for name in ("sqlalchemy", "alembic"):
+        if find_spec(name) is None:
+            raise NotAvailable(
+                f"Store: expected the packages sqlalchemy and alembic, found that {name} is missing; install them with:"
+                " pip install 'twinloop[store]'."
+            )
 
 
 def said(name: str, failure: Exception) -> TwinloopError:
@@ -304,7 +302,7 @@ def _migrate(store: Store, found: str | None) -> None:
     if store.read_only:
         raise InvalidInput(
             f"Store {store.name}: expected tables of version {max(known)}, found {found}; open it once without"
-            " read_only, which brings it up to date."
+            " read_only, as `twinloop learn` does, which brings it up to date."
         )
     with store.engine.begin() as connection:
         config.attributes["connection"] = connection

@@ -19,6 +19,8 @@ from twinloop.law.linear.state_space import Linear
 
 HALVINGS = 30
 """Times that a step to a command that holds a state is halved at most."""
+CLOSE = 1e-12
+"""Of a command's size: steps that are no longer change nothing that anybody asks for."""
 
 
 def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Linear:
@@ -302,6 +304,8 @@ def trimmed(law: Law, state: Floats, start: Floats) -> Floats:
         share = 1.0
         for _ in range(HALVINGS):
             tried = np.clip(best + share * step, low, high)
+            if (np.abs(tried - best) <= CLOSE * sizes).all():
+                return best
             left, there = off(tried)
             if left < least:
                 break
