@@ -439,7 +439,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         known, book = self._method, self._book
         twins = known.twins_before(book)
         errors = free_runs([twin.model for _, twin in twins], book, self._workers)
-        return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals()))
+        return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals(book)))
 
     def checks(self) -> Checks:
         """Whether the twin may be believed and the controller flown, check by check; printable.

@@ -107,7 +107,7 @@ class Method(Protocol):
         """
         ...
 
-    def rivals(self) -> tuple[Rival, ...]:
+    def rivals(self, book: Logbook) -> tuple[Rival, ...]:
         """Sums of terms that were considered for the twin, the chosen ones among them."""
         ...
 

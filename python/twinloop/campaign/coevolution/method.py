@@ -180,7 +180,7 @@ class Coevolution:
         """None: the paper knows no noise."""
         return None
 
-    def rivals(self) -> tuple[Rival, ...]:
+    def rivals(self, book: Logbook) -> tuple[Rival, ...]:
         """None: programs are no sums."""
         return ()
 

@@ -1,0 +1,149 @@
+"""Knowledge: what was learnt, as a twin and as the numbers that an engineer looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.examination.rivals import Rival
+from twinloop.campaign.identify_and_plan.calibration import (
+    OF_PARTS,
+    factor,
+    needed_factor,
+    residuals_of_flights,
+)
+from twinloop.campaign.identify_and_plan.memory import Learnt
+from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.presets import DefaultOptions
+from twinloop.campaign.setup import Setup
+from twinloop.errors import engine_input
+from twinloop.identification.records import Run
+from twinloop.identification.remarks import symbols_of
+from twinloop.identification.sensors.offsets import moved
+from twinloop.law.accuracy import TestErrors
+from twinloop.law.twin import Twin
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Shows what was learnt, beside all that was told.
+
+    Args:
+        setup: of the campaign.
+        options: of the preset.
+        book: of the campaign.
+    """
+
+    setup: Setup
+    options: DefaultOptions
+    book: Logbook
+
+    def twin(self, learnt: Learnt, errors: Sequence[TestErrors]) -> Twin:
+        """The best model, with the committee and the noise for its band.
+
+        Args:
+            learnt: from the first experiments.
+            errors: of the twin on all of them.
+        """
+        found = learnt.identified
+        noise = found.noise(self.setup.signals)
+        inflation = OF_PARTS if found.of_parts else factor(learnt.needed)
+        if found.exact:
+            # What follows exact readings to rounding is the law: its members are too sure of nothing.
+            residuals = residuals_of_flights(
+                found.model, self.book.experiments[: learnt.told], self.setup.limits
+            )
+            noise, inflation = replace(noise, sensors=residuals), 1.0
+        return Twin(
+            found.model,
+            self.setup.signals,
+            errors,
+            self.options.divergence_factor,
+            members=learnt.believed,
+            noise=noise,
+            seed=self.setup.seed,
+            inflation=inflation,
+            remarks=learnt.lessons[-1].remarks,
+            flights=[run.trajectory for run in self.book.experiments],
+        )
+
+    def needed_factors(self, learnt: Learnt) -> tuple[float, ...]:
+        """Factors that the flights told since would have needed, after those before them.
+
+        Args:
+            learnt: from the first experiments.
+        """
+        # A committee with parts in it says nothing of those that come after it.
+        if learnt.identified.of_parts:
+            return learnt.needed
+        twin = self.twin(learnt, [])
+        needed = [
+            needed_factor(twin, run.replayed, run.trajectory) for run in self.book.experiments[learnt.told :]
+        ]
+        return (*learnt.needed, *(found for found in needed if found is not None))
+
+    def twins_before(self, latest: Learnt, asked: Learnt | None) -> tuple[tuple[int, Twin], ...]:
+        """Twins that have not learnt all: with bands those of the last question and of today, else models alone.
+
+        Args:
+            latest: what was learnt last.
+            asked: what was known when the last test was asked for.
+        """
+        divergence = self.options.divergence_factor
+        told = [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
+        found = {
+            learnt: Twin(model, self.setup.signals, (), divergence)
+            for learnt, model in zip(told, latest.models, strict=True)
+        }
+        if asked is not None:
+            found[asked.told] = self.twin(asked, [])
+        # Of today it is where flights were told that nobody has learnt yet.
+        found[latest.told] = self.twin(latest, [])
+        return tuple(
+            (learnt, found[learnt]) for learnt in sorted(found) if learnt < len(self.book.experiments)
+        )
+
+    def innovations(self, learnt: Learnt, workers: _core.Workers) -> tuple[Floats, ...] | None:
+        """Whitened prediction errors of the twin's own filter; None of exact readings, which leave rounding alone.
+
+        Args:
+            learnt: from the first experiments.
+            workers: how the work is carried out.
+        """
+        if learnt.identified.exact:
+            return None
+        runs = [
+            Run.of(run.trajectory.states, run.trajectory.commands).continued(self.setup.signals)
+            for run in self.book.experiments[: learnt.told]
+        ]
+        runs = moved(runs, self.setup.signals, learnt.identified.offsets)
+        with engine_input():
+            found = _core.predictions(
+                learnt.identified.model,
+                self.setup.limits.engine,
+                [chain.engine for chain in learnt.identified.chains],
+                [(run.states, run.weights, run.commands) for run in runs],
+                workers=workers,
+            )
+        return None if found is None else tuple(errors for errors, _ in found)
+
+    def rivals(self, learnt: Learnt) -> tuple[Rival, ...]:
+        """Subsets of terms that annealing has found nearly as good.
+
+        Args:
+            learnt: from the first experiments.
+        """
+        identified, signals = learnt.identified, self.setup.signals
+        symbols = symbols_of(signals)
+        return tuple(
+            Rival(
+                signals.state_names[found.chain.states[0]],
+                tuple(sorted(identified.pool.text(node, symbols) for node in subset)),
+                above,
+            )
+            for found in identified.sums
+            for subset, above in ((tuple(found.weights), 0.0), *found.others)
+            if above > 0.0 or subset == tuple(found.weights)
+        )

@@ -1,0 +1,180 @@
+"""Learning: from all flights that were told to a twin, the members of its committee that follow, and their record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Lesson
+from twinloop.campaign.identify_and_plan.diagnostics import doubts, other_commands
+from twinloop.campaign.identify_and_plan.following import Following, following, foretold, unexplained
+from twinloop.campaign.identify_and_plan.knowledge import Knowledge
+from twinloop.campaign.identify_and_plan.memory import Learnt
+from twinloop.campaign.identify_and_plan.selection import learnt_from
+from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.presets import DefaultOptions
+from twinloop.campaign.setup import Setup
+from twinloop.campaign.twin_errors import free_runs
+from twinloop.identification.identified import Identified
+from twinloop.identification.identify import UnderWay, identify_runs
+from twinloop.identification.records import Run
+from twinloop.objectives import normalised_error
+from twinloop.steps import Watch
+from twinloop.streams import Unit
+
+FEWEST = 4
+"""Members of a committee that are kept in any case."""
+WRONG = 0.5
+"""Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
+
+
+@dataclass(frozen=True)
+class Learner:
+    """Learns from a logbook.
+
+    Args:
+        setup: of the campaign.
+        options: of the preset.
+        workers: how the work is carried out.
+        watch: called with each step that begins.
+    """
+
+    setup: Setup
+    options: DefaultOptions
+    workers: _core.Workers
+    watch: Watch
+
+    def learnt(
+        self,
+        book: Logbook,
+        asked: Learnt | None,
+        under_way: UnderWay | None,
+        keep: Callable[[UnderWay], None],
+    ) -> Learnt:
+        """What all that was told teaches.
+
+        Args:
+            book: with at least one experiment.
+            asked: what was known when the last test was asked for; None: nothing.
+            under_way: the identification of the same experiments, as far as it had come; None: it begins.
+            keep: called with the identification wherever it may go on from later.
+        """
+        told = len(book.experiments)
+        needed = () if asked is None else Knowledge(self.setup, self.options, book).needed_factors(asked)
+        identified = self._identified(book, None if asked is None else asked.identified, under_way, keep)
+        followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
+        believed = [identified.members[i] for i in believed_members(followed)]
+        follows = self._can_follow(identified, followed)
+        lesson = self._lesson(identified, follows, book, followed)
+        before, models = ((), ()) if asked is None else (asked.lessons, asked.models)
+        return Learnt(
+            told, identified, believed, follows, needed, (*before, lesson), models=(*models, identified.model)
+        )
+
+    def _identified(
+        self,
+        book: Logbook,
+        known: Identified | None,
+        under_way: UnderWay | None,
+        keep: Callable[[UnderWay], None],
+    ) -> Identified:
+        flights = learnt_from(book.experiments, self.options.most_readings)
+        return identify_runs(
+            [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
+            self.setup.signals,
+            self.options,
+            rests=self._rests(),
+            seed=self.setup.seed,
+            iteration=len(book.experiments),
+            known=known,
+            workers=self.workers,
+            watch=self.watch,
+            under_way=under_way,
+            keep=keep,
+        )
+
+    def _rests(self) -> list[Floats]:
+        """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
+        family, target = self.setup.family, np.atleast_2d(self.setup.target_state)[0]
+        middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
+        return [family.controller(middle).command(target, target)]
+
+    def _can_follow(self, identified: Identified, followed: Following) -> bool:
+        """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from."""
+        scales = np.array([state.scale for state in self.setup.signals.states])
+        noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
+        free, frozen = followed.free[0], followed.frozen
+        lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
+        return bool(np.isfinite(identified.left)) and 2 * int(lost.sum()) <= len(lost)
+
+    def _unexplained(self, identified: Identified, book: Logbook, followed: Following) -> list[float]:
+        """By how much more than noise and disturbances the best model misses each flight; none where it diverges."""
+        if not np.isfinite(identified.left):
+            return []
+        noise, unit = (
+            identified.noise(self.setup.signals),
+            Unit(self.setup.seed).part(len(book.experiments), 1),
+        )
+        model, limits = identified.members[0], self.setup.limits
+        expected = foretold(model, book.experiments, noise, unit, limits, self.workers)
+        missed: list[float] = unexplained(followed.free[0], followed.frozen, expected).tolist()
+        return missed
+
+    def _lesson(self, identified: Identified, follows: bool, book: Logbook, followed: Following) -> Lesson:
+        free = free_runs(identified.members[:1], book, self.workers)[0].tolist()
+        return Lesson(
+            iteration=len(book.experiments),
+            tests=tuple(run.number for run in book.experiments),
+            form=identified.model.form,
+            terms=identified.terms,
+            misfit=identified.misfit,
+            readings=identified.readings,
+            ignored=identified.ignored,
+            sensors=tuple(identified.sensors(self.setup.signals.n_x).tolist()),
+            lags=tuple(actuator.lag for actuator in identified.actuation.actuators),
+            delays=tuple(actuator.delay for actuator in identified.actuation.actuators),
+            hidden=tuple(
+                (hidden.commands, hidden.squared, hidden.rest, hidden.time)
+                for hidden in identified.actuation.hidden
+            ),
+            offsets=tuple(identified.offsets.tolist()),
+            closed_loop=tuple(free),
+            normalised=tuple(
+                normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)
+            ),
+            follows=follows,
+            remarks=(
+                *identified.remarks,
+                *doubts(
+                    book.experiments,
+                    self.setup.signals,
+                    follows or not np.isfinite(identified.left),  # of one that diverges it is said already
+                    self.setup.steps,
+                    self._unexplained(identified, book, followed),
+                    () if follows else other_commands(book.experiments),
+                ),
+            ),
+        )
+
+
+def believed_members(followed: Following) -> list[int]:
+    """Members of a committee that follow the flights that they were learnt from, and the best one in any case.
+
+    One that cannot is no member (E-SINDy's stability filter).
+
+    Args:
+        followed: free runs of the members, the best first.
+
+    Returns:
+        Their numbers, in order.
+    """
+    free = followed.free
+    wrong = (free > np.maximum(WRONG * followed.frozen, 4.0 * free[0])).any(axis=1)
+    believed = {0, *np.flatnonzero(~wrong).tolist()}
+    # Where hardly any can, the ones that go wrong least still show where more must be known.
+    others = [i for i in followed.order() if i not in believed]
+    return sorted(believed | set(others[: max(0, FEWEST - len(believed))]))

@@ -1,0 +1,63 @@
+"""What the preset `default` remembers: values that never change, with a plain form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Lesson
+from twinloop.identification.identified import Identified
+from twinloop.identification.identify import UnderWay
+from twinloop.records import Recorded
+from twinloop.test import Test
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt(Recorded, kind="learnt"):
+    """What was learnt from the first experiments of a campaign.
+
+    Args:
+        told: how many they were.
+        identified: the model, its committee and how they were found.
+        believed: members of the committee that follow the flights, the best first.
+        follows: whether the best model, flown by itself, follows at least half of them.
+        needed: factors on the committees' spreads that the flights would have needed, each predicted before it was
+            learnt.
+        lessons: records of this identification and of those that it began with.
+        gains: that were tuned on the committee when a test was asked for; None: none were.
+        models: the best model of each identification, as `lessons`; what an older version wrote has none.
+    """
+
+    told: int
+    identified: Identified
+    believed: Sequence[_core.Model]
+    follows: bool
+    needed: tuple[float, ...]
+    lessons: tuple[Lesson, ...]
+    gains: Floats | None = None
+    models: tuple[_core.Model, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Memory(Recorded, kind="memory_of_default"):
+    """What the preset `default` remembers; all of it are values that never change.
+
+    Args:
+        asked: what was known when the last test was asked for. Learning begins here, whoever looks in between.
+        latest: what was learnt last; shown to whoever looks, and used by `ask` if it is of all that was told.
+        gains: tuned on the latest committee, after so many experiments and failures.
+        best: the controller to fly, at the revision of the logbook that it was chosen at.
+        under_way: an identification that is not finished, and of how many experiments it is.
+        scores: of the gains that were judged, of a tuning on the latest committee that is not finished.
+    """
+
+    VERSION = 2
+
+    asked: Learnt | None = None
+    latest: Learnt | None = None
+    gains: tuple[int, Floats] | None = None
+    best: tuple[int, Test] | None = None
+    under_way: tuple[int, UnderWay] | None = None
+    scores: tuple[int, tuple[Floats, ...]] | None = None
