@@ -139,9 +139,9 @@ def test_gains_that_left_the_envelope_give_way_to_any_that_keep_it():
 def test_a_full_state_feedback_is_tuned_from_the_gains_of_lqr_on_the_twin_too(monkeypatch, trusted):
     seen, tune = [], Planner.tune
 
-    def spy(self, committee, starts, number):
+    def spy(self, committee, starts, number, *scored):
         seen.append((committee, list(starts)))
-        return tune(self, committee, starts, number)
+        return tune(self, committee, starts, number, *scored)
 
     monkeypatch.setattr(Planner, "tune", spy)
     controller = StateFeedback(None, (-6.0, 6.0))
