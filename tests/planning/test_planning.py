@@ -13,10 +13,11 @@ from twinloop.campaign.history import Experiment
 from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
 from twinloop.limits import Limits
+from twinloop.planning.comparison import Flown
 from twinloop.planning.excitation import SHARE, answered, binary, chirps, first_chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
-from twinloop.planning.planner import Flown, Planner
+from twinloop.planning.planner import Planner
 from twinloop.planning.quality import KINDS, quality_of
 from twinloop.streams import Unit
 
@@ -65,7 +66,7 @@ TUNED = np.array([4.0, 0.1, 2.0])
 
 
 def proposed(planner, committee, tuned=TUNED, goal="both", number=3, exploit=False, last=False, **changes):
-    flown = Flown(**{"best": tuned, "kept": True, "usages": [1.0], "good": 1.0, **changes})
+    flown = Flown(**{"best": tuned, "flies": True, "usages": [1.0], "good": 1.0, **changes})
     return planner.propose(committee, tuned, flown, goal, number, exploit, last)
 
 

@@ -1,0 +1,280 @@
+"""Comparison: candidates judged on a committee, and the one of them that is flown next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twinloop.arrays import Floats
+from twinloop.envelope import outside
+from twinloop.flights import disagreements
+from twinloop.planning.candidates import Candidates
+from twinloop.planning.gains import nearby
+from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
+from twinloop.planning.reasons import Why, reason
+from twinloop.planning.settings import PlanningOptions
+from twinloop.planning.worth import apart, gain, limit
+
+Flags = NDArray[np.bool_]
+TRIED = 128
+"""Candidates at most that are flown under noise before the safest one is taken."""
+TOGETHER = 4
+"""Of them at once."""
+ANYWHERE = 64
+"""Flights by which it is asked how much of the twin is unknown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """What has flown so far.
+
+    Args:
+        best: genes of the best flight; those tuned where no test was flown.
+        flies: whether they are known to fly: to the end, and inside the envelope.
+        usages: largest usage of the envelope in each flight.
+        good: quality of the best flight that kept the envelope; infinite where none has: one that keeps it may then be
+            worse.
+        failed: genes of tests that failed on the system, or were cut.
+    """
+
+    best: Floats
+    flies: bool
+    usages: Sequence[float]
+    good: float
+    failed: Sequence[Floats] = ()
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the next test is for.
+
+    Args:
+        goal: "both", "model" or "control".
+        number: of the test, for its streams.
+        exploit: whether the tuned gains are flown as they are.
+        plain: whether the test that promises most is wanted, rather than the one that tells most.
+    """
+
+    goal: str
+    number: int
+    exploit: bool
+    plain: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A test that is proposed.
+
+    Args:
+        genes: its gains (size,).
+        initial_state: where it starts (n_x,).
+        target_state: where it leads (n_x,).
+        excitation: (n, n_u), or None.
+        predicted: mean quality over members and draws, as a record of the flight would give it; infinite if any
+            diverges.
+        spread: standard deviation of it over members and noise; infinite likewise.
+        risk: share of predicted flights that leave the envelope, with half a flight added on either side.
+        safe: whether every member keeps the margin, and the envelope under every draw of the sensors' noise.
+        disagreement: of the committee, log det.
+        gain: quality that knowing the right member would bring, by the committee's own estimate.
+        reason: for a person.
+    """
+
+    genes: Floats
+    initial_state: Floats
+    target_state: Floats
+    excitation: Floats | None
+    predicted: float
+    spread: float
+    risk: float
+    safe: bool
+    disagreement: float
+    gain: float
+    reason: str
+
+
+class Comparison:
+    """Candidates on a committee: all of them without noise, and under drawn noise those that may be chosen.
+
+    Args:
+        judge: of the campaign.
+        options: of the planning.
+        committee: that judges.
+        drafts: candidates; the first one is the tuned gains as they are.
+        flown: what has flown so far.
+        wanted: what the test is for.
+    """
+
+    def __init__(
+        self,
+        judge: Judge,
+        options: PlanningOptions,
+        committee: Committee,
+        drafts: Candidates,
+        flown: Flown,
+        wanted: Wanted,
+    ) -> None:
+        self.judge, self.options, self.committee = judge, options, committee
+        self.drafts, self.flown, self.wanted = drafts, flown, wanted
+        genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
+        # A member that blows up whatever is flown is no member (E-SINDy).
+        self.members = judge.lasting(committee.members, genes, excitation, ends)
+        self.quiet = judge.judge(self.members, genes, committee.sds, 1, excitation, ends)
+        # Differences below these are rounding.
+        smallest = np.array([1e-6 * state.scale for state in judge.signals.states])
+        self.tells, self.where = disagreements(
+            self.members,
+            judge.flights(genes, excitation, ends),
+            np.maximum(committee.sds, smallest),
+            workers=judge.workers,
+        )
+        self.possible = self._possible()
+        self.keeps = self.possible & (self.quiet.worst_usage <= self._reach())
+        self.promised = float(self.quiet.mean[0])
+
+    def proposal(self) -> Proposal:
+        """The candidate that tells most of those that may be flown, or promises most; else the safest one."""
+        found = self._trusted_choice() if self.committee.trusted else None
+        chosen, flights = self._safest() if found is None else found
+        inside = self.quiet.worst_usage[chosen] <= 1.0 - self.options.margin
+        safe = bool(inside and not outside(flights.usages).any())
+        predicted, spread = expected(flights.qualities[:, :, 0])
+        excitation, disagreement = self.drafts.excitation[chosen], float(self.tells[chosen])
+        return Proposal(
+            genes=self.drafts.genes[chosen],
+            initial_state=self.drafts.ends[0][chosen],
+            target_state=self.drafts.ends[1][chosen],
+            excitation=excitation if excitation.any() else None,
+            predicted=predicted,
+            spread=spread,
+            risk=risk(flights.usages),
+            safe=safe,
+            disagreement=disagreement,
+            gain=self.gain,
+            reason=reason(self._why(chosen, safe, disagreement), self.judge.signals, self.options),
+        )
+
+    @cached_property
+    def gain(self) -> float:
+        """Quality that knowing the right member would bring, among the candidates that keep the envelope."""
+        return gain(self.quiet.qualities.mean(axis=1)[:, self.keeps])
+
+    def _trusted_choice(self) -> tuple[int, Judged] | None:
+        """What a committee that can be trusted chooses, and its flights under noise; None where nothing lasts."""
+        exploit, mean = self.wanted.exploit, self.quiet.mean
+        most, worst, by_noise, scatter = self._allowed()
+        # The tuned gains as they are tell least, and asked for once more nothing.
+        others = self.keeps & (exploit | (np.arange(len(self.keeps)) > 0))
+        allowed = others & (mean <= worst)
+        first = [0] if exploit and allowed[0] else []
+        first += _in_order(allowed, mean if self.wanted.plain else -self.tells)
+        found = self._first_that_lasts(first, worst + by_noise + 2.0 * scatter)
+        if found is None:
+            # None that tells much lasts under noise: the one that promises most, if it is no worse than was flown.
+            found = self._first_that_lasts(_in_order(others & (mean <= most), mean), most + 2.0 * scatter)
+        return found
+
+    def _safest(self) -> tuple[int, Judged]:
+        """The candidate that uses least of the envelope, and its flights under noise."""
+        # What was flown and kept the envelope will again, whatever the members make of it.
+        likely = self.possible
+        if self.flown.flies:
+            likely = likely & (np.arange(len(likely)) >= self.drafts.repeats)
+        chosen = int(np.argmin(np.where(likely, self.quiet.worst_usage, np.inf)))
+        return chosen, self._noisy([chosen])
+
+    def _allowed(self) -> tuple[float, float, float, float]:
+        """The worst predicted quality of any flight, and of one that tells; what noise adds; how far it scatters."""
+        goal = self.wanted.goal
+        most = self._most()
+        if goal == "model":
+            return most, most, 0.0, 0.0
+        scatter, by_noise = self._noise_of_tuned()
+        unknown = self._unknown() if goal == "both" else 0.0
+        worst = limit(self.promised, self.flown.good, self.gain, unknown, scatter, self.options)
+        return most, worst, by_noise, scatter
+
+    def _possible(self) -> Flags:
+        """Candidates that are no flight that failed, or was cut, once more."""
+        possible = ~nearby(self.judge.family, self.drafts.genes, self.flown.failed)
+        possible[self.drafts.repeats :] &= self.flown.flies
+        # Where all of them are, the safest of them is still the best that can be said.
+        return possible if possible.any() else np.ones_like(possible)
+
+    def _reach(self) -> float:
+        """Usage of the envelope that a proposal may have, where that of each flight so far is known."""
+        options, used = self.options, self.flown.usages
+        first, most = used[0] if used else 0.0, max(used, default=0.0)
+        # A model is believed near what was flown: each flight may go somewhat further than those before it.
+        near = max(options.reach_first, options.reach_growth * most)
+        # With gains far from any that were flown it may be wrong in ways that no member shows, and the more so the
+        # further a flight goes: what is small on the first flight, and in no term, is not small then.
+        far = max(min(options.reach_far, options.reach_growth * first), options.reach_least, most)
+        return min(1.0 - options.margin, far if self.wanted.goal == "model" else near)
+
+    def _most(self) -> float:
+        """Predicted quality that any flight may have at most; one for the model may cost as much again."""
+        # Where no flight has kept the envelope, one that does may be worse than what is promised.
+        good, twice = self.flown.good, 2.0 * self.promised
+        most = (1.0 + self.options.worse) * good if np.isfinite(good) else twice
+        return max(most, twice) if self.wanted.goal == "model" else most
+
+    def _unknown(self) -> float:
+        """How far members are apart about flights of the task under gains from anywhere in their box, as a share."""
+        judge = self.judge
+        stream = judge.unit.part(self.wanted.number, 1).stream("candidates")
+        genes = judge.family.from_unit(stream.uniforms(ANYWHERE, judge.family.size))
+        return apart(judge.judge(self.members, genes, np.zeros(judge.signals.n_x), 1).qualities[:, 0])
+
+    def _noise_of_tuned(self) -> tuple[float, float]:
+        """Of the tuned flight: how far its quality is from that of the next, and what noise adds to a measurement."""
+        genes, sds, draws = self.drafts.genes[:1], self.committee.sds, self.options.draws
+        judge = self.judge.judge
+        true, measured = (judge(self.members, genes, sds, draws, measured=how) for how in (False, True))
+        if not np.isfinite(true.qualities).all():
+            return 0.0, 0.0
+        quiet = judge(self.members, genes, sds, 1)
+        return float(true.qualities[0].std()), max(0.0, float(measured.mean[0] - quiet.mean[0]))
+
+    def _noisy(self, chosen: list[int]) -> Judged:
+        """Some candidates under drawn noise, as records of their flights would give them."""
+        some, draws = self.drafts.some(chosen), self.options.draws
+        return self.judge.judge(
+            self.members, some.genes, self.committee.sds, draws, some.excitation, some.ends, measured=True
+        )
+
+    def _first_that_lasts(self, ordered: Sequence[int], worst: float) -> tuple[int, Judged] | None:
+        """The first that keeps the envelope under every draw of noise and is not worse than the worst allowed."""
+        for at in range(0, min(len(ordered), TRIED), TOGETHER):
+            batch = list(ordered[at : at + TOGETHER])
+            flights = self._noisy(batch)
+            lasts = np.flatnonzero(~outside(flights.worst_usage) & (flights.mean <= worst))
+            if len(lasts):
+                i = int(lasts[0])
+                return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])
+        return None
+
+    def _why(self, chosen: int, safe: bool, disagreement: float) -> Why:
+        row, state, high, low = self.where[chosen].tolist()
+        return Why(
+            trusted=self.committee.trusted,
+            flies=self.flown.flies,
+            exploits=self.wanted.exploit and chosen == 0,
+            plain=self.wanted.plain,
+            repeats=chosen >= self.drafts.repeats,
+            safe=safe,
+            disagreement=disagreement,
+            step=row,
+            state=state,
+            members=(high, low),
+        )
+
+
+def _in_order(those: Flags, cost: Floats) -> list[int]:
+    """Numbers of those that are meant, the one of least cost first."""
+    numbers: list[int] = np.flatnonzero(those)[np.argsort(cost[those], kind="stable")].tolist()
+    return numbers

@@ -1,0 +1,85 @@
+"""Reasons: why a test is proposed, in sentences for a person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from twinloop.elementary import log
+from twinloop.planning.settings import PlanningOptions
+from twinloop.signals import Signals
+
+
+@dataclass(frozen=True)
+class Why:
+    """What there is to say of a proposal.
+
+    Args:
+        trusted: whether the committee follows the flights so far.
+        flies: whether the best gains flown are known to fly.
+        exploits: whether the tuned gains are flown as they are.
+        plain: whether the test that promises most was wanted.
+        repeats: whether it flies the best gains flown again.
+        safe: whether every member keeps the envelope with its margin, and under noise.
+        disagreement: of the committee, in nats.
+        step: at which two members are the furthest apart.
+        state: in which they are.
+        members: numbers of the two.
+    """
+
+    trusted: bool
+    flies: bool
+    exploits: bool
+    plain: bool
+    repeats: bool
+    safe: bool
+    disagreement: float
+    step: int
+    state: int
+    members: tuple[int, int]
+
+
+def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
+    """Why this test.
+
+    Args:
+        why: what there is to say.
+        signals: of the system.
+        options: of the planning.
+    """
+    sentences = [_what_flies(why, options), _what_it_tells(why, signals)]
+    if not why.safe:
+        sentences.append(
+            "No candidate keeps the envelope with its margin, or lasts at all, on every model and under the noise"
+            " of the sensors: this is the safest that is known. Fly it with a hand on the switch, or not at all."
+        )
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _what_flies(why: Why, options: PlanningOptions) -> str:
+    """That the best gains flown fly again; nothing where others do."""
+    known = ": they are known to fly" * why.flies
+    if why.repeats and why.plain:
+        return f"The best gains flown, again{known}."
+    if why.repeats:
+        change = "a stronger excitation" if options.excitation > 0.0 else "a small variation"
+        return f"The best gains flown, again, with {change}{known}."
+    return ""
+
+
+def _what_it_tells(why: Why, signals: Signals) -> str:
+    """What is expected of the flight."""
+    high, low = why.members
+    if not why.trusted:
+        return "The twin does not follow the flights so far: it cannot say what this one will tell."
+    if why.exploits:
+        return "The best gains that the twin knows, flown as they are."
+    if why.plain:
+        promise = "The gains that promise most of those that may be flown, as they are."
+        return "" if why.repeats else promise
+    if why.disagreement > 0.0 and high != low:
+        return (
+            f"Models {high} and {low} disagree most on {signals.state_names[why.state]},"
+            f" {why.step * signals.dt:.2g} s after the start; the flight tells"
+            f" {why.disagreement / float(log(2.0)):.3g} bits."
+        )
+    return "The models predict the same of it: the flight tests what they have in common."
