@@ -28,8 +28,8 @@ from twinloop.law.exports.checks import (
 )
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.exports.python_source import python_source
+from twinloop.law.exports.taking import compared
 from twinloop.law.noise import LastingDisturbance, Noise
-from twinloop.law.twin import taken
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 
@@ -57,7 +57,7 @@ def test_modules_for_other_packages_simulate_what_the_twin_does(which, kind, tmp
     twin = TWINS[which]()
     (path,) = twin.export(tmp_path / "taken.py", kind=kind)
     flight = flown(twin, seed=7)
-    expected = taken(twin.law, twin.simulate_commands(flight.states[0], 2.0 * flight.commands))
+    expected = compared(twin.law, twin.simulate_commands(flight.states[0], 2.0 * flight.commands))
     simulate = {"casadi": casadi_simulation, "control": control_simulation}[kind](path.read_text())
     found = simulate(flight.states[0], 2.0 * flight.commands)[: len(expected)]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.law.twin import NINE_OF_TEN, Twin
+from twinloop.law.twin import Twin
+from twinloop.law.uncertainty import NINE_OF_TEN
 from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from twinloop.arrays import Floats
 from twinloop.records import Recorded
+from twinloop.signals import Signals
 
 
 @dataclass(frozen=True)
@@ -81,3 +85,31 @@ class FitTable(tuple[StateFit, ...]):
             fit, r2 = ("-" if value is None else f"{value:.4g}" for value in (row.fit, row.r2))
             lines.append(f"{row.name:<16} {row.unit or '1':<8} {row.rmse:>10.4g}  {fit:>8}  {r2:>8}")
         return "\n".join(lines)
+
+
+def fit_table(signals: Signals, read: Floats, free: Floats | None) -> FitTable:
+    """How well a free run follows what was read.
+
+    Args:
+        signals: of the system.
+        read: states (n, n_x).
+        free: those of the free run (n, n_x); None where it diverges before the end.
+
+    Returns:
+        RMSE, FIT % and R² of each state.
+    """
+    rows = []
+    for i, state in enumerate(signals.states):
+        around = float(np.square(read[:, i] - read[:, i].mean()).sum())
+        squares = np.inf if free is None else float(np.square(signals.difference(read, free)[:, i]).sum())
+        share = squares / around if around > 0.0 else None
+        rows.append(
+            StateFit(
+                name=state.name,
+                unit=state.unit,
+                rmse=float(np.sqrt(squares / len(read))),
+                fit=None if share is None else 100.0 * (1.0 - float(np.sqrt(share))),
+                r2=None if share is None else 1.0 - share,
+            )
+        )
+    return FitTable(rows)

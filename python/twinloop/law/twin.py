@@ -14,35 +14,31 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop.arrays import Floats, floats, number
-from twinloop.errors import InvalidInput, NotAvailable, engine_input
-from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
+from twinloop.errors import InvalidInput, engine_input
+from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
 from twinloop.law.equations import equations
 from twinloop.law.exports.environment import Reward, environment
-from twinloop.law.exports.export import Source, asked, delivered, exported
 from twinloop.law.exports.gymnasium_source import Episode
-from twinloop.law.flight import drawn_runs, fly
+from twinloop.law.exports.taking import taken_twin
+from twinloop.law.flight import fly
 from twinloop.law.law import Law
 from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import Noise
+from twinloop.law.uncertainty import DRAWS, NINE_OF_TEN, committee_runs, spread_of
 from twinloop.limits import Limits
-from twinloop.records import Recorded, checked_record, from_text, read, to_text
+from twinloop.records import Recorded, checked_record, from_text, read
 from twinloop.remarks import Remark
 from twinloop.replay import Replay
 from twinloop.showing import Shown
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory, check_recorded, continued
 
 WRONG = 0.5
 """Share of the error of the model that never moves above which a flight is not followed."""
-DRAWS = 12
-"""Runs of each member of a committee that a band is made of."""
 STARTS = 5.0
 """Standard deviations of a sensor by which a flight's first reading may be off the state that its test asks for."""
-NINE_OF_TEN = 1.645
-"""Standard deviations on either side of the mean between which nine of ten normal numbers lie."""
 
 
 class Twin(Shown, Recorded, kind="twin"):
@@ -184,31 +180,7 @@ class Twin(Shown, Recorded, kind="twin"):
             InvalidInput: no such kind, or a path that cannot be written.
             NotAvailable: the twin does not follow its own flights, or the export could not be checked on them.
         """
-        chosen, path = asked(to, kind)
-        if not force and not self.follows:
-            raise NotAvailable(
-                "Export: expected a twin that follows the flights that it was learnt from, found one that does not"
-                " follow half of them; learn from more tests, or pass force=True."
-            )
-        record = to_text(self.to_record()) if chosen == "json" else ""
-        source = Source(
-            self.law,
-            lambda state, commands: taken(self.law, self.simulate_commands(state, commands)),
-            self.flights,
-            record,
-            not force,
-            self._episode() if episode is None else episode,
-        )
-        name = "twin" if path is None else path.stem
-        return delivered(exported(source, chosen, name, precision), name, path)
-
-    def _episode(self) -> Episode:
-        """What an environment of Gymnasium begins with where nobody says it."""
-        rest = np.zeros(self.signals.n_x)
-        if not self.flights:
-            return Episode(rest, rest, 100, self.divergence_factor)
-        first = self.flights[0]
-        return Episode(self._began(first), rest, max(1, first.steps), self.divergence_factor)
+        return taken_twin(self, to, kind, precision, force, episode)
 
     @cached_property
     def law(self) -> Law:
@@ -268,15 +240,22 @@ class Twin(Shown, Recorded, kind="twin"):
             The same; states that were read further from where they were asked to begin than their sensors explain begin
             as they were read.
         """
-        begun = self._began(flown)
+        begun = self.began(flown)
         if isinstance(test, Replay):
             return dataclasses.replace(test, initial_state=begun)
         explained = np.zeros_like(begun) if self.noise is None else STARTS * self.noise.sensors
         off = np.abs(self.signals.difference(begun, test.initial_state)) > explained
         return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
 
-    def _began(self, flown: Trajectory) -> Floats:
-        """The state (n_x,) that a flight's first reading is of."""
+    def began(self, flown: Trajectory) -> Floats:
+        """Where a flight began, as the twin understands its first reading.
+
+        Args:
+            flown: of the same signals.
+
+        Returns:
+            The state (n_x,).
+        """
         with engine_input():
             states: Floats = self.model.states_of(flown.states[:1])
         began: Floats = states[0]
@@ -293,17 +272,7 @@ class Twin(Shown, Recorded, kind="twin"):
             where no committee stands behind the twin.
         """
         drawn = self.drawn(test, DRAWS)
-        if drawn is None:
-            return None
-        states = drawn[0]
-        lasted = np.isfinite(states)
-        count = np.maximum(1, lasted.sum(axis=0))
-        # From one of the runs: sums of whole states round by more than runs may differ.
-        origin = np.where(lasted[0], states[0], 0.0)
-        off = np.where(lasted, self.signals.difference(states, origin), 0.0)
-        middle = off.sum(axis=0) / count
-        variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
-        return origin + middle, variance
+        return None if drawn is None else spread_of(drawn[0], self.signals)
 
     def drawn(self, test: Test | Replay, draws: int) -> tuple[Floats, Floats] | None:
         """Runs of a test by each member, under drawn disturbances and sensor noise.
@@ -318,12 +287,7 @@ class Twin(Shown, Recorded, kind="twin"):
         """
         if not self.members or self.noise is None:
             return None
-        noise, moves = self.noise.drawn(draws, test.steps, Unit(self.seed).part(0).stream("band"))
-        runs = [
-            drawn_runs(member, test, self.limits, noise=noise, disturbance=moves).read
-            for member in self.members
-        ]
-        return np.concatenate(runs), np.tile(noise, (len(runs), 1, 1))
+        return committee_runs(self.members, self.noise, test, draws, self.limits, self.seed)
 
     def predict(self, states: ArrayLike, commands: ArrayLike, past: ArrayLike | None = None) -> Floats:
         """One step.
@@ -445,41 +409,13 @@ class Twin(Shown, Recorded, kind="twin"):
             InvalidInput: other columns, or no step.
         """
         recorded = check_recorded(trajectory, self.limits, None, least=1)
-        sent = Replay(self.signals, self._began(recorded), recorded.commands)
+        sent = Replay(self.signals, self.began(recorded), recorded.commands)
         free = fly(self.model, sent, limits=self.limits).states
         read = continued(recorded, self.signals, recorded.states[0]).states[1:]
-        lasted = len(free) > len(read)
-        rows = []
-        for i, state in enumerate(self.signals.states):
-            around = float(np.square(read[:, i] - read[:, i].mean()).sum())
-            left = np.inf
-            if lasted:
-                left = float(np.square(self.signals.difference(read, free[1:])[:, i]).sum())
-            share = left / around if around > 0.0 else None
-            rows.append(
-                StateFit(
-                    name=state.name,
-                    unit=state.unit,
-                    rmse=float(np.sqrt(left / len(read))),
-                    fit=None if share is None else 100.0 * (1.0 - float(np.sqrt(share))),
-                    r2=None if share is None else 1.0 - share,
-                )
-            )
-        return FitTable(rows)
+        return fit_table(self.signals, read, free[1:] if len(free) > len(read) else None)
 
     def __repr__(self) -> str:
         return f"Twin(form={self.model.form!r}, tests={len(self.errors)})"
-
-
-def taken(law: Law, run: Trajectory) -> Floats:
-    """What an export is compared with: true states, and beside them what is read where a sensor is late.
-
-    Args:
-        law: of the twin.
-        run: of it.
-    """
-    states = run.states if run.true_states is None else run.true_states
-    return np.hstack([states, run.states]) if any(law.offsets) else states
 
 
 def load_twin(path: str | Path) -> Twin:

@@ -12,7 +12,8 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.law.flight import fly
-from twinloop.law.twin import NINE_OF_TEN, Twin
+from twinloop.law.twin import Twin
+from twinloop.law.uncertainty import NINE_OF_TEN
 from twinloop.limits import Limits
 from twinloop.replay import Replay
 from twinloop.test import Test
