@@ -17,6 +17,7 @@ from twinloop.campaign import standing
 from twinloop.campaign.assessment import Advice, advice, controller_to_fly, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
+from twinloop.campaign.cost import Cost, cost
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Earlier, Examination
@@ -590,6 +591,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
         twin, history = self.twin, self.history
         lessons = [record for record in history if isinstance(record, Lesson)]
         return advice(twin, self.setup, lessons, controller_to_fly(self)[0]) if lessons else None
+
+    @property
+    def cost(self) -> Cost:
+        """What the campaign has cost on the system so far: runs, seconds, envelope, quality given away."""
+        return cost(self._book)
 
     @property
     def plot(self) -> Any:

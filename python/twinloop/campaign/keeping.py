@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -245,9 +245,30 @@ def provenance(threads: int) -> Record:
         "processor": _processor(),
         "vectors": _core.vector_widths(),
         "system": platform.platform(),
-        "command": [shown_name(word) for word in sys.argv],
+        "command": [shown_name(word) for word in as_typed(sys.argv)],
         "versions": versions(),
     }
+
+
+def as_typed(words: Sequence[str]) -> list[str]:
+    """A command as a person would type it: the programme without the folders of this machine.
+
+    Args:
+        words: as a process gets them, the programme first; or as this function gave them.
+
+    Returns:
+        "twinloop" and its words; of a script "python", its name and its words.
+    """
+    path, *rest = words or [""]
+    if path == "python":
+        return list(words)
+    name = Path(path).name
+    if name == "__main__.py":
+        module = Path(path).parent.name
+        return [module, *rest] if module == "twinloop" else ["python", "-m", module, *rest]
+    if Path(path).stem == "twinloop":
+        return ["twinloop", *rest]
+    return ["python", *([name] if name else []), *rest]
 
 
 def _processor() -> str:

@@ -80,6 +80,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             {"test": failure.test.number, "gains": failure.test.parameters, "reason": failure.reason}
             for failure in campaign.failures
         ],
+        "cost": dataclasses.asdict(campaign.cost),
         "controller": None if best is None else _controller(campaign, best, identified),
         "no_controller": why or None,
         "first_controller": _first_controller(campaign, twin, identified),

@@ -7,6 +7,7 @@ import sys
 import time
 from datetime import datetime, timezone
 
+from twinloop.campaign.keeping import as_typed
 from twinloop.versions import versions
 
 
@@ -30,6 +31,6 @@ class Stopwatch:
             "threads": self.threads,
             "host": platform.node(),
             "machine": platform.machine(),
-            "command": sys.argv,
+            "command": as_typed(sys.argv),
             "versions": versions(),
         }

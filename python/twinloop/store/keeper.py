@@ -32,6 +32,7 @@ class Kept:
         experiments: that it will make in all, as was said last; None: nobody has said.
         created: when, in UTC.
         sessions: versions and processor each time it was opened to be written.
+        told: when each experiment was told, in UTC.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Kept:
     experiments: int | None
     created: str
     sessions: tuple[Record, ...]
+    told: tuple[str, ...]
 
 
 def kept(store: Store) -> list[dict[str, Any]]:
@@ -124,6 +126,7 @@ def found(store: Store, name: str | None) -> Kept | None:
         experiments=row.experiments,
         created=row.created,
         sessions=tuple({"started": s.started, **from_text(s.provenance, what)} for s in opened),
+        told=tuple(run.told for run in runs),
     )
 
 

@@ -19,7 +19,7 @@ from starlette.routing import Route
 from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
 from twinloop.faces.dashboard.desk import Desk
 from twinloop.faces.dashboard.fence import App, Fence
-from twinloop.faces.report.page import report_page, style, templates
+from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import columns, sheet
 from twinloop.faces.telling import numbered
@@ -202,8 +202,7 @@ class Pages:
         now = str(self.desk.state(name)["state"])
         if self._reports.get(name, ("", ""))[0] != now:
             found = source(self.desk.store, name)
-            page = report_page(found.campaign, found.name, {"name": found.system}, {}, found.sessions)
-            self._reports[name] = now, page
+            self._reports[name] = now, source_page(found)
         return self._reports[name][1]
 
     def _sheet(self, name: str, number: int) -> str:

@@ -11,7 +11,7 @@ from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.saving import FORMATS, check_format, picture, written
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.report.comparison import comparison, comparison_page
-from twinloop.faces.report.page import report_page, templates
+from twinloop.faces.report.page import source_page, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.text import table
 
@@ -34,7 +34,7 @@ def report(campaign: str, name: str | None, output: Path | None, form: str | Non
     check_writable(path, [".html"])
     templates()  # what is missing is said before any work
     found = source(campaign, name)
-    text = report_page(found.campaign, found.name, {"name": found.system}, {}, found.sessions)
+    text = source_page(found)
     write_text(path, text)
     click.echo(f"Report: {path}", err=True)
 

@@ -17,8 +17,9 @@ from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
 from twinloop.faces.figures.svg import panel_svg
 from twinloop.faces.figures.units import words
 from twinloop.faces.report import tables
+from twinloop.faces.report.cost import cost_table
 from twinloop.faces.report.moot import moot
-from twinloop.faces.report.source import OWN
+from twinloop.faces.report.source import OWN, Source
 from twinloop.faces.report.verdict import EVIDENCE, verdict
 from twinloop.faces.result import summary
 
@@ -61,7 +62,7 @@ def style() -> str:
 
 def report_page(
     campaign: Campaign, name: str, system: Mapping[str, object], run_info: Mapping[str, object],
-    sessions: Sequence[Mapping[str, Any]] = (), controller: bool = True,
+    sessions: Sequence[Mapping[str, Any]] = (), controller: bool = True, elapsed: float | None = None,
 ) -> str:  # fmt: skip
     """The report of a campaign.
 
@@ -72,6 +73,7 @@ def report_page(
         run_info: of the process that makes the report.
         sessions: that have worked on the campaign, where a store knows them.
         controller: whether a controller was to be tuned; otherwise the page is about the twin alone.
+        elapsed: seconds on the clock from the beginning of the campaign to its last flight, where a store knows them.
 
     Returns:
         One page of HTML that needs nothing else.
@@ -107,13 +109,28 @@ def report_page(
             tables.gains(result), tables.margins(found), tables.steps(found), tables.effort(found),
             tables.envelope(found), *tables.poles(found)[1:],
         ) if controller else [],
-        campaign_tables=_present(tables.flights(result) if controller else None, tables.data(found)),
+        campaign_tables=_present(
+            *((cost_table(result, elapsed), tables.flights(result)) if controller else ()), tables.data(found)
+        ),
         next=_next(campaign, result),
         failures=campaign.failures,
         sessions=sessions,
         version=_core.__version__,
     )  # fmt: skip
     return text
+
+
+def source_page(found: Source) -> str:
+    """The report of a campaign from where it is kept.
+
+    Args:
+        found: the campaign with what is known about it.
+
+    Returns:
+        One page of HTML that needs nothing else.
+    """
+    system = {"name": found.system}
+    return report_page(found.campaign, found.name, system, {}, found.sessions, elapsed=found.elapsed)
 
 
 def _title(campaign: Campaign, name: str, system: str) -> str:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.keeping import look
+from twinloop.campaign.keeping import as_typed, look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.working import knows_nothing
 from twinloop.records.reading import from_text
-from twinloop.store import is_address
+from twinloop.store import Kept, is_address
 
 LARGEST = 1 << 30
 """Bytes of a record that is read."""
@@ -29,12 +31,14 @@ class Source:
         name: of it.
         system: what it experimented on, in a few words.
         sessions: that have worked on it, as texts: begun, command, versions, machine.
+        elapsed: seconds on the clock from its beginning to the last flight told; None where no store knows.
     """
 
     campaign: Campaign
     name: str
     system: str
     sessions: Sequence[Mapping[str, str]]
+    elapsed: float | None = None
 
 
 def source(where: str, name: str | None = None) -> Source:
@@ -90,14 +94,22 @@ def _of_store(where: str, name: str | None) -> Source:
     held = look(where, name, read_only=True)
     kind = OWN if held.system is None else str(held.system.get("kind", "")).replace("_", " ")
     campaign = Campaign.load(where, held.name, read_only=True)
-    return Source(campaign, held.name, kind, [_session(session) for session in held.sessions])
+    sessions = [_session(session) for session in held.sessions]
+    return Source(campaign, held.name, kind, sessions, _elapsed(held))
+
+
+def _elapsed(held: Kept) -> float | None:
+    if not held.told:
+        return None
+    began, ended = (datetime.fromisoformat(when) for when in (held.created, held.told[-1]))
+    return max(0.0, (ended - began).total_seconds())
 
 
 def _session(found: Mapping[str, Any]) -> dict[str, str]:
     versions = found.get("versions")
     return {
         "begun": str(found.get("started", "")),
-        "command": " ".join(str(word) for word in found.get("command") or ()),
+        "command": shlex.join(as_typed([str(word) for word in found.get("command") or ()])),
         "versions": ", ".join(f"{k} {v}" for k, v in versions.items())
         if isinstance(versions, Mapping)
         else "",

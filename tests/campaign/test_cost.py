@@ -1,0 +1,52 @@
+"""What a campaign has cost: every kind of run is counted once, seconds and qualities add up."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lives import OTHER_GAINS, PLANT, begun, by_hand, cut, made
+from twinloop.faces.report.cost import cost_table
+from twinloop.faces.result import summary
+
+
+def test_every_kind_of_run_is_counted_once_and_seconds_add_up():
+    campaign = begun(duration=1.0)
+    assert (campaign.cost.runs, campaign.cost.seconds, campaign.cost.given_away) == (
+        1,
+        pytest.approx(1.0),
+        0.0,
+    )
+    second = campaign.test(OTHER_GAINS)
+    campaign.tell(second, PLANT.run(second))
+    aborted, failed, silent, never = (campaign.test(OTHER_GAINS) for _ in range(4))
+    campaign.tell(aborted, cut(PLANT.run(aborted), 8))
+    campaign.tell_failed(failed, "the motor cut out", partial=cut(PLANT.run(failed), 5))
+    campaign.tell_failed(silent, "it did not start")
+    campaign.abandon(never)
+    campaign.attach(by_hand(30))
+    cost = campaign.cost
+    assert (cost.runs, cost.cut, cost.failed, cost.attached, cost.abandoned) == (5, 1, 2, 1, 1)
+    assert cost.seconds == pytest.approx(0.05 * (20 + 20 + 8 + 5 + 30))
+    qualities = [run.quality for run in campaign.experiments if run.quality is not None]
+    assert cost.best == min(qualities) and len(qualities) == 2
+    assert cost.given_away == pytest.approx(max(qualities) - min(qualities))
+
+
+def test_the_envelope_that_was_used_and_left_is_said():
+    campaign = made()
+    test = campaign.test(OTHER_GAINS)
+    run = PLANT.run(test)
+    states = np.array(run.states)
+    states[5:7, 1] = 15.0  # bounds are ± 12
+    campaign.tell(test, type(run)(run.t, states, run.commands))
+    assert campaign.cost.left == 1 and campaign.cost.usage == pytest.approx(15.0 / 12.0)
+
+
+def test_the_report_says_it_with_units():
+    table = cost_table(summary(begun(), {}, {}), 75.0)
+    said = {row[0]: row[1] for row in table.rows}
+    assert said["flight that was recorded"] == "1 s" and said["of these cut, failed"] == "0, 0"
+    assert said["quality given away"].startswith("0 rad s over a best of ")
+    assert said["from its beginning to the last flight told"] == "1 min 15 s"
+    assert math.isfinite(float(said["most of the envelope that any used"].split()[0]))
