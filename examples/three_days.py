@@ -144,7 +144,7 @@ undisturbed = twinloop("ask", "spare.db", shown=False)
 assert undisturbed.replace("spare", "rig") == sheet, "the laptop that lived asks for another test"
 fly(tests(sheet)[0], seed=1, until=60)
 twinloop("tell", "rig.db", "1", "flight-1.csv", expected=(2,))
-twinloop("tell", "rig.db", "1", "flight-1.csv", "--aborted", "someone opened the door")
+twinloop("tell", "rig.db", "1", "--aborted", "flight-1.csv", "--reason", "someone opened the door")
 twinloop("certify", "rig.db", "-o", "tuesday", expected=(0, 1))
 twinloop("ask", "rig.db")
 twinloop("tell", "rig.db", "2", "--failed", "the motor cut out at the start")

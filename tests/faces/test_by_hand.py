@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -187,9 +188,16 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     lines = (folder / "flight.csv").read_text(encoding="utf-8").splitlines()
     (folder / "short.csv").write_text("\n".join(lines[:12]), encoding="utf-8")
     refused = run("tell", "rig.db", "0", "short.csv")
-    assert refused.exit_code == 2 and "--aborted" in refused.stderr
-    assert "aborted" in run("tell", "rig.db", "0", "short.csv", "--aborted", "a gust").stdout
-    assert look().experiments[-1].trajectory.reason == "a gust"
+    assert refused.exit_code == 2
+    written = "twinloop tell rig.db 0 --aborted short.csv --reason"
+    assert written in refused.stderr
+    # The log stands behind the option, wherever one begins.
+    other = run("tell", "rig.db", "0", "short.csv", "--aborted", "a gust")
+    assert other.exit_code == 2 and f"{written} 'a gust'." in other.stderr
+    told = shlex.split(f"{written} 'a gust'")[1:]
+    assert "aborted" in run(*told).stdout
+    run_ = look().experiments[-1].trajectory
+    assert (run_.ended, run_.reason) == ("aborted", "a gust")
     run("ask", "rig.db")
     assert "failed" in run("tell", "rig.db", "1", "--failed", "motor cut out").stdout
     assert look().failures[0].reason == "motor cut out"
@@ -208,7 +216,11 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     ("arguments", "word"),
     [
         (("tell", "rig.db", "0"), "--failed REASON"),
-        (("tell", "rig.db", "0", "x.csv", "--failed", "a", "--aborted", "b"), "found both"),
+        (("tell", "rig.db", "0", "--failed", "a", "--aborted", "x.csv"), "found both"),
+        (("tell", "rig.db", "0", "--aborted", "x.csv"), "check its name"),
+        (("tell", "rig.db", "0", "--aborted", "x.csv", "--reason", " "), "a few words"),
+        (("tell", "rig.db", "0", "x.csv", "--reason", "a gust"), "beside --aborted FLIGHT"),
+        (("tell", "rig.db", "0", "--failed", "a", "--reason", "b"), "--failed REASON"),
         (("tell", "rig.db", "7", "--failed", "a"), "ask for one first"),
         (("tell", "rig.db", "0", "x.csv"), "check its name"),
         (("ask", "other.db"), "twinloop new other.toml"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from contextlib import closing
 from pathlib import Path
 
@@ -20,6 +21,9 @@ from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import write_columns
 from twinloop.store import shown_name
 from twinloop.test import Test
+
+STOPPED = "stopped before its end"
+"""Why a flight was aborted, where nobody says it."""
 
 
 @click.command()
@@ -100,29 +104,67 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
 @click.option(
     "--failed", metavar="REASON", help="The test failed; FLIGHT is what was recorded, if anything was."
 )
-@click.option("--aborted", metavar="REASON", help="The test was stopped before its end.")
-def tell(store: str, test: int, flight: Path | None, failed: str | None, aborted: str | None) -> None:
-    """Tell what happened to a TEST: a FLIGHT as CSV or .npz, or why there is none."""
-    if failed is not None and aborted is not None:
-        raise InvalidInput("tell: expected --failed or --aborted, found both; leave one out.")
-    if failed is None and flight is None:
-        raise InvalidInput("tell: expected a flight, found none; name its file, or say --failed REASON.")
+@click.option(
+    "--aborted", type=Path, metavar="FLIGHT", help="The test was stopped before its end; what was recorded."
+)
+@click.option("--reason", metavar="REASON", help="With --aborted: why it was stopped.")
+def tell(
+    store: str,
+    test: int,
+    flight: Path | None,
+    failed: str | None,
+    aborted: Path | None,
+    reason: str | None,
+) -> None:
+    """Tell what happened to a TEST: a FLIGHT as CSV or .npz, whole or aborted, or why there is none."""
+    log = _told(store, test, flight, failed, aborted, reason)
     with closing(_campaign(store)) as campaign:
         if failed is not None:
-            asked = tell_failed(campaign, test, failed, flight)
+            asked = tell_failed(campaign, test, failed, log)
         else:
-            assert flight is not None  # refused above
+            assert log is not None  # refused above
             asked = tell_flight(
                 campaign,
                 test,
-                flight,
-                aborted=aborted or "",
-                otherwise="say why it was stopped: --aborted REASON",
+                log,
+                aborted="" if aborted is None else STOPPED if reason is None else reason,
+                otherwise=f"tell that it was stopped: {_aborted(store, test, log, 'why')}",
             )
         click.echo(
             f"Kept: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
             f" {shown_name(store)}."
         )
+
+
+def _told(
+    store: str, test: int, flight: Path | None, failed: str | None, aborted: Path | None, reason: str | None
+) -> Path | None:
+    """The log that is told, once what is said of it fits together."""
+    if failed is not None and aborted is not None:
+        raise InvalidInput("tell: expected --failed or --aborted, found both; leave one out.")
+    if flight is not None and aborted is not None:
+        why = str(aborted) if reason is None else reason
+        raise InvalidInput(
+            f"tell: expected the log of an aborted flight behind --aborted, found {flight} before it; write:"
+            f" {_aborted(store, test, flight, why)}."
+        )
+    if reason is not None and (aborted is None or not reason.strip()):
+        raise InvalidInput(
+            "tell: expected --reason with a few words beside --aborted FLIGHT, found it without one of the two; a test"
+            " that failed says why itself: --failed REASON."
+        )
+    if failed is None and flight is None and aborted is None:
+        raise InvalidInput(
+            "tell: expected a flight, found none; name its file, or say --aborted FLIGHT or --failed REASON."
+        )
+    return flight if aborted is None else aborted
+
+
+def _aborted(store: str, test: int, log: Path, why: str) -> str:
+    """The command that tells an aborted flight."""
+    return shlex.join(
+        ["twinloop", "tell", shown_name(store), str(test), "--aborted", str(log), "--reason", why]
+    )
 
 
 @click.command()
