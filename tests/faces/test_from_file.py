@@ -95,6 +95,63 @@ main(["run", "rig.toml", "--experiments", "3", "--threads", "1", "--store", "rig
     assert same(flights("rig.db"), flights("rig2.db"))
 
 
+HANGS = """
+import time
+from pathlib import Path
+import rig
+
+def hanging():
+    system = rig.rig()
+    plain = system.run
+    def run(test):
+        while test.number == 1 and not Path("mended").exists():
+            time.sleep(0.05)
+        return plain(test)
+    system.run = run
+    return system
+"""
+
+
+@pytest.mark.parametrize("by", ["option", "file"])
+def test_a_system_that_hangs_is_given_up_in_a_sentence_and_nothing_is_lost(folder, monkeypatch, by):
+    monkeypatch.delitem(sys.modules, "hangs", raising=False)
+    (folder / "hangs.py").write_text(HANGS, encoding="utf-8")
+    written(
+        folder, PENDULUM, section("hangs:hanging", "timeout = 0.5" if by == "file" else "timeout = 600.0")
+    )
+    words = ["run", "rig.toml", "--experiments", "2", "--threads", "1"]
+    stopped = run(*words, *(["--timeout", "0.5"] if by == "option" else []))
+    assert stopped.exit_code == 1
+    assert "did not answer test 1 within 0.5 s; the test still waits and nothing is lost" in stopped.stderr
+    assert "twinloop resume rig.db goes on from here" in stopped.stderr
+    assert "1 experiment" in stopped.stdout and len(flights("rig.db")) == 1
+    (folder / "mended").touch()
+    done = run("resume", "rig.db", "--threads", "1")
+    assert done.exit_code == 0, done.output
+    assert [run.number for run in tl.Campaign.load("rig.db", read_only=True).experiments] == [0, 1]
+
+
+def test_a_first_flight_that_hangs_leaves_one_sentence(folder, monkeypatch):
+    monkeypatch.delitem(sys.modules, "hangs", raising=False)
+    (folder / "hangs.py").write_text(HANGS.replace("== 1", "== 0"), encoding="utf-8")
+    written(folder, PENDULUM, section("hangs:hanging"))
+    stopped = run("run", "rig.toml", "--timeout", "0.3")
+    assert stopped.exit_code == 1 and stopped.stdout == ""
+    assert "did not answer test 0 within 0.3 s" in stopped.stderr and "Interrupted" not in stopped.stderr
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan"])
+def test_a_timeout_is_seconds_above_nothing(folder, seconds):
+    refused = run("run", "quadrotor", "--timeout", seconds)
+    assert refused.exit_code == 2 and "--timeout (s)" in refused.stderr
+
+
+def test_the_risk_that_is_allowed_holds_for_a_file_too(folder):
+    written(folder, PENDULUM, section("rig:rig"))
+    stopped = run("run", "rig.toml", "--experiments", "2", "--threads", "1", "--max-risk", "0")
+    assert stopped.exit_code == 1 and "risk" in stopped.stderr and len(flights("rig.db")) == 1
+
+
 def test_a_built_in_system_needs_no_other_section(folder):
     written(folder, SHORT, section("quadrotor", noise=0.001, seed=3), name="hover.toml")
     file = read_file("hover.toml")

@@ -29,7 +29,7 @@ from twinloop.faces.report.command import compare, report
 from twinloop.faces.settings import settings
 from twinloop.faces.stored import learn, resume, show
 from twinloop.faces.terminal import prepared
-from twinloop.faces.working import answers, check_answer, work
+from twinloop.faces.working import answers, check_answer, patient, work
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
 from twinloop.systems import BUILT_IN, Quadrotor
@@ -139,6 +139,7 @@ def main(context: click.Context) -> None:
 )
 @click.option("--name", default="campaign", show_default=True, help="Of the campaign in its store.")
 @click.option("--max-risk", type=float, help="Fly no test that leaves the envelope more probably.")
+@patient
 @answers
 @click.pass_context
 def run(
@@ -160,6 +161,7 @@ def run(
     store: str | None,
     name: str,
     max_risk: float | None,
+    timeout: float | None,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -169,18 +171,21 @@ def run(
     SYSTEM is a built-in one (quadrotor), or a campaign file such as rig.toml that names one; that campaign is kept in
     rig.db beside it.
     """
+    if max_risk is not None:
+        share("--max-risk", max_risk)
     if Path(system).suffix == ".toml":
         _refuse_beside_a_file(context)
         kept_in = Path(system).with_suffix(".db") if store is None else store
-        context.exit(run_file(read_file(system), kept_in, name, experiments, threads, output, plot, as_json))
+        file = read_file(system)
+        context.exit(
+            run_file(file, kept_in, name, experiments, threads, output, plot, as_json, timeout, max_risk)
+        )
     if system not in BUILT_IN:
         raise unknown("system", system, BUILT_IN)
     if experiments < 1:
         raise InvalidInput(
             f"--experiments: expected at least 1, found {experiments}; the first flight counts."
         )
-    if max_risk is not None:
-        share("--max-risk", max_risk)
     options = dict(_change(preset, change) for change in changes)
     options |= _generations(preset, generations, test_generations)
     rig = _vehicle(system, noise, seed, gyroscopic, harsh)
@@ -203,7 +208,9 @@ def run(
         store=store,
         name=name,
     )
-    context.exit(work(campaign, rig, watch, experiments, output, plot, as_json, max_risk=max_risk))
+    context.exit(
+        work(campaign, rig, watch, experiments, output, plot, as_json, timeout=timeout, max_risk=max_risk)
+    )
 
 
 for command in (new, ask, tell, attach, abandon):

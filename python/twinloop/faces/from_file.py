@@ -20,6 +20,8 @@ def run_file(
     output: Path | None,
     plot: Path | None,
     as_json: bool,
+    timeout: float | None = None,
+    max_risk: float | None = None,
 ) -> int:
     """Flies the system of a campaign file.
 
@@ -32,6 +34,8 @@ def run_file(
         output: for the result; None: none.
         plot: for the picture; None: none.
         as_json: whether the result is printed as JSON.
+        timeout: seconds that a run may take; None: what the file says.
+        max_risk: probability of leaving the envelope above which a test is not flown; None: any.
 
     Returns:
         The exit code.
@@ -52,7 +56,8 @@ def run_file(
     campaign.progress = watch
     if not campaign.tests:
         campaign.test(file.first)
-    return work(campaign, rig, watch, experiments, output, plot, as_json, file.flies.use, file.flies.timeout)
+    seconds = file.flies.timeout if timeout is None else timeout
+    return work(campaign, rig, watch, experiments, output, plot, as_json, file.flies.use, seconds, max_risk)
 
 
 def file_beside(store: str) -> Path | None:

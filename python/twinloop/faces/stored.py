@@ -19,7 +19,7 @@ from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
-from twinloop.faces.working import answers, check_answer, described, knows_nothing, work
+from twinloop.faces.working import answers, check_answer, described, knows_nothing, patient, work
 from twinloop.store import Kept, kept, opened, shown_name
 from twinloop.systems import BUILT_IN, Quadrotor
 
@@ -29,6 +29,7 @@ from twinloop.systems import BUILT_IN, Quadrotor
 @click.option("--name", help="Of the campaign, where the store holds several.")
 @click.option("--experiments", type=int, help="Runs in all; by default as many as were asked for.")
 @click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@patient
 @answers
 @click.pass_context
 def resume(
@@ -37,6 +38,7 @@ def resume(
     name: str | None,
     experiments: int | None,
     threads: int | None,
+    timeout: float | None,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -55,14 +57,14 @@ def resume(
                 "resume: expected --experiments N for a campaign that was flown by hand so far, found none;"
                 " say how many runs there shall be in all."
             )
-        context.exit(run_file(file, store, held.name, wanted, threads, output, plot, as_json))
+        context.exit(run_file(file, store, held.name, wanted, threads, output, plot, as_json, timeout))
     rig = _system(held)
     budget = held.experiments if experiments is None else experiments
     assert budget is not None  # it stands beside the system
     campaign = Campaign.load(store, held.name, threads=threads)
     watch = Watch(campaign.options, budget, "quadrotor")
     campaign.progress = watch
-    context.exit(work(campaign, rig, watch, budget, output, plot, as_json))
+    context.exit(work(campaign, rig, watch, budget, output, plot, as_json, timeout=timeout))
 
 
 @click.command()

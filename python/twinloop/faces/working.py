@@ -9,8 +9,9 @@ from typing import Any, TypeVar
 
 import click
 
+from twinloop.arrays import number
 from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.errors import InvalidInput, TooRisky
+from twinloop.errors import InvalidInput, NoAnswer, TooRisky
 from twinloop.faces.console import Watch
 from twinloop.faces.files import check_picture, check_writable, write_text
 from twinloop.faces.result import Result, summary, to_json
@@ -38,6 +39,22 @@ def answers(command: Command) -> Command:
     ):
         command = option(command)
     return command
+
+
+def patient(command: Command) -> Command:
+    """The option of a command that flies a system: `timeout`.
+
+    Args:
+        command: of click.
+    """
+    return click.option(
+        "--timeout",
+        type=float,
+        callback=lambda context, option, value: (
+            None if value is None else number("--timeout (s)", value, above=0.0)
+        ),
+        help="Seconds that the system may take for a test; then it is given up and nothing is lost.",
+    )(command)
 
 
 def check_answer(output: Path | None, plot: Path | None) -> None:
@@ -88,7 +105,8 @@ def work(
         max_risk: probability of leaving the envelope above which a test is not flown; None: any.
 
     Returns:
-        The exit code: 130 after an interruption, 1 where no controller is fit to fly, or a test was too risky.
+        The exit code: 130 after an interruption, 1 where no controller is fit to fly, a test was too risky, or the
+        system did not answer in time.
 
     Raises:
         KeyboardInterrupt: an interruption before there was a result.
@@ -99,12 +117,14 @@ def work(
         with watch, suppress(KeyboardInterrupt):
             try:
                 campaign.run(rig, experiments, timeout=timeout, max_risk=max_risk)
-            except TooRisky as reason:
+            except (TooRisky, NoAnswer) as reason:
                 click.echo(str(reason), err=True)
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
-        if campaign.interrupted and campaign.store is not None:
+        if (campaign.interrupted or stopped) and campaign.store is not None:
             click.echo(f"Kept: twinloop resume {campaign.store} goes on from here.", err=True)
+        if stopped and not campaign.experiments:
+            return 1
         if not campaign.experiments or knows_nothing(campaign):
             raise KeyboardInterrupt
         result = _uninterrupted(lambda: summary(campaign, described(name, rig), clock.info()))
