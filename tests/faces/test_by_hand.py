@@ -71,6 +71,16 @@ def test_a_campaign_is_flown_by_hand_as_from_python(folder):
 def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     first = run("ask", "rig.db").stdout
     assert "angle.kp" in first and "N m/rad" in first and "twinloop tell rig.db 0 FLIGHT.csv" in first
+    assert "The controller that you trust already, with a gentle excitation" in first
+    assert "nothing is known of the system before it" in first
+    said = json.loads(run("ask", "rig.db", "--json").stdout)
+    assert said["risk"] is None and f"Risk of leaving the envelope: {said['risk_unknown']}\n" in first
+    # What can be said of it: how much is added, by the file's own numbers, and what holds it back.
+    with open("rig-test-0.csv", encoding="utf-8") as file:
+        most = max(abs(float(row["excitation_torque"] or 0.0)) for row in csv.DictReader(file))
+    (torque,) = SIGNALS.commands
+    share = f"{100 * most / (torque.bounds[1] - torque.bounds[0]):.2g} %"
+    assert f"at most {share} of a command's range; the nearer angle or rate comes" in said["risk_unknown"]
     flown(look().tests[0])
     run("tell", "rig.db", "0", "flight.csv")
     sheet = run("ask", "rig.db").stdout

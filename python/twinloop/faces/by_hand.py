@@ -94,7 +94,8 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     stem = Path("campaign") if beside is None else beside.with_suffix("")
     file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
-    return sheet(shown_name(store), test, predicted, str(file), campaign.setup.quality), facts(test, file)
+    text = sheet(shown_name(store), test, predicted, str(file), campaign.setup.quality)
+    return text, facts(test, file, bool(campaign.experiments))
 
 
 @click.command()

@@ -59,12 +59,64 @@ def _expected(test: Test, predicted: Trajectory | None) -> str:
     return table(heads, rows)
 
 
-def facts(test: Test, file: Path) -> dict[str, object]:
+def reason(test: Test, flown: bool) -> str:
+    """Why this test; of one with gains of a person's own what it is for.
+
+    Args:
+        test: to be flown.
+        flown: whether anything was told yet, or attached.
+    """
+    if test.reason:
+        return test.reason
+    gentle = "" if test.excitation is None else ", with a gentle excitation that shows what the commands do"
+    known = (
+        "nothing is known of the system before it."
+        if not flown
+        else "what is known comes from other flights."
+    )
+    return f"The controller that you trust already{gentle}: {known}"
+
+
+def unknown_risk(test: Test) -> str:
+    """What can be said of the risk of a test that no committee has judged: what is added to its controller's commands.
+
+    Args:
+        test: to be flown.
+    """
+    if test.excitation is None:
+        return "not judged before a test was flown. It is the controller's own, for nothing is added to its commands."
+    signals = test.family.signals
+    most = np.abs(test.excitation).max(axis=0)
+    shares = [
+        100.0 * float(size) / (command.bounds[1] - command.bounds[0])
+        for size, command in zip(most, signals.commands, strict=True)
+    ]
+    text = (
+        "not judged before a test was flown. It is the controller's own; what is added to it is at most"
+        f" {max(shares):.2g} % of a command's range"
+    )
+    ranges = {} if test.hold_back is None else test.hold_back.ranges(signals)
+    if ranges:
+        text += (
+            f"; the nearer {_listed(list(ranges))} comes to the envelope the less of it is added, and beyond the outer"
+            " range nothing"
+        )
+    if unbounded := [name for name in signals.state_names if name not in ranges]:
+        text += f"; {_listed(unbounded)} {'holds' if len(unbounded) == 1 else 'hold'} none of it back"
+    return f"{text}."
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def facts(test: Test, file: Path, flown: bool) -> dict[str, object]:
     """The sheet as values.
 
     Args:
         test: to be flown.
         file: where its columns are.
+        flown: whether anything was told yet, or attached.
     """
     signals = test.family.signals
     return {
@@ -79,7 +131,8 @@ def facts(test: Test, file: Path) -> dict[str, object]:
         "predicted": test.predicted,
         "spread": test.spread,
         "risk": test.risk,
-        "why": test.reason,
+        "risk_unknown": unknown_risk(test) if test.risk is None else None,
+        "why": reason(test, flown),
         "file": str(file),
     }
 
@@ -141,9 +194,9 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quali
         )
     if test.excitation is not None or predicted is not None:
         lines += ["", _expected(test, predicted), ""]
-    if test.risk is not None:
-        lines.append(f"Risk of leaving the envelope: {100 * test.risk:.2g} %.")
-    lines += [test.reason] if test.reason else []
+    risk = unknown_risk(test) if test.risk is None else f"{100 * test.risk:.2g} %."
+    lines.append(f"Risk of leaving the envelope: {risk}")
+    lines.append(reason(test, predicted is not None))
     lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")
     lines.append(f"  twinloop tell {store} {test.number} FLIGHT.csv")
     return "\n".join(lines) + "\n"
