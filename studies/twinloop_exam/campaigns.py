@@ -24,7 +24,7 @@ Measured = tuple[int, dict[str, float | None], Trajectory | None, float]
 
 
 def campaign(
-    who: Campaigner, subject: Subject, held_out: HeldOut, seed: int, experiments: int, threads: int
+    who: Campaigner, subject: Subject, held_out: HeldOut, seed: int, experiments: int, threads: int | None
 ) -> Iterator[Measured]:
     """Flies a campaign.
 
@@ -34,7 +34,7 @@ def campaign(
         held_out: what its twin is judged on.
         seed: of the system and the campaign.
         experiments: after Υ0.
-        threads: of the engine; no number but the seconds depends on it.
+        threads: of the engine; None: all that there are. No number but the seconds depends on it.
 
     Yields:
         What was measured after each experiment, Υ0 first. `ask_seconds` is the time of the `ask` that

@@ -15,6 +15,7 @@ from twinloop.arrays import whole
 from twinloop.campaign.remaining import duration
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.faces.files import write_text
+from twinloop.sweep.workers import HERE, processes
 from twinloop_exam.kinds import Fitter, Tuner
 from twinloop_exam.learners import LEARNERS, for_smoke, learner
 from twinloop_exam.page import as_page
@@ -51,7 +52,9 @@ bench.add_command(zoo)
 @click.option("--experiments", type=int, help="After the first flight, at most; by default as each needs.")
 @click.option("--data", help="Learner whose flights the fits are made on; ours by default.")
 @click.option("--store", type=Path, metavar="FILE.db", help="Where rows are kept; exam.db by default.")
-@click.option("--jobs", type=int, default=1, show_default=True, help="Processes at once.")
+@click.option(
+    "--cluster", default=HERE, show_default=True, help="here, local:N, or a Dask scheduler's address."
+)
 @click.option("--table", "form", help=f"Only print what the store holds: {', '.join(FORMATS)}.")
 @click.option("--page", type=Path, metavar="FILE.md", help="Only write what the store holds as a page.")
 @click.option("--tune", is_flag=True, help="Compare hyper-parameters of the others on seeds 0 to 9.")
@@ -67,7 +70,7 @@ def power(
     experiments: int | None,
     data: str | None,
     store: Path | None,
-    jobs: int,
+    cluster: str,
     form: str | None,
     page: Path | None,
     tune: bool,
@@ -78,7 +81,7 @@ def power(
     """The exam: how little data a twin and a controller need, beside what others need."""
     if form is not None and form not in FORMATS:
         raise unknown("form of the tables", form, FORMATS)
-    jobs = whole("--jobs", jobs, least=1)
+    processes(cluster)
     if experiments is not None:
         experiments = whole("--experiments", experiments)
     names = _chosen("system of the exam", systems, SMOKE_SYSTEMS if smoke else list(SUBJECTS), SUBJECTS)
@@ -96,10 +99,10 @@ def power(
             raise NotAvailable(f"Store {str(path)!r}: expected a file, found none; run the exam first.")
         scope = Scope(names, chosen, source, chosen_seeds, experiments, retry)
         if tune:
-            click.echo(_tune(scope, path, jobs, yes), nl=False)
+            click.echo(_tune(scope, path, cluster, yes), nl=False)
             return
         try:
-            failed = 0 if shown_only else _run(scope, path, jobs, yes)
+            failed = 0 if shown_only else _run(scope, path, cluster, yes)
         except KeyboardInterrupt:
             _say(f"Interrupted: what was measured is in {path.name}; the same command goes on from there.")
             context.exit(130)
@@ -117,7 +120,7 @@ def power(
     context.exit(1 if smoke and failed else 0)
 
 
-def _run(scope: Scope, path: Path, jobs: int, yes: bool) -> int:
+def _run(scope: Scope, path: Path, cluster: str, yes: bool) -> int:
     """Says what it will cost, then does it; how many jobs failed."""
     scope = _with_source(scope)
     store = Store(path)
@@ -127,14 +130,15 @@ def _run(scope: Scope, path: Path, jobs: int, yes: bool) -> int:
             store.measured_by(version())
     finally:
         store.close()
-    cost = sum(job.seconds for job in todo) / jobs
+    count = processes(cluster) or 1
+    cost = sum(job.seconds for job in todo) / count
     _say(
-        f"{len(todo)} jobs to do, about {duration(cost)} on {jobs} process{'es' if jobs > 1 else ''} (as"
+        f"{len(todo)} jobs to do, about {duration(cost)} on {count} process{'es' if count > 1 else ''} (as"
         f" measured in {path.name}, guessed where it holds nothing)."
     )
     if cost > ASK_ABOVE and not yes and sys.stdin.isatty():
         click.confirm("Begin?", abort=True, err=True)
-    return work_off(path, todo, jobs) if todo else 0
+    return work_off(path, todo, cluster) if todo else 0
 
 
 def _with_source(scope: Scope) -> Scope:
@@ -145,12 +149,12 @@ def _with_source(scope: Scope) -> Scope:
     return replace(scope, learners=[scope.data, *scope.learners])
 
 
-def _tune(scope: Scope, path: Path, jobs: int, yes: bool) -> str:
+def _tune(scope: Scope, path: Path, cluster: str, yes: bool) -> str:
     system = "quadrotor" if "quadrotor" in scope.systems else scope.systems[0]
     grids = [who for who in scope.learners if isinstance(who, Fitter | Tuner) and who.grid]
     tried = [variant for who in grids for variant in variants(who)]
     seeds = scope.seeds or TUNING_SEEDS
-    _run(Scope([system], tried, scope.data, seeds, max(TUNING_EXPERIMENTS), scope.retry), path, jobs, yes)
+    _run(Scope([system], tried, scope.data, seeds, max(TUNING_EXPERIMENTS), scope.retry), path, cluster, yes)
     shown = []
     store = Store(path)
     try:

@@ -376,7 +376,7 @@ def test_what_is_measured_is_not_measured_again(store):
     scope = a_scope([least, PAPER])
     jobs = planned(scope, store)
     assert [job.who.name for job in jobs] == ["paper", "least-squares"]  # flights before those who need them
-    assert study.work_off(store.path, jobs, 1) == 0
+    assert study.work_off(store.path, jobs) == 0
     assert planned(scope, store) == []
     more = planned(dataclasses.replace(scope, seeds=[0, 1]), store)
     assert [job.address.seed for job in more] == [1, 1]
@@ -430,7 +430,7 @@ def test_a_failure_is_counted_and_tried_again_only_when_asked(store, monkeypatch
         raise RuntimeError("no thrust")
 
     monkeypatch.setattr(campaigns, "campaign", broken)
-    assert study.work_off(store.path, planned(a_scope(), store), 1) == 1
+    assert study.work_off(store.path, planned(a_scope(), store)) == 1
     monkeypatch.undo()
     assert planned(a_scope(), store) == []
     results = Results(store, ["quadrotor-0"], [PAPER], PAPER, [0])
@@ -446,11 +446,35 @@ def test_a_fit_without_flights_is_no_failure_and_waits_for_them(store):
     assert planned(a_scope([least]), store) == jobs
 
 
-def test_several_processes_measure_the_same(store):
-    scope = a_scope([RANDOM], seeds=[0, 1], experiments=1)
-    assert study.work_off(store.path, planned(scope, store), 2) == 0
-    rows = store.rows("quadrotor-0", "random-gains", key(RANDOM))
-    assert [(row.address.seed, row.k) for row in rows] == [(0, 0), (0, 1), (1, 0), (1, 1)]
+def test_a_cluster_measures_the_same_by_its_address_though_its_workers_see_no_file(store, monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    least = LEARNERS["least-squares"]
+    scope = a_scope([PAPER, least], seeds=[0, 1], experiments=1)
+    here = Store(store.path.with_name("here.db"))
+    assert study.work_off(here.path, planned(scope, here)) == 0
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+    ) as cluster:
+        # One seed first: the other is what is left to do.
+        first = dataclasses.replace(scope, seeds=[0])
+        assert study.work_off(store.path, planned(first, store), cluster.scheduler_address) == 0
+        left = planned(scope, store)
+        assert {job.address.seed for job in left} == {1}
+        assert study.work_off(store.path, left, cluster.scheduler_address) == 0
+    assert planned(scope, store) == []
+    for who in (PAPER, least):
+        found = [
+            [
+                (row.address.seed, row.k, {n: v for n, v in row.measures.items() if "seconds" not in n})
+                for row in of.rows("quadrotor-0", who.name, key(who, PAPER))
+            ]
+            for of in (here, store)
+        ]
+        assert len(found[0]) == 4 and found[0] == found[1]
+    address = Address("quadrotor-0", "paper", 1, key(PAPER))
+    assert [f.states.tobytes() for f in store.flights(address, 1)] == [
+        f.states.tobytes() for f in here.flights(address, 1)
+    ]
 
 
 def test_another_file_is_refused(tmp_path):
@@ -666,7 +690,7 @@ def test_the_store_prints_its_tables_without_working(tmp_path):
         (["--seeds", "5:5"], "10:35"),
         (["--seeds", "x"], "10:35"),
         (["--table", "html"], "markdown"),
-        (["--jobs", "0"], "--jobs"),
+        (["--cluster", "local:0"], "local:N"),
         (["--experiments", "-1"], "--experiments"),
         (["--table", "text", "--store", "nowhere.db"], "run the exam first"),
     ],

@@ -8,13 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from twinloop.campaign import Campaign, available_threads
+from twinloop.campaign import Campaign
 from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput
 from twinloop.store import kept, opened
 from twinloop.sweep.flying import Flown, begun, fly
 from twinloop.sweep.jobs import Job, system_of
-from twinloop.sweep.workers import HERE, finished, processes
+from twinloop.sweep.workers import HERE, finished, threads_on
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -56,8 +56,7 @@ def sweep(jobs: Sequence[Job], store: str | Path, cluster: str | Client = HERE) 
         NotAvailable: the packages of the extra `store` or `cluster` are missing.
         StoreFailure: the store cannot be written.
     """
-    count = processes(cluster)
-    threads = None if cluster == HERE else max(1, available_threads() // count) if count else 1
+    threads = threads_on(cluster)
     done = _kept(store)
     todo = []
     for job in jobs:

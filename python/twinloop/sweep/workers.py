@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from twinloop.campaign import available_threads
 from twinloop.errors import InvalidInput, NotAvailable
 
 if TYPE_CHECKING:
@@ -77,6 +78,21 @@ def processes(cluster: object) -> int | None:
             f"Cluster: expected local:N with 1 to {MOST_PROCESSES} processes, found {cluster!r}; such as local:4."
         )
     return int(count)
+
+
+def threads_on(cluster: object) -> int | None:
+    """Threads of the engine that a task may use there; None: all that there are.
+
+    Args:
+        cluster: as `finished` takes it.
+
+    Raises:
+        InvalidInput: "local:N" whose N is no number from 1 on.
+    """
+    if cluster == HERE:
+        return None
+    count = processes(cluster)
+    return max(1, available_threads() // count) if count else 1
 
 
 @contextmanager
