@@ -13,7 +13,7 @@ from strategies import program_text
 from twinloop import _core
 from twinloop.law.exports import python_source as written
 from twinloop.law.exports.c_source import c_source
-from twinloop.law.exports.checks import (
+from twinloop.law.exports.simulations import (
     c_simulation,
     casadi_simulation,
     control_simulation,

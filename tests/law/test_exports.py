@@ -18,7 +18,9 @@ from twinloop import _core
 from twinloop.errors import NotAvailable
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.exports.c_source import c_source
-from twinloop.law.exports.checks import (
+from twinloop.law.exports.controller_source import controller_c, controller_python
+from twinloop.law.exports.python_source import python_source
+from twinloop.law.exports.simulations import (
     c_controller,
     c_simulation,
     casadi_simulation,
@@ -26,8 +28,6 @@ from twinloop.law.exports.checks import (
     python_controller,
     python_simulation,
 )
-from twinloop.law.exports.controller_source import controller_c, controller_python
-from twinloop.law.exports.python_source import python_source
 from twinloop.law.exports.taking import compared
 from twinloop.law.noise import LastingDisturbance, Noise
 

@@ -8,7 +8,7 @@ import pytest
 
 import twinloop as tl
 from law_twins import twin_of
-from twinloop.law.exports.checks import python_simulation
+from twinloop.law.exports.simulations import python_simulation
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 EVIL = [

@@ -15,25 +15,23 @@ from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.law.exports.c_source import c_source
 from twinloop.law.exports.casadi_source import casadi_source
-from twinloop.law.exports.checks import (
-    Simulation,
-    c_controller,
-    c_simulation,
-    casadi_simulation,
-    check_controller,
-    check_simulation,
-    check_sympy,
-    control_simulation,
-    gymnasium_simulation,
-    python_controller,
-    python_simulation,
-)
+from twinloop.law.exports.checks import check_controller, check_simulation, check_sympy
 from twinloop.law.exports.control_source import control_source
 from twinloop.law.exports.controller_source import controller_c, controller_python
 from twinloop.law.exports.fmu.running import fmu_simulation
 from twinloop.law.exports.fmu.unit import archived, built, unit_of
 from twinloop.law.exports.gymnasium_source import Episode, gymnasium_source
 from twinloop.law.exports.python_source import python_source
+from twinloop.law.exports.simulations import (
+    Simulation,
+    c_controller,
+    c_simulation,
+    casadi_simulation,
+    control_simulation,
+    gymnasium_simulation,
+    python_controller,
+    python_simulation,
+)
 from twinloop.law.exports.symbolic import latex_source, sympy_source
 from twinloop.law.law import Law
 from twinloop.trajectory import Trajectory

@@ -10,8 +10,8 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.errors import NotAvailable
-from twinloop.law.exports.checks import Simulation
 from twinloop.law.exports.fmu.description import late_states
+from twinloop.law.exports.simulations import Simulation
 from twinloop.law.law import Law
 
 

@@ -1,0 +1,85 @@
+"""The controller of a campaign as text: gains, what it was chosen for, what another experiment would bring."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from twinloop.faces.text.table import cell, table
+from twinloop.faces.text.words import held_at, with_unit
+
+
+def _gains(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[list[object]]:
+    """A row a gain: name, value, the first controller's, unit, bounds."""
+    return [
+        [
+            gain["name"],
+            gain["value"],
+            None if first is None else first["gains"][gain["name"]],
+            gain["unit"],
+            "fixed"
+            if gain["low"] is None
+            else f"{gain['low']:g} to {gain['high']:g}" + (f", {held_at(gain)}" if held_at(gain) else ""),
+        ]
+        for gain in best["gains"]
+    ]
+
+
+def tuned_controller_text(result: Mapping[str, Any]) -> str:
+    """The best controller of the paper beside the first."""
+    best, first = result["controller"], result["first_controller"]
+    rows = _gains(best, first)
+    measured, reference = best["measured"], first["measured"]
+    quality = (
+        f"Final distance on the system: {cell(measured)}; first controller: {cell(reference)}; "
+        f"doing nothing: {result['task']['distance']:.4g}; predicted by the twin: {cell(best['predicted'])}."
+    )
+    title = f"BEST CONTROLLER FLOWN: TEST {best['test']}"
+    return f"{title}\n{table(['gain', 'value', 'first', 'unit', 'bounds'], rows)}\n{quality}"
+
+
+def controller_text(result: Mapping[str, Any]) -> str:
+    """The controller to fly beside the first, and why this one."""
+    best, first = result["controller"], result["first_controller"]
+    if best is None:
+        return f"NO CONTROLLER TO FLY\n{result['no_controller'].removeprefix('No controller to fly: ')}"
+    gains = _gains(best, first)
+    state = f"TEST {best['test']}, FLOWN" if best["flown"] else "NOT FLOWN YET"
+    qualities = [["this controller", best["predicted"], best["spread"], best["measured"]]]
+    if first is not None:
+        qualities.append(["first controller", first["predicted"], None, first["measured"]])
+    gently = any(run["excited"] for run in result["experiments"][:1])
+    excited = "\nThe first controller was excited when it was flown." if gently else ""
+    return "\n".join(
+        [
+            f"CONTROLLER TO FLY: {state}",
+            table(["gain", "value", "first", "unit", "bounds"], gains),
+            "",
+            table(["quality", "predicted", "± spread", "measured"], qualities),
+            f"{best['why']} Risk {cell(best['risk'])}.{excited}",
+        ]
+    )
+
+
+def advice_text(result: Mapping[str, Any]) -> str:
+    """What another experiment would bring."""
+    advice, unit = result["advice"], result["quality"]["unit"]
+    title = "ANOTHER EXPERIMENT?\n"
+    scatter = advice["scatter"]
+    if advice["gain"] is None:
+        return title + "No committee was asked for a flight yet; ask for one to hear what it would bring."
+    if not advice["trusted"]:
+        return f"{title}Flown by itself the model does not follow what it was learnt from: it cannot say. Fly another."
+    share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
+    words = f"{title}When test {advice['before_test']} was planned, knowing which model is right would"
+    size = None if scatter is None else with_unit(scatter, unit)
+    if advice["gain"] == 0.0:
+        stop = " For the controller, stop." if advice["stop"] else ""
+        scattered = "" if size is None else f"\nThe scatter of one measurement is {size}."
+        return f"{words} not have improved\nthe quality.{stop}{scattered}"
+    words += f" have improved the quality\nby {with_unit(advice['gain'], unit)}{share}."
+    if size is None:
+        return words
+    if advice["stop"]:
+        return f"{words}\nThat is below the scatter of one measurement, {size}. For the controller, stop."
+    return f"{words}\nThat is above the scatter of one measurement, {size}: another experiment may pay."

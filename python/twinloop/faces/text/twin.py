@@ -1,0 +1,129 @@
+"""The twin of a campaign as text: equations, errors, sensors, what disturbs, actuators, hidden states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from twinloop.faces.text.table import cell, table
+
+A_DAY = 86_400.0
+"""Seconds: what takes longer to fade does not fade within a flight."""
+
+
+def equations_text(result: Mapping[str, Any]) -> str:
+    """The equations."""
+    return "TWIN\n" + "\n".join(result["twin"]["equations"])
+
+
+def program_errors_text(result: Mapping[str, Any]) -> str:
+    """Errors of an evolved program on each test."""
+    head = [
+        "test",
+        "ended",
+        "open loop",
+        "closed loop",
+        "normalised",
+        "before learning",
+        "predicted δ",
+        "measured δ",
+    ]
+    keys = ("test", "ended", "open_loop", "closed_loop", "normalised", "before", "predicted", "measured")
+    rows = [[run[key] for key in keys] for run in result["experiments"]]
+    note = (
+        "Errors are mean squares over steps and states, SI units; normalised: 1 is a model that never"
+        " moves.\nδ is the distance of the last state to the target."
+    )
+    return "ERRORS OF THE TWIN, ONE ROW A TEST\n" + table(head, rows) + "\n" + note
+
+
+def states_text(result: Mapping[str, Any]) -> str:
+    """Sensors, disturbances, actuators and hidden states."""
+    twin = result["twin"]
+    rows = [
+        [
+            state["name"],
+            state["unit"] or "1",
+            state["error"],
+            state["sensor"],
+            None if not state["sensor"] or state["error"] is None else state["error"] / state["sensor"],
+        ]
+        for state in twin["states"]
+    ]
+    head = ["state", "unit", "error of the twin", "noise of the sensor", "ratio"]
+    lines = [
+        "WHAT THE TWIN LEAVES, STATE BY STATE",
+        table(head, rows),
+        "Errors: root mean square of flown minus simulated, over whole flights, each from where it began."
+        " Noise:\nstandard deviation, as estimated. A ratio of 1 is a twin that leaves the sensors' noise alone.",
+        _disturbances(twin["disturbances"]),
+        _actuators(twin["actuators"]),
+        *(_hidden(state) for state in twin["hidden"]),
+        f"{twin['terms']} terms, {twin['committee']} models in the committee; χ² a reading {cell(twin['misfit'])}"
+        f" (1: noise and disturbances explain what is left)\nover {twin['readings']} readings,"
+        f" {twin['ignored']} ignored.",
+        *(remark["sentence"] if isinstance(remark, dict) else str(remark) for remark in twin["remarks"]),
+    ]
+    return "\n".join(lines)
+
+
+def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
+    if not disturbances:
+        return "Disturbances: none were found beside the sensors' noise."
+    words = []
+    for found in disturbances:
+        name, unit = found["name"], found["unit"] or "1"
+        parts = [f"{found['white']:.2g} {unit} a period"] if found["white"] else []
+        if found["lasting"]:
+            parts.append(f"{found['lasting']:.2g} ({unit})/s that lasts {found['memory']:.2g} s")
+        words.append(f"{name} {' and '.join(parts)}")
+    return f"Disturbances (standard deviations): {'; '.join(words)}."
+
+
+def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
+    """Lags and delays in words; commands that have the same are named together."""
+    groups: dict[tuple[float, int], list[str]] = {}
+    for actuator in actuators:
+        groups.setdefault((actuator["lag"], actuator["delay"]), []).append(actuator["name"])
+    if list(groups) == [(0.0, 0)]:
+        return "Actuators: no lag and no delay were found."
+    words = []
+    for (lag, delay), names in groups.items():
+        slow = f"lag {lag:.3g} s" if lag else "no lag"
+        late = f"delay {delay} period{'s' if delay != 1 else ''}" if delay else "no delay"
+        words.append(f"{', '.join(names)}: {slow}, {late}")
+    return f"Actuators: {'; '.join(words)}."
+
+
+def _hidden(state: Mapping[str, Any]) -> str:
+    """A state that no sensor reads, in words."""
+    what = "squares" if state["squared"] else "values"
+    fading = f"forgotten to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "not forgotten"
+    return f"Hidden: the {what} of {', '.join(state['commands'])} fill a state that no sensor reads; it is {fading}."
+
+
+def errors_text(result: Mapping[str, Any]) -> str:
+    """Errors of an identified twin on each flight, before and after it was learnt."""
+    head = ["test", "ended", "one step", "whole flight", "normalised", "before learning"]
+    rows = [
+        [
+            run["test"],
+            run["ended"],
+            run["open_loop"],
+            run["closed_loop"],
+            run["normalised"],
+            run["normalised_before"],
+        ]
+        for run in result["experiments"]
+    ]
+    note = (
+        f"Mean squares over steps and states ({squared_units(result)}), to the noisy readings. Normalised: over that of"
+        " a model that\nnever moves; 1 is useless. Before learning: the same, of the twin that had not seen the flight."
+    )
+    return "ERRORS OF THE TWIN, ONE ROW A TEST\n" + table(head, rows) + "\n" + note
+
+
+def squared_units(result: Mapping[str, Any]) -> str:
+    """Units of the states, squared."""
+    units = dict.fromkeys(state["unit"] or "1" for state in result["signals"]["states"])
+    return ", ".join(f"({unit})²" if "/" in unit or " " in unit else f"{unit}²" for unit in units)

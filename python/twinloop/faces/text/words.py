@@ -1,0 +1,62 @@
+"""Qualities, units and bounds in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def held_at(gain: Mapping[str, Any]) -> str:
+    """Where a gain of a result stands at a bound, for a person.
+
+    Args:
+        gain: of the controller; results of before this was told have none of it.
+
+    Returns:
+        "at its upper bound", "at its lower bound" or "".
+    """
+    return f"at its {gain['at_bound']} bound" if gain.get("at_bound") else ""
+
+
+QUALITIES = {
+    "iae": "integrated absolute error",
+    "ise": "integrated squared error",
+    "final_distance": "distance of the last state to the target",
+}
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A value in its unit."""
+    return f"{value:.2g} {unit}".rstrip()
+
+
+def quality_words(kind: str, unit: str) -> str:
+    """What is minimised, for a person.
+
+    Args:
+        kind: "iae", "ise" or "final_distance".
+        unit: of it; "" where it has none.
+
+    Returns:
+        Such as "integrated absolute error (rad s)".
+    """
+    return QUALITIES[kind] + (f" ({unit})" if unit else "")
+
+
+def counted(measure: Mapping[str, Any]) -> str:
+    """What counts in a quality, with weights and units, for a person.
+
+    Args:
+        measure: `quality` of a result.
+
+    Returns:
+        Such as "2 × pitch (rad), 1 × yaw (rad)".
+    """
+    squared = "" if measure["kind"] == "iae" else "²"
+    parts = [
+        f"{each['weight']:.4g} × {each['name']}{squared} ({each['unit'] or '1'})"
+        for each in measure["counts"]
+    ]
+    efforts = (("effort", "commands²"), ("effort_rate", "their rates²"))
+    parts += [f"{measure[key]:.4g} × {what} (in scales)" for key, what in efforts if measure[key]]
+    return ", ".join(parts)
