@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.logbook import Logbook
 from twinloop.envelope import outside
@@ -107,18 +108,23 @@ class Choice:
         if tuned.tobytes() == flown.genes.tobytes():
             return "the twin knows no better ones"
         measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
-        if measured is not None and self._doubtful(members, flown, recorded, measured):
+        share = share_of(self.planner, self.committee, flown, self.draws)
+        alone = None if measured is None else measured * share
+        if measured is not None and self._doubtful(members, flown, recorded, measured, share):
             return (
                 "the twin expects worse of others than was measured of these, but of these it expects worse, too, and"
                 " so is not believed here"
             )
-        if measured is not None and not confirmed(self.book.experiments):
+        if alone is not None and not confirmed(self.book.experiments):
             predicted, spread = expected(recorded[:, :, 0])
             spread = calibrated(spread, predicted, self.book.experiments)
-            if not predicted + SURE * spread < measured:
+            if not predicted + SURE * spread < alone:
+                found = f"{alone:.3g} was measured of these"
+                if flown.excitation is not None:
+                    found = f"these, without the excitation of their flight, are worth {alone:.3g}"
                 return (
                     "the last flight was not what had been predicted, and of others the twin predicts"
-                    f" {predicted:.3g} ± {spread:.2g} where {measured:.3g} was measured of these"
+                    f" {predicted:.3g} ± {spread:.2g} where {found}"
                 )
         if better < self.confidence:
             share, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
@@ -129,9 +135,12 @@ class Choice:
         return ""
 
     def _doubtful(
-        self, members: Sequence[_core.Model], flown: Test, recorded: Floats, measured: float
+        self, members: Sequence[_core.Model], flown: Test, recorded: Floats, measured: float, share: float
     ) -> bool:
-        """Whether the twin expects less of its own gains than was measured of the best, and of that flight too."""
+        """Whether the twin expects less of its own gains than was measured of the best, and of that flight too.
+
+        `share` is what the best are worth without the excitation of that flight.
+        """
         ends = flown.initial_state[np.newaxis], flown.target_state[np.newaxis]
         excitation = None if flown.excitation is None else flown.excitation[np.newaxis]
         again = self.planner.judge(
@@ -139,7 +148,7 @@ class Choice:
             measured=True, hold_back=flown.hold_back,
         )  # fmt: skip
         least = 1.01 * measured + DOUBT * again.scatter
-        return bool(recorded[:, :, 0].mean() > least and again.mean[0] > least)
+        return bool(recorded[:, :, 0].mean() > share * least and again.mean[0] > least)
 
     def _tuned(self, genes: Floats, judged: Judged, recorded: Floats, reason: str) -> Test:
         same = next((test for test in self.book.tests if test.genes.tobytes() == genes.tobytes()), None)

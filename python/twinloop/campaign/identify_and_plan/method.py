@@ -13,6 +13,7 @@ from twinloop.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Lesson, Planned, Progress
+from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import (
     calibrated,
 )
@@ -171,8 +172,9 @@ class IdentifyAndPlan:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
         if self.memory.best is not None and self.memory.best[0] == book.revision:
             return self.memory.best[1]
-        best = standing.best_flown(book)
-        choice = Choice(self.planner, self._committee(), book, self.options.draws, self.options.confidence)
+        committee = self._committee()
+        best = best_alone(self.planner, committee, book, self.options.draws)
+        choice = Choice(self.planner, committee, book, self.options.draws, self.options.confidence)
         if at_once:
             tuned, note = self._known_gains(best)
             found = choice.between(tuned, best)
