@@ -6,16 +6,18 @@
 import io
 import json
 import os
+import re
 import string
 import zipfile
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
 from lives import CONTROLLER, SIGNALS, begun
+from strategies import programs
 from twinloop import _core
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import TwinloopError
@@ -108,10 +110,88 @@ def test_a_formula_is_a_program_or_refused(text):
     assert program is None or isinstance(program, _core.Program)
 
 
+# The text of a program
+
+
+WORDS = ["r0", "r1", "r9", "r99", "r-1", "0.5", "-2.5e-3", "1e999", "nan", "0x1p3", "+", "-", "*", "/", "min", "sin",
+         "tanh", "pow", "=", "(", ")", ",", "page", "page 1", "page 2", "inputs=2", "outputs=0", "registers=4000000000",
+         "program", "∞", ""]  # fmt: skip
+
+
+@st.composite
+def program_texts(draw):
+    """What a program is written as, by the grammar; in most of them some words or lines are others."""
+    lines = str(draw(programs(pages=3, page_length=4))).splitlines()
+    for _ in range(draw(st.integers(0, 2))):
+        i = draw(st.integers(0, len(lines) - 1))
+        match draw(st.sampled_from(["word", "word", "swap", "lose", "double", "space", "character"])):
+            case "word":
+                words = lines[i].split(" ")
+                words[draw(st.integers(0, len(words) - 1))] = draw(st.sampled_from(WORDS))
+                lines[i] = " ".join(words)
+            case "swap":
+                j = draw(st.integers(0, len(lines) - 1))
+                lines[i], lines[j] = lines[j], lines[i]
+            case "lose":
+                lines = [*lines[:i], *lines[i + 1 :]] or [""]
+            case "double":
+                lines.insert(i, lines[i])
+            case "space":
+                lines[i] = f"\t {lines[i]}  "
+            case "character":
+                at = draw(st.integers(0, max(0, len(lines[i]) - 1)))
+                lines[i] = lines[i][:at] + draw(st.characters(codec="utf-8")) + lines[i][at + 1 :]
+    return "\n".join(lines)
+
+
+def parsed(text):
+    """A program; None where it is refused by the number of the line."""
+    try:
+        return _core.Program.parse(text)
+    except ValueError as refusal:
+        assert re.search(r"\bexpected\b", str(refusal)), str(refusal)
+        return None
+
+
+def reads_back(text):
+    """Whether a text is a program; one that is has a text of its own, which reads back to it and runs as it does."""
+    program = parsed(text)
+    if program is None:
+        return False
+    again = _core.Program.parse(str(program))
+    rows = np.linspace(-2.0, 2.0, 3 * program.inputs).reshape(3, program.inputs)
+    assert again == program and str(again) == str(program)
+    assert again.run(rows).tobytes() == program.run(rows).tobytes()
+    return True
+
+
 @MANY
-@given(damaged("r2 = a * b\nr3 = r2 + 1.5\nr3 = sin(r3)\nout r3"))
-def test_the_text_of_a_program_is_no_program(text):
-    # A program is made of instructions; its text is for people, so there is no way in.
+@given(program_texts() | st.text(max_size=80))
+def test_a_text_is_a_program_that_reads_back_or_refused(text):
+    reads_back(text)
+
+
+def test_many_of_the_texts_that_are_tried_are_programs_and_many_are_not():
+    """Else the test above would try one of the two only; which texts these are does not change from run to run."""
+    outcomes = []
+
+    @seed(7)
+    @settings(max_examples=200, database=None, suppress_health_check=list(HealthCheck))
+    @given(program_texts())
+    def tried(text):
+        outcomes.append((reads_back(text), len(text.splitlines())))
+
+    tried()
+    programs_found = [length for whole, length in outcomes if whole]
+    assert 0.3 < len(programs_found) / len(outcomes) < 0.9
+    # And these are no empty ones: a header, a page, and instructions.
+    assert sum(length > 4 for length in programs_found) > 0.15 * len(outcomes)
+
+
+@MANY
+@given(program_texts())
+def test_the_text_of_a_program_is_no_formula(text):
+    # One line may be left of it, such as "- 1".
     assert refused(lambda: program_of([text], {"a": 0, "b": 1}, 2)) is None or "\n" not in text.strip()
 
 
