@@ -35,9 +35,9 @@ def best_alone(planner: Planner, committee: Committee, book: Logbook, draws: int
     """
     best = standing.best_flown(book)
     known = {
-        run.number: run.test
+        run.test.number: run.test
         for run in book.experiments
-        if run.test is not None and standing.flies(book, run.number) and standing.on_task(book, run.test)
+        if run.test is not None and standing.flies(book, run.test.number) and standing.on_task(book, run.test)
     }
     if best is None or best.number not in known or not committee.trusted:
         return best

@@ -108,9 +108,9 @@ class Choice:
         if tuned.tobytes() == flown.genes.tobytes():
             return "the twin knows no better ones"
         measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
-        share = share_of(self.planner, self.committee, flown, self.draws)
-        alone = None if measured is None else measured * share
-        if measured is not None and self._doubtful(members, flown, recorded, measured, share):
+        without = share_of(self.planner, self.committee, flown, self.draws)
+        alone = None if measured is None else measured * without
+        if measured is not None and self._doubtful(members, flown, recorded, measured, without):
             return (
                 "the twin expects worse of others than was measured of these, but of these it expects worse, too, and"
                 " so is not believed here"
@@ -119,12 +119,12 @@ class Choice:
             predicted, spread = expected(recorded[:, :, 0])
             spread = calibrated(spread, predicted, self.book.experiments)
             if not predicted + SURE * spread < alone:
-                found = f"{alone:.3g} was measured of these"
+                worth = f"{alone:.3g} was measured of these"
                 if flown.excitation is not None:
-                    found = f"these, without the excitation of their flight, are worth {alone:.3g}"
+                    worth = f"these, without the excitation of their flight, are worth {alone:.3g}"
                 return (
                     "the last flight was not what had been predicted, and of others the twin predicts"
-                    f" {predicted:.3g} ± {spread:.2g} where {found}"
+                    f" {predicted:.3g} ± {spread:.2g} where {worth}"
                 )
         if better < self.confidence:
             share, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
