@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import twinloop as tl
-from oracles import UNARY, operate, same_bits
+from oracles import UNARY, operate, rk4, same_bits
 from sameness import same
 from small_plants import fans, gravity, pendulum_like, swung
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.fit import fitting
+from twinloop.identification.fit.tuning import LONGEST_MEMORY
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.proposals.parts import cut
 from twinloop.identification.records import HELD, Run, guessed_noise
@@ -459,6 +460,21 @@ def test_a_hidden_state_that_commands_fill_is_found():
     alone = identified(runs, signals, rests=rests, workers=_core.Workers(threads=1), form="acceleration")
     assert alone.model.hidden == found.model.hidden
     assert same_bits(alone.model.constants, found.model.constants)
+
+
+def test_what_fills_a_hidden_state_that_never_empties_is_kept_for_no_longer_than_runs_can_show():
+    dt, stream, runs = 0.1, np.random.default_rng(2), []
+    signals = tl.Signals([tl.State("speed", "m/s", 3.0)], [tl.Command("u", "V", (-2.0, 2.0), scale=1.0)], dt)
+    for _ in range(3):
+        commands = np.repeat(stream.uniform(-2.0, 2.0, (10, 1)), 6, axis=0)
+        states = [np.zeros(2)]
+        for (u,) in commands:
+            states.append(rk4(lambda x, u=u: np.array([x[1] - x[0] ** 3, u + 0.02 * x[1]]), states[-1], dt))
+        speed = np.array(states)[:, :1]
+        runs.append(Run.of(speed + 1e-3 * stream.normal(size=speed.shape), commands))
+    found = identified(runs, signals, rests=[np.zeros(1)], form="acceleration")
+    [(_, squared, _, time)] = found.actuation.hidden
+    assert not squared and time == pytest.approx(LONGEST_MEMORY * 60 * dt)
 
 
 def test_where_nothing_is_hidden_the_law_is_as_if_nobody_had_looked():

@@ -15,6 +15,10 @@ from twinloop.identification.hypothesis import Fit, Hypothesis
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.bounds import bounded_model
 from twinloop.law.actuation import Actuation
+from twinloop.signals import Signals
+
+LONGEST_MEMORY = 16.0
+"""Time of a hidden state at most, in lengths of the longest run: no run can tell a longer one from for ever."""
 
 
 def tune(
@@ -49,6 +53,7 @@ def tune(
     # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
     start = model.constants.tolist()
     held = {place for place, bounds in limits.items() if steps == 0 and start[place] in bounds}
+    longest = LONGEST_MEMORY * signals.dt * max(len(run.commands) for run in hypothesis.runs)
     for turn in itertools.count():
         with engine_input():
             tuned, left, readings, covariance, drawn = _core.tune(
@@ -64,11 +69,25 @@ def tune(
                 workers=context.workers,
             )
         model, beyond = bounded_model(tuned, limits)
-        if not beyond:
+        model, endless = _forgetting(model, signals, longest)
+        if not beyond and not endless:
             break
         held |= beyond
+        lags = [group for group in lags if endless.isdisjoint(group)]
     if covariance.size:
         for place in (place for place, constant in enumerate(free) if constant in held):
             covariance = np.insert(np.insert(covariance, place, 0.0, axis=0), place, 0.0, axis=1)
     fit = Fit(tuned, tuple(observer), left, readings, covariance)
     return fit, [bounded_model(one, limits)[0] for one in drawn]
+
+
+def _forgetting(model: _core.Model, signals: Signals, longest: float) -> tuple[_core.Model, set[int]]:
+    """The model with hidden states that last for so many seconds at most, and the places of those that did not."""
+    actuation = Actuation.of(model, signals)
+    times = [actuator.lag for actuator in actuation.actuators] + [state.time for state in actuation.hidden]
+    endless = {place for place, time in enumerate(times) if place >= signals.n_u and time > longest}
+    if not endless:
+        return model, endless
+    return model.with_constants(
+        model.constants.tolist(), [longest if place in endless else time for place, time in enumerate(times)]
+    ), endless
