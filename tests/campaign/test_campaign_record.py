@@ -72,7 +72,7 @@ def test_an_iteration_that_was_interrupted_goes_on_where_it_stopped():
     with pytest.raises(KeyboardInterrupt):
         campaign.ask()
     record = through_json(campaign.to_record())
-    assert record["memory"]["latest"]["left"] > 0
+    assert record["memory"]["latest"]["ahead"] > 0
     assert same(tl.Campaign.from_record(record).ask().genes, lived(new("paper"), LIFE[:1]).ask().genes)
 
 
@@ -105,7 +105,7 @@ def damaged(record, path, value):
         (["logbook", "tests", 0, "number"], 3, "keep the tests in their order"),
         (["logbook", "experiments", 0, 1, "trajectory", "t"], [0.0], "shape"),
         (["memory", "latest", "told"], 3, "another campaign"),
-        (["memory", "latest", "left"], 10**6, "generations left"),
+        (["memory", "latest", "ahead"], 10**6, "generations left"),
         (["memory", "latest", "models", "population", 0], "program inputs=1", "expected"),
         (["memory", "latest", "models", "generation"], -1, "at least 0"),
         (["memory", "kind"], "memory_of_default", "memory_of_paper"),

@@ -415,7 +415,7 @@ def test_gusts_are_reported_unless_the_readings_were_taken_for_exact(begin, monk
     plant = tl.systems.Simulated(SIGNALS, gusty_pendulum, default_gains=PENDULUM_GAINS)
     campaign = begin(duration=3.0).run(plant, 1)
     (found,) = summary(campaign, {}, {})["twin"]["disturbances"]
-    assert found["name"] == "rate" and max(found["white"] / SIGNALS.dt, found["lasting"]) > 0.5
+    assert found["name"] == "rate" and max(found["white"] / SIGNALS.dt, found["correlated"]) > 0.5
     # The same noise, had it been held at the least that is believed rather than estimated.
     exact = [replace(lesson, misfit=1e-6) for lesson in campaign.history]
     monkeypatch.setattr(tl.Campaign, "history", property(lambda campaign: exact))

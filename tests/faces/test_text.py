@@ -77,7 +77,9 @@ def result_of_default(**advice):
             "equations": ["d rate / dt = torque"], "terms": 1, "committee": 1, "misfit": 1.0, "readings": 80,
             "ignored": 0, "remarks": ["Fly another test before you trust it."],
             "states": [{"name": "angle", "unit": "rad", "error": 2e-3, "sensor": 1e-3}],
-            "disturbances": [{"name": "rate", "unit": "rad/s", "white": 0.0, "lasting": 0.5, "memory": 0.2}],
+            "disturbances": [
+                {"name": "rate", "unit": "rad/s", "white": 0.0, "correlated": 0.5, "correlation_time": 0.2},
+            ],
             "actuators": [{"name": "torque", "lag": 0.03, "delay": 1}],
             "hidden": [{"commands": ["torque"], "squared": True, "rest": 0.0, "time": 0.8}],
         },
@@ -98,7 +100,7 @@ def test_a_result_of_default_says_what_a_person_must_know():
     text = render(result_of_default())
     for words in (
         "torque: lag 0.03 s, delay 1 period.", "squares of torque fill a state", "1/e in 0.8 s",
-        "rate 0.5 (rad/s)/s that lasts 0.2 s", "It was cut: rate above 12.",
+        "rate 0.5 (rad/s)/s with a correlation time of 0.2 s", "It was cut: rate above 12.",
         "CONTROLLER TO FLY: NOT FLOWN YET", "rad², (rad/s)²", "Fly another test before you trust it.",
     ):  # fmt: skip
         assert words in text

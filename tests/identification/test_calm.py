@@ -44,7 +44,7 @@ def learnt(runs, proposals):
 
 
 def lasting(hypothesis):
-    return [found.chain.motion[1] > 0.0 for found in hypothesis.sums]
+    return [found.chain.motion.correlated > 0.0 for found in hypothesis.sums]
 
 
 @pytest.mark.parametrize("first", range(0, 12, 3))
@@ -67,7 +67,7 @@ def test_a_wind_that_lasts_is_kept(seed):
     _, found = learnt([blown(seed, 3.0), blown(seed + 1, 3.0)], PROPOSALS)
     assert lasting(found) == [True]
     # Standard deviation of what a period's pushes have in common, as it was made.
-    assert np.sqrt(found.sums[0].chain.motion[1]) == pytest.approx(3.0, rel=0.5)
+    assert np.sqrt(found.sums[0].chain.motion.correlated) == pytest.approx(3.0, rel=0.5)
 
 
 def test_what_is_left_of_a_description_is_its_likelihood_and_its_terms():
@@ -79,4 +79,4 @@ def test_what_is_left_of_a_description_is_its_likelihood_and_its_terms():
     regression = problem.regression(old.chain, problem.usable(list(old.weights)))
     weights = np.array(list(old.weights.values()))
     gained = [regression.likelihood(weights, found.chain.sensors, found.chain.motion) for found in (old, new)]
-    assert new.energy - old.energy == pytest.approx(gained[1] - gained[0], abs=1e-9)
+    assert new.description_length - old.description_length == pytest.approx(gained[1] - gained[0], abs=1e-9)

@@ -166,7 +166,7 @@ def test_what_rotors_do_together_is_one_term_in_squares_and_times_a_speed():
     flights = flown(GYRO, cross=0.3)
     found, plain = learnt(flights), learnt(flights, directions=False)
     assert [len(s.weights) for s in found.sums] == [2, 3]
-    assert found.energy < plain.energy - 40.0
+    assert found.description_length < plain.description_length - 40.0
     np.testing.assert_allclose(slopes(found, GYRO), GYRO, rtol=0.01)
     assert found.terms <= plain.terms
 
@@ -176,7 +176,7 @@ def test_rotors_that_are_not_equal_are_told_apart(gains):
     found = learnt(flown(gains))
     np.testing.assert_allclose(slopes(found, gains), gains, rtol=0.02)
     plain = learnt(flown(gains), directions=False)
-    assert found.energy <= plain.energy + 1e-6 and found.terms == plain.terms
+    assert found.description_length <= plain.description_length + 1e-6 and found.terms == plain.terms
 
 
 def test_a_share_of_its_own_costs_a_constant():

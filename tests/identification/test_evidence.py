@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop.identification.evidence import HIDING, LAGGING, LASTING, STEPPING, Evidence, price, strongest
+from twinloop.identification.evidence import CORRELATED, HIDING, LAGGING, STEPPING, Evidence, price, strongest
 from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -41,15 +41,15 @@ def test_nobody_beats_the_strongest_and_it_is_the_first_of_its_kind(several):
 
 
 def evidence(length=0.0, **changes):
-    known = {"fitted": True, "lasts": True, "smoothed": False, "length": length}
+    known = {"fitted": True, "stable": True, "smoothed": False, "length": length}
     return Evidence(**{**known, **changes})
 
 
 def test_what_runs_away_beats_nothing_that_was_fitted_and_what_lasts_beats_it():
-    away = evidence(-1e9, lasts=False)
+    away = evidence(-1e9, stable=False)
     assert evidence(1e9).beats(away) and not away.beats(evidence(1e9))
-    assert not away.beats(evidence(0.0, lasts=False)) and not evidence(0.0, lasts=False).beats(away)
-    assert not evidence(-1e9, lasts=False, smoothed=True).beats(away)
+    assert not away.beats(evidence(0.0, stable=False)) and not evidence(0.0, stable=False).beats(away)
+    assert not evidence(-1e9, stable=False, smoothed=True).beats(away)
 
 
 def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
@@ -71,7 +71,7 @@ def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
 )
 def test_what_is_there_beside_terms_is_paid_for(form, actuation, expected):
     assert price(form, actuation, APART, 0) == expected
-    assert price(form, actuation, APART, 2) == expected + 2 * LASTING
+    assert price(form, actuation, APART, 2) == expected + 2 * CORRELATED
 
 
 def test_each_group_of_commands_that_lags_pays_and_commands_of_one_group_pay_once():

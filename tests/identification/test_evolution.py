@@ -41,7 +41,12 @@ def learnt(monkeypatch, **options):
 
     def spy(problem, known, *rest, **how):
         found = grow(problem, known, *rest, **how)
-        lengths.append([(before.energy, after.energy) for before, after in zip(known, found, strict=True)])
+        lengths.append(
+            [
+                (before.description_length, after.description_length)
+                for before, after in zip(known, found, strict=True)
+            ]
+        )
         return found
 
     monkeypatch.setattr(selection, "evolve", spy)

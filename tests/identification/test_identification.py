@@ -333,7 +333,7 @@ def test_the_law_of_a_pendulum_is_found():
     assert set(terms) == {1, 2, ("sin", 0)}
     assert terms["sin", 0] == pytest.approx(-9.0, rel=0.01)
     assert terms[1] == pytest.approx(-0.4, rel=0.01) and terms[2] == pytest.approx(5.0, rel=0.01)
-    assert len(found.members) == 3 and found.ignored == 0 and found.readings == 404
+    assert len(found.members) == 3 and found.outliers == 0 and found.readings == 404
     assert found.members[0] is found.model
 
 
@@ -352,9 +352,9 @@ def test_from_above_gusts_are_told_from_terms_where_from_below_they_are_not(seed
     changes = {"libraries": ("linear", "quadratic", "damping"), "moves": 50_000}
     changes |= {"hidden": False, "directions": False}
     both, below = (identified(runs, signals, noise_from_above=above, **changes) for above in (True, False))
-    assert both.energy < below.energy - 100.0
+    assert both.description_length < below.description_length - 100.0
     assert both.terms < 10 < below.terms
-    gusts = np.sqrt([found.chain.motion[1] for found in both.sums])
+    gusts = np.sqrt([found.chain.motion.correlated for found in both.sums])
     assert ((gusts > 0.2) & (gusts < 2.0)).all()
 
 
@@ -378,7 +378,7 @@ def test_where_nothing_drives_a_state_but_noise_no_term_does():
     run = Run.of(walk + 1e-3 * stream.normal(size=walk.shape), stream.uniform(-1.0, 1.0, (199, 1)))
     found = identified([run], signals)
     assert found.terms == 0 and len(found.members) == 3
-    assert np.isfinite(found.left)
+    assert np.isfinite(found.chi_squared)
 
 
 def test_a_lag_of_the_actuator_is_found():
@@ -450,10 +450,10 @@ def test_a_hidden_state_that_commands_fill_is_found():
     [(commands, squared, rest, time)] = found.actuation.hidden
     assert (list(commands), squared, rest) == ([0, 1], True, 1.0)
     assert time == pytest.approx(0.8, rel=0.1)
-    assert found.energy < blind.energy - 100.0 and found.terms < 8
+    assert found.description_length < blind.description_length - 100.0 and found.terms < 8
     # What is left is noise alone; without the state it is several times as much, or a disturbance.
     assert found.misfit == pytest.approx(1.0, abs=0.2)
-    assert found.chains[0].motion[1] < 0.1 * blind.chains[0].motion[1]
+    assert found.chains[0].motion.correlated < 0.1 * blind.chains[0].motion.correlated
     text = tl.Twin(found.model, signals).equations(3)
     assert "d hidden / dt = left**2/2 + right**2/2 - 1 - hidden/0." in text
     assert all(len(member.hidden) == 1 for member in found.members)
@@ -543,7 +543,7 @@ def test_a_part_may_lead_to_a_shorter_description_and_never_to_a_longer_one():
     for seed in range(3):
         run = swung(wild, seed, start=(0.3, 0.0))
         found, alone = (identified([run], signals, parts=of_parts) for of_parts in (True, False))
-        saved.append(alone.energy - found.energy)
+        saved.append(alone.description_length - found.description_length)
         if saved[-1] > 100.0:
             assert set(law(found)) >= {("sin", 0)}
     assert min(saved) >= 0.0 and max(saved) > 100.0
@@ -551,7 +551,7 @@ def test_a_part_may_lead_to_a_shorter_description_and_never_to_a_longer_one():
 
 def test_parts_are_searched_with_the_fewest_moves_too():
     found = identified([swung(gravity, 0)], pendulum_like(), moves=LEAST_MOVES, committee_size=8)
-    assert found.of_parts and np.isfinite(found.energy)
+    assert found.of_parts and np.isfinite(found.description_length)
 
 
 def test_a_part_begins_with_the_effects_that_its_commands_have_there():
@@ -605,7 +605,7 @@ def test_an_outlier_is_not_learnt_from():
     spoilt = run.states.copy()
     spoilt[40, 1] += 4.0
     clean, found = (identified([Run.of(s, run.commands)], pendulum_like()) for s in (run.states, spoilt))
-    assert clean.ignored <= 1 and 1 <= found.ignored <= 2
+    assert clean.ignored <= 1 and 1 <= found.outliers <= 2
     assert any("ignored" in str(remark) for remark in found.remarks)
     for x in ([0.3, 0.5], [1.0, -1.0]):
         one, other = (f.model.step([x], [[0.4]])[0] for f in (clean, found))
@@ -668,7 +668,7 @@ def test_what_was_learnt_before_is_not_changed_and_the_same_bits_come_again():
     assert same_bits(first.model.constants, before[1])
     for other in later[1:]:
         assert [str(m.program) for m in other.members] == [str(m.program) for m in later[0].members]
-        assert other.energy == later[0].energy
+        assert other.description_length == later[0].description_length
 
 
 def test_a_model_that_a_small_change_makes_diverge_keeps_its_terms(monkeypatch):

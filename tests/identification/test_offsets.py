@@ -78,7 +78,7 @@ def test_the_law_is_learnt_as_if_all_sensors_were_read_at_once():
     ]
     errors = [np.abs(found.model.step(rows, commands) - expected).max() for found in (on, off)]
     assert errors[0] < 0.01 and errors[1] > 3.0 * errors[0]
-    assert on.misfit < 1.3 and on.energy < off.energy - 50.0
+    assert on.misfit < 1.3 and on.description_length < off.description_length - 50.0
     assert on.sensors(2)[0] == pytest.approx(1e-3, rel=0.3)
     assert not off.offsets.any()
 
@@ -86,7 +86,9 @@ def test_the_law_is_learnt_as_if_all_sensors_were_read_at_once():
 def test_where_none_is_found_no_bit_changes():
     runs = [read(swinging, PENDULUM, 3)]
     on, off = (learnt(runs, PENDULUM, offsets=offsets) for offsets in (True, False))
-    assert same_bits(on.model.constants, off.model.constants) and on.energy == off.energy
+    assert (
+        same_bits(on.model.constants, off.model.constants) and on.description_length == off.description_length
+    )
     assert [str(m.program) for m in on.members] == [str(m.program) for m in off.members]
 
 

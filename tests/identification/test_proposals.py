@@ -98,7 +98,9 @@ def test_what_finds_nothing_changes_nothing_wherever_it_is_proposed():
         return []
 
     def longer(context, hypothesis):
-        more = (replace(found, energy=found.energy + 1.0) for found in hypothesis.sums)
+        more = (
+            replace(found, description_length=found.description_length + 1.0) for found in hypothesis.sums
+        )
         return [hypothesis, replace(hypothesis, sums=tuple(more))]
 
     plain = end_of(context, start).best
@@ -154,12 +156,12 @@ def test_where_the_shortest_runs_away_the_modest_one_is_proposed_too(monkeypatch
     def runs_away_once(context, hypothesis):
         found = fitted(context, hypothesis)
         tried.append(hypothesis)
-        return replace(found, fit=replace(found.fit, left=np.inf)) if len(tried) == 1 else found
+        return replace(found, fit=replace(found.fit, chi_squared=np.inf)) if len(tried) == 1 else found
 
     monkeypatch.setattr(terms_file, "fitted", runs_away_once)
     found = decided(Found(start), terms(context, start))
-    assert len(tried) == 2 and found.best.evidence.lasts and found.rivals == ()
-    assert same(found.best, fitted(context, climbed(context, replace(start, sums=start.modest))))
+    assert len(tried) == 2 and found.best.evidence.stable and found.rivals == ()
+    assert same(found.best, fitted(context, climbed(context, replace(start, sums=start.from_above))))
 
 
 def test_what_was_known_is_a_start_of_its_own_that_changes_no_other():
@@ -174,7 +176,7 @@ def test_what_was_known_is_a_start_of_its_own_that_changes_no_other():
     one, two = (start() for start in starts(context, "acceleration"))
     assert same(known, before)
     assert one.fit is None and one.actuation.hidden == () and two.start == RENEWED
-    assert two.evidence.lasts and two.actuation.hidden
+    assert two.evidence.stable and two.actuation.hidden
     assert len(starts(replace(context, known=None), "acceleration")) == 1
     # The order in which they are searched does not matter, for they share nothing that changes.
     late = end_of(context, two)
@@ -190,11 +192,18 @@ def test_a_newcomer_is_a_function_and_a_line():
         grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
         entered.append(grown.pool.add("tanh", grown.pool.add("*", 0, 0.123)))
         first, *others = grown.sums
-        first = replace(first, weights={**first.weights, entered[0]: 0.5}, energy=first.energy - 1e3)
+        first = replace(
+            first,
+            weights={**first.weights, entered[0]: 0.5},
+            description_length=first.description_length - 1e3,
+        )
         return [fitted(context, replace(grown, sums=(first, *others), fit=None))]
 
     found = end_of(context, start_of(context), (*PROPOSALS, believer))
     learnt = concluded(context, found, [])
     assert learnt.of_parts and learnt.pool.text(entered[0], ["angle", "rate", "torque"]).startswith("tanh")
     assert all(node < len(learnt.pool) for found in learnt.sums for node in found.weights)
-    assert type(learnt).from_record(learnt.to_record(), context.signals).energy == learnt.energy
+    assert (
+        type(learnt).from_record(learnt.to_record(), context.signals).description_length
+        == learnt.description_length
+    )

@@ -157,7 +157,7 @@ def test_a_denominator_that_two_chains_share_is_found_and_paid_for_once():
     ((term, constant),) = shared[0]
     assert term == 0
     assert constant == pytest.approx(1.25, rel=1e-4)
-    assert all(new.energy < old.energy for new, old in zip(found, known, strict=True))
+    assert all(new.description_length < old.description_length for new, old in zip(found, known, strict=True))
     quotients = [term for sum_ in found for term in sum_.weights if quotient(pool, term) is not None]
     bare = pool.length(0)
     assert all(bare < pool.length(term) for term in quotients)

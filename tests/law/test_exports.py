@@ -29,7 +29,7 @@ from twinloop.law.exports.simulations import (
     python_simulation,
 )
 from twinloop.law.exports.taking import compared
-from twinloop.law.noise import LastingDisturbance, Noise
+from twinloop.law.noise import CorrelatedDisturbance, Noise
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 
@@ -204,7 +204,7 @@ def test_a_twin_comes_back_in_another_process_with_the_same_numbers(tmp_path):
     errors = [TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)]
     lone = TWINS["actuators and hidden states"]()
     noise = Noise(
-        np.array([1e-3, 5e-3]), np.array([0.0, 1e-3]), (LastingDisturbance((1, 0), True, 0.1, 0.3),), 0.05
+        np.array([1e-3, 5e-3]), np.array([0.0, 1e-3]), (CorrelatedDisturbance((1, 0), True, 0.1, 0.3),), 0.05
     )
     twin = tl.Twin(
         lone.model, SIGNALS, errors, members=[lone.model], noise=noise, seed=3, inflation=1.5,

@@ -14,7 +14,7 @@ import pytest
 import twinloop as tl
 from law_twins import SIGNALS, TWINS
 from twinloop.law.accuracy import TestErrors
-from twinloop.law.noise import LastingDisturbance, Noise
+from twinloop.law.noise import CorrelatedDisturbance, Noise
 
 FOLDER = Path(__file__).parent / "twins"
 SAVED = sorted(FOLDER.glob("*.json"))
@@ -42,7 +42,7 @@ def write(folder=FOLDER):
         noise = Noise(
             np.full(bare.signals.n_x, 1e-3),
             np.zeros(bare.signals.n_x),
-            (LastingDisturbance((1, 0), True, 0.1, 0.3),) if bare.signals is SIGNALS else (),
+            (CorrelatedDisturbance((1, 0), True, 0.1, 0.3),) if bare.signals is SIGNALS else (),
             0.05,
         )
         twin = tl.Twin(

@@ -103,15 +103,15 @@ class Disturbance:
         name: of the state.
         unit: of the state.
         white: what is added in a period, in its unit; 0: nothing that is felt.
-        lasting: what is added in a second and lasts, in its unit; 0: nothing that is felt.
-        memory: time after which that is forgotten to 1/e, s.
+        correlated: what is added in a second by one that is forgotten slowly, in its unit; 0: nothing that is felt.
+        correlation_time: after which that is forgotten to 1/e, s.
     """
 
     name: str
     unit: str
     white: float
-    lasting: float
-    memory: float
+    correlated: float
+    correlation_time: float
 
 
 def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
@@ -126,16 +126,16 @@ def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
     """
     if twin.noise is None or exact(lesson.misfit):
         return ()
-    lasting = {each.states[0]: (each.sd, each.memory) for each in twin.noise.lasting}
+    slow = {each.states[0]: (each.sd, each.correlation_time) for each in twin.noise.correlated}
     found = []
     for i, (state, white) in enumerate(zip(twin.signals.states, twin.noise.moves.tolist(), strict=True)):
-        size, memory = lasting.get(i, (0.0, 0.0))
-        # What is far below the sensor's noise, estimated beside it, within its memory cannot be told from nothing.
+        size, time = slow.get(i, (0.0, 0.0))
+        # Far below the sensor's noise, estimated beside it, within its correlation time it cannot be told from nothing.
         least = 0.01 * lesson.sensors[i]
         white = white if white > least else 0.0
-        size = size if size * max(memory, twin.signals.dt) > least else 0.0
+        size = size if size * max(time, twin.signals.dt) > least else 0.0
         if white or size:
-            found.append(Disturbance(state.name, state.unit, white, size, memory))
+            found.append(Disturbance(state.name, state.unit, white, size, time))
     return tuple(found)
 
 

@@ -13,8 +13,8 @@ LAGGING = 12.0
 """What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
 HIDING = 30.0
 """What a hidden state must gain: its time, its kind, and what a search may find by luck."""
-LASTING = 16.0
-"""What a disturbance that lasts must gain, each: its size, its memory, and the choice of having one."""
+CORRELATED = 16.0
+"""What a correlated disturbance must gain, each: its size, its correlation time, and the choice of having one."""
 STEPPING = 12.0
 """What increments must gain: a law of a step holds for that step alone."""
 
@@ -27,27 +27,27 @@ class Evidence:
 
     Args:
         fitted: whether its constants were tuned on predictions.
-        lasts: whether its model stays near its own runs; where that is not known yet it is taken to.
+        stable: whether its model stays near its own runs; where that is not known yet it is taken to.
         smoothed: whether its terms were selected on states that a model has smoothed.
         length: description length of the readings: −2 log of their likelihood, the price of its terms, and that of
             what else it holds (`price`).
     """
 
     fitted: bool
-    lasts: bool
+    stable: bool
     smoothed: bool
     length: float
 
     @property
     def stage(self) -> tuple[bool, ...]:
         """How far it was worked out; what runs away is worth nothing, however its terms were selected."""
-        return self.fitted, self.lasts, self.lasts and self.smoothed
+        return self.fitted, self.stable, self.stable and self.smoothed
 
     def beats(self, other: Evidence) -> bool:
         """Whether this hypothesis is believed rather than the other; of two that run away neither is."""
         if self.stage != other.stage:
             return self.stage > other.stage
-        return self.lasts and shorter(self.length, other.length)
+        return self.stable and shorter(self.length, other.length)
 
 
 class Judged(Protocol):
@@ -71,19 +71,19 @@ def strongest(hypotheses: Iterable[Hypotheses]) -> Hypotheses:
     return best
 
 
-def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], lasting: int) -> float:
+def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], correlated: int) -> float:
     """What a hypothesis pays for besides its terms, in units of χ².
 
     Args:
         form: what its outputs mean.
         actuation: between commands and its law.
         alike: groups of commands; those of a group share one lag and one delay, and pay for them once.
-        lasting: how many disturbances that last.
+        correlated: how many correlated disturbances.
     """
     lagging = sum(any(not actuation.actuators[i].direct for i in group) for group in alike)
     return (
         STEPPING * (form == "increment")
         + LAGGING * lagging
         + HIDING * bool(actuation.hidden)
-        + LASTING * lasting
+        + CORRELATED * correlated
     )

@@ -26,21 +26,21 @@ class Fit(Recorded, kind="fit"):
     Args:
         model: the tuned one.
         observer: all chains, with the noise under which its predictions were made.
-        left: χ² of the whitened prediction errors; infinite where the model runs away from its own runs.
+        chi_squared: of the whitened prediction errors; infinite where the model runs away from its own runs.
         readings: that counted.
         covariance: of the constants and lags that were free; empty where a small change makes the model diverge.
     """
 
     model: _core.Model
     observer: tuple[Chain, ...]
-    left: float
+    chi_squared: float
     readings: int
     covariance: Floats
 
     @property
-    def lasts(self) -> bool:
+    def stable(self) -> bool:
         """Whether the model stays near its own runs."""
-        return bool(np.isfinite(self.left))
+        return bool(np.isfinite(self.chi_squared))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Hypothesis(Recorded, kind="hypothesis"):
         driven: chains that outputs drive, with a first guess of their noise.
         given: chains that other states drive, with their noise.
         sums: terms that drive each of `driven`, with the noise under which they were found.
-        modest: sums that were found with the noise from above, for where `sums` run away.
+        from_above: sums that were found with the noise from above, for where the model of `sums` runs away.
         fit: the model of the sums; None until it is tuned.
         smoothed: whether the states in `runs` were smoothed by a model.
         of_part: whether a part of the only run has led to it.
@@ -76,7 +76,7 @@ class Hypothesis(Recorded, kind="hypothesis"):
     given: tuple[Chain, ...]
     start: int
     sums: tuple[Sum, ...] = ()
-    modest: tuple[Sum, ...] = ()
+    from_above: tuple[Sum, ...] = ()
     fit: Fit | None = None
     smoothed: bool = False
     of_part: bool = False
@@ -95,10 +95,10 @@ class Hypothesis(Recorded, kind="hypothesis"):
     @property
     def evidence(self) -> Evidence:
         """What the readings say for it."""
-        lasts = self.fit is None or self.fit.lasts
-        lasting = sum(found.chain.motion[1] > 0.0 for found in self.sums)
-        length = self.length + price(self.form, self.actuation, self.alike, lasting)
-        return Evidence(self.fit is not None, lasts, self.smoothed, length)
+        stable = self.fit is None or self.fit.stable
+        correlated = sum(found.chain.motion.correlated > 0.0 for found in self.sums)
+        length = self.length + price(self.form, self.actuation, self.alike, correlated)
+        return Evidence(self.fit is not None, stable, self.smoothed, length)
 
     def searched(self, sums: Sequence[Sum]) -> Hypothesis:
         """The same with what one more search has found, which nobody has fitted yet."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import exact
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
-from twinloop.law.noise import LastingDisturbance, Noise
+from twinloop.law.noise import CorrelatedDisturbance, Noise
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -32,10 +34,10 @@ class Identified(Recorded, kind="identified"):
         chains: with the noise of sensors and motion.
         actuation: lags, delays and hidden states between commands and model.
         offsets: by how much later than those of the driven states each state's readings were taken from it (n_x,), s.
-        left: χ² of the whitened prediction errors of the best model.
+        chi_squared: of the whitened prediction errors of the best model.
         readings: that counted.
-        ignored: readings that were taken for outliers.
-        energy: description length.
+        outliers: readings that were taken for such, and not learnt from.
+        description_length: of its sums.
         of_parts: whether members are there that parts of the only run have led to.
         remarks: what a person should know.
     """
@@ -47,14 +49,19 @@ class Identified(Recorded, kind="identified"):
     chains: list[Chain]
     actuation: Actuation
     offsets: Floats
-    left: float
+    chi_squared: float
     readings: int
-    ignored: int
-    energy: float
+    outliers: int
+    description_length: float
     of_parts: bool = False
     remarks: list[Remark] = field(default_factory=list)
 
-    VERSION = 2
+    VERSION = 3
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "left": "chi_squared",
+        "energy": "description_length",
+        "ignored": "outliers",
+    }
 
     @classmethod
     def from_record(cls, record: object, *given: object) -> Identified:
@@ -99,7 +106,7 @@ class Identified(Recorded, kind="identified"):
     @property
     def misfit(self) -> float:
         """χ² for each reading; 1 where only noise is left."""
-        return self.left / max(1, self.readings)
+        return self.chi_squared / max(1, self.readings)
 
     @property
     def exact(self) -> bool:
@@ -111,15 +118,18 @@ class Identified(Recorded, kind="identified"):
         moves = np.zeros(signals.n_x)
         for chain in self.chains:
             period = signals.dt if chain.integrated else 1.0
-            moves[chain.states[0]] = np.sqrt(chain.motion[0] * period)
-        lasting = [
-            LastingDisturbance(
-                tuple(chain.states), chain.integrated, float(np.sqrt(chain.motion[1])), chain.motion[2]
+            moves[chain.states[0]] = np.sqrt(chain.motion.white * period)
+        correlated = [
+            CorrelatedDisturbance(
+                tuple(chain.states),
+                chain.integrated,
+                float(np.sqrt(chain.motion.correlated)),
+                chain.motion.correlation_time,
             )
             for chain in self.chains
-            if chain.motion[1] > 0.0
+            if chain.motion.correlated > 0.0
         ]
-        return Noise(self.sensors(signals.n_x), moves, tuple(lasting), signals.dt)
+        return Noise(self.sensors(signals.n_x), moves, tuple(correlated), signals.dt)
 
     def sensors(self, n_x: int) -> Floats:
         """Standard deviation of each state's sensor (n_x,)."""

@@ -149,7 +149,7 @@ def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
     """What is believed once some hypotheses were proposed, and its rivals: those that last and are not believed."""
     several = [found.best, *proposed]
     best = strongest(several)
-    others = (other for other in several[1:] if other is not best and other.evidence.lasts)
+    others = (other for other in several[1:] if other is not best and other.evidence.stable)
     # What is drawn from here on is nothing that one of those that are not believed has drawn.
     drawn = max(other.searches for other in several if other.start == best.start)
     return replace(found, best=replace(best, searches=drawn), rivals=(*found.rivals, *others))
@@ -173,14 +173,14 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
         chains=list(observer),
         actuation=best.actuation,
         offsets=best.offsets,
-        left=fit.left,
+        chi_squared=fit.chi_squared,
         readings=fit.readings,
-        ignored=int(sum((run.weights == 0.0).sum() for run in best.runs)),
-        energy=best.length,
+        outliers=int(sum((run.weights == 0.0).sum() for run in best.runs)),
+        description_length=best.length,
         of_parts=of_parts,
         remarks=[
             *said,
-            *remarks(best.runs, pool, signals, sums, fit.left, fit.readings),
+            *remarks(best.runs, pool, signals, sums, fit.chi_squared, fit.readings),
             *late_sensors(best.offsets, driven, signals),
             *other_noise(fit.observer, signals),
             *held_at_bounds(sums, best.candidates.priors.bounds, pool, signals, best.form),

@@ -59,14 +59,14 @@ class Run(Recorded, kind="run"):
 class Stages:
     """Inputs of a model at the start, the middle and the end of each period (rows, inputs), all runs in one.
 
-    `left` is the variance, a period, of what integrating through them leaves of what moves each state (n_x,).
+    `integration` is the variance, a period, of what integrating through them leaves of what moves each state (n_x,).
     """
 
     start: Floats
     middle: Floats
     end: Floats
     runs: tuple[slice, ...]
-    left: Floats
+    integration: Floats
 
 
 def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stages:

@@ -1,32 +1,33 @@
-"""What a twin does not predict: noise of sensors, and disturbances, white and lasting."""
+"""What a twin does not predict: noise of sensors, and disturbances, white and correlated."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.elementary import exp
-from twinloop.records import Recorded
+from twinloop.records import Record, Recorded
 
 
-class LastingDisturbance(NamedTuple):
-    """What drives states beside the commands and is forgotten slowly, such as gusts.
+class CorrelatedDisturbance(NamedTuple):
+    """A disturbance that is forgotten slowly, such as a gust: a Gauss-Markov process of the first order.
 
     Args:
         states: that it drives: the first one, then its integral, and so on.
         integrated: whether it is a derivative of the first one, and not what is added to it in a period.
         sd: its standard deviation, in the unit of the first state, a second where it is a derivative.
-        memory: time after which it is forgotten to 1/e, s.
+        correlation_time: after which 1/e of it is left, s.
     """
 
     states: tuple[int, ...]
     integrated: bool
     sd: float
-    memory: float
+    correlation_time: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +37,30 @@ class Noise(Recorded, kind="noise"):
     Args:
         sensors: standard deviation of each state's sensor (n_x,), in its unit.
         moves: standard deviation of what a white disturbance adds to each state in a period (n_x,), in its unit.
-        lasting: disturbances that last.
+        correlated: disturbances that are.
         dt: period, s.
     """
 
     sensors: Floats
     moves: Floats
-    lasting: tuple[LastingDisturbance, ...] = ()
+    correlated: tuple[CorrelatedDisturbance, ...] = ()
     dt: float = 1.0
+
+    VERSION = 2
+    RENAMED: ClassVar[Mapping[str, str]] = {"lasting": "correlated"}
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of the first version, which called a correlation time a memory."""
+        found = super().renewed(record)
+        if isinstance(found.get("correlated"), list):
+            found["correlated"] = [
+                {"correlation_time" if key == "memory" else key: value for key, value in each.items()}
+                if isinstance(each, dict)
+                else each
+                for each in found["correlated"]
+            ]
+        return found
 
     def drawn(self, draws: int, steps: int, stream: _core.Stream) -> tuple[Floats, Floats]:
         """What sensors add to readings (draws, steps + 1, n_x), and disturbances to states (draws, steps, n_x)."""
@@ -53,8 +70,8 @@ class Noise(Recorded, kind="noise"):
     def disturbance(self, draws: int, steps: int, stream: _core.Stream) -> Floats:
         """Draws of what disturbances add to the states (draws, steps, n_x)."""
         added = self.moves * stream.normals(draws, steps, len(self.moves))
-        for states, integrated, size, memory in self.lasting:
-            kept = float(exp(-self.dt / memory))
+        for states, integrated, size, time in self.correlated:
+            kept = float(exp(-self.dt / time))
             fresh = stream.normals(draws, steps)
             gust = np.empty((draws, steps))
             gust[:, 0] = fresh[:, 0]

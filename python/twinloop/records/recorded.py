@@ -43,6 +43,8 @@ class Recorded:
     KIND: ClassVar[str]
     VERSION: ClassVar[int] = 1
     GIVEN: ClassVar[tuple[str, ...]] = ()
+    RENAMED: ClassVar[Mapping[str, str]] = {}
+    """Keys of earlier versions, and what they are called now."""
 
     def __init_subclass__(cls, kind: str | None = None, given: tuple[str, ...] = (), **rest: Any) -> None:
         super().__init_subclass__(**rest)
@@ -75,6 +77,15 @@ class Recorded:
         """Names of the fields that a record has, in order."""
         fields = dataclasses.fields(cls)  # type: ignore[arg-type]
         return tuple(field.name for field in fields if field.init and field.name not in cls.GIVEN)
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version as this one would have written it.
+
+        Args:
+            record: without "kind" and "version".
+        """
+        return {cls.RENAMED.get(key, key): value for key, value in record.items()}
 
     @classmethod
     def _head(cls) -> Record:
@@ -134,6 +145,8 @@ def checked_record(
             " Twinloop wrote it: install that."
         )
     rest = {key: value for key, value in record.items() if key not in ("kind", "version")}
+    if version < kind.VERSION:
+        rest = kind.renewed(rest)
     for key in rest:
         if key not in keys:
             raise unknown(f"key in the record {where}", str(key)[:60], keys)

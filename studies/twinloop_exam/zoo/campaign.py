@@ -165,7 +165,9 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
             "offsets": list(lesson.offsets),
             "hidden": [list(each) for each in lesson.hidden],
             "sensors": list(lesson.sensors),
-            "disturbances": [[each.name, each.white, each.lasting, each.memory] for each in felt],
+            "disturbances": [
+                [each.name, each.white, each.correlated, each.correlation_time] for each in felt
+            ],
             "empty": honesty.empty_equations(twin, flown),
             "missed": honesty.misses(plant, twin, flown),
             "serious": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if one.serious}),

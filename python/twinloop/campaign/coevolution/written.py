@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from twinloop import _core
 from twinloop.campaign.coevolution.learning import Learner, Learning
@@ -23,7 +25,7 @@ class WrittenLearning(Recorded, kind="model_loop"):
         models: population, archive and counters.
         told: experiments that it learns.
         iteration: that is running, or was the last.
-        left: generations of it that are still to be run.
+        ahead: generations of it that are still to be run.
         capped_before: generations before it in which the non-dominated set was pruned.
         finished: records of the iterations before.
     """
@@ -31,9 +33,12 @@ class WrittenLearning(Recorded, kind="model_loop"):
     models: ModelSnapshot
     told: int
     iteration: int
-    left: int
+    ahead: int
     capped_before: int
     finished: tuple[Iteration, ...]
+
+    VERSION = 2
+    RENAMED: ClassVar[Mapping[str, str]] = {"left": "ahead"}
 
     @staticmethod
     def of(learning: Learning) -> WrittenLearning:
@@ -60,17 +65,17 @@ class WrittenLearning(Recorded, kind="model_loop"):
         learnt = book.first(self.told)
         models = self.models.restored(learner.options, learner.signals, learner.workers)
         objectives = self.models.population_objectives.shape[1]
-        if objectives != 2 * self.told or not 0 <= self.left <= learner.options.model_generations:
+        if objectives != 2 * self.told or not 0 <= self.ahead <= learner.options.model_generations:
             raise InvalidInput(
                 f"Record model_loop: expected {2 * self.told} objectives and at most"
-                f" {learner.options.model_generations} generations left, found {objectives} and {self.left}."
+                f" {learner.options.model_generations} generations left, found {objectives} and {self.ahead}."
             )
         return Learning(
             models,
             learnt.selected,
             tuple(learnt.experiments),
             self.iteration,
-            self.left,
+            self.ahead,
             self.capped_before,
             self.finished,
         )
@@ -82,11 +87,11 @@ class WrittenChoosing(Recorded, kind="choosing"):
 
     Args:
         tests: population, archive and counters.
-        left: generations that are still to be run.
+        ahead: generations that are still to be run.
     """
 
     tests: TestSnapshot
-    left: int
+    ahead: int
 
     def restored(
         self, models: _core.ModelSearch, setup: Setup, options: Options, workers: _core.Workers
@@ -102,12 +107,12 @@ class WrittenChoosing(Recorded, kind="choosing"):
         Raises:
             InvalidInput: it is none of this campaign, or more generations are left than there were.
         """
-        if not 0 <= self.left <= options.generations_of_tests:
+        if not 0 <= self.ahead <= options.generations_of_tests:
             raise InvalidInput(
                 f"Record choosing: expected at most {options.generations_of_tests} generations left, found"
-                f" {self.left}."
+                f" {self.ahead}."
             )
-        return self.tests.restored(models, setup.family, setup.task, options, workers), self.left
+        return self.tests.restored(models, setup.family, setup.task, options, workers), self.ahead
 
 
 @dataclass(frozen=True, eq=False)

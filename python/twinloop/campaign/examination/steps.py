@@ -22,14 +22,14 @@ class StepAnswer:
         rise: time from 10 % to 90 % of the step, s; None where it does not get there.
         overshoot: share of the step by which it goes beyond.
         settling: time after which it stays within 5 % of the step, s; None where it does not.
-        left: share of the step by which it is off at the end.
+        steady_state_error: share of the step by which it is off at the end.
     """
 
     state: str
     rise: float | None
     overshoot: float
     settling: float | None
-    left: float
+    steady_state_error: float
 
 
 def step_answer(name: str, t: Floats, values: Floats, start: float, target: float) -> StepAnswer:

@@ -127,9 +127,9 @@ class Choice:
                     f" {predicted:.3g} ± {spread:.2g} where {worth}"
                 )
         if better < self.confidence:
-            share, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
+            sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
             return (
-                f"newly tuned ones are better in only {share} of the twin's predictions, and proven gains are replaced"
+                f"newly tuned ones are better in only {sure} of the twin's predictions, and proven gains are replaced"
                 f" from {asked} on"
             )
         return ""

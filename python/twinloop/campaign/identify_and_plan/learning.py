@@ -109,11 +109,11 @@ class Learner:
         noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
         free, frozen = followed.free[0], followed.frozen
         lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
-        return bool(np.isfinite(identified.left)) and 2 * int(lost.sum()) <= len(lost)
+        return bool(np.isfinite(identified.chi_squared)) and 2 * int(lost.sum()) <= len(lost)
 
     def _unexplained(self, identified: Identified, book: Logbook, followed: Following) -> list[float]:
         """By how much more than noise and disturbances the best model misses each flight; none where it diverges."""
-        if not np.isfinite(identified.left):
+        if not np.isfinite(identified.chi_squared):
             return []
         noise, unit = (
             identified.noise(self.setup.signals),
@@ -133,7 +133,7 @@ class Learner:
             terms=identified.terms,
             misfit=identified.misfit,
             readings=identified.readings,
-            ignored=identified.ignored,
+            ignored=identified.outliers,
             sensors=tuple(identified.sensors(self.setup.signals.n_x).tolist()),
             lags=tuple(actuator.lag for actuator in identified.actuation.actuators),
             delays=tuple(actuator.delay for actuator in identified.actuation.actuators),
@@ -152,7 +152,8 @@ class Learner:
                 *doubts(
                     book.experiments,
                     self.setup.signals,
-                    follows or not np.isfinite(identified.left),  # of one that diverges it is said already
+                    follows
+                    or not np.isfinite(identified.chi_squared),  # of one that diverges it is said already
                     self.setup.steps,
                     self._unexplained(identified, book, followed),
                     () if follows else other_commands(book.experiments),

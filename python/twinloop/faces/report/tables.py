@@ -100,12 +100,12 @@ def disturbances(result: Mapping[str, Any]) -> Table | None:
             words(each["name"]),
             each["unit"] or "1",
             each["white"] or None,
-            each["lasting"] or None,
-            each["memory"] or None,
+            each["correlated"] or None,
+            each["correlation_time"] or None,
         ]
         for each in found
     ]
-    head = ["state", "unit", "white, each period", "lasting, each second", "its memory (s)"]
+    head = ["state", "unit", "white, each period", "correlated, each second", "correlation time (s)"]
     return _table("disturbances", "Disturbances (standard deviations)", head, rows)
 
 
@@ -237,7 +237,12 @@ def steps(found: Examination) -> Table | None:
                 why = "it diverges" if run.steps < steps else "the twin does not follow"
                 rows.append([words(answer.state), f"{name}: {why}", *[None] * 4])
                 continue
-            numbers = [answer.rise, 100.0 * answer.overshoot, answer.settling, 100.0 * answer.left]
+            numbers = [
+                answer.rise,
+                100.0 * answer.overshoot,
+                answer.settling,
+                100.0 * answer.steady_state_error,
+            ]
             rows.append([words(answer.state), name, *numbers])
     if not rows:
         return None

@@ -74,8 +74,9 @@ def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
     for found in disturbances:
         name, unit = found["name"], found["unit"] or "1"
         parts = [f"{found['white']:.2g} {unit} a period"] if found["white"] else []
-        if found["lasting"]:
-            parts.append(f"{found['lasting']:.2g} ({unit})/s that lasts {found['memory']:.2g} s")
+        if found["correlated"]:
+            size, time = found["correlated"], found["correlation_time"]
+            parts.append(f"{size:.2g} ({unit})/s with a correlation time of {time:.2g} s")
         words.append(f"{name} {' and '.join(parts)}")
     return f"Disturbances (standard deviations): {'; '.join(words)}."
 

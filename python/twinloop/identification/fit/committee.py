@@ -63,7 +63,7 @@ def _structures(
 ) -> list[_core.Model]:
     """Members of subsets drawn by how likely they are; where the best one's is drawn, its next constants."""
     problem, draw = posed(context, hypothesis), context.unit.stream("structures")
-    plausible = PLAUSIBLE * max(base.left, base.readings)
+    plausible = PLAUSIBLE * max(base.chi_squared, base.readings)
     members: list[_core.Model] = []
     grams: dict[tuple[int, tuple[int, ...]], _core.Gram] = {}
     for attempt in range(3 * size):
@@ -92,21 +92,25 @@ def _structures(
                 varied.append(replace(found, weights=weights))
         other = replace(hypothesis, sums=tuple(varied), fit=None)
         fit, drawn = tune(context, other, model_of(context, other), base.observer, 4, 1, number=attempt + 1)
-        if fit.lasts and fit.left <= plausible and drawn:
+        if fit.stable and fit.chi_squared <= plausible and drawn:
             members.append(drawn[0])
     return members
 
 
 def _rescaled(hypothesis: Hypothesis, fit: Fit) -> tuple[Chain, ...]:
     """Noise that explains what is left on average, so that members are as uncertain as the runs say."""
-    misfit = fit.left / max(1, fit.readings) if fit.lasts else 1.0
+    misfit = fit.chi_squared / max(1, fit.readings) if fit.stable else 1.0
     factor = misfit if exact(misfit) else max(misfit, 1.0)
     sizes = np.max([np.abs(run.states).max(axis=0) for run in hypothesis.runs], axis=0)
     scaled = []
     for chain in fit.observer:
         least = np.square(ROUNDING * sizes[list(chain.states)])
         sensors = np.where(least > 0.0, np.maximum(chain.sensors * factor, least), chain.sensors)
-        motion = (chain.motion[0] * factor, chain.motion[1] * factor, chain.motion[2])
+        motion = (
+            chain.motion.white * factor,
+            chain.motion.correlated * factor,
+            chain.motion.correlation_time,
+        )
         scaled.append(chain.with_noise(sensors, motion))
     return tuple(scaled)
 

@@ -23,7 +23,7 @@ PRUNINGS = 3
 def fitted(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     """The hypothesis with its model tuned, without outliers and without terms that tuning has shown to be nothing."""
     best, fit = _tuned(context, hypothesis)
-    if not fit.lasts or not context.options.tuning:
+    if not fit.stable or not context.options.tuning:
         return best
     cleaned = without_outliers(context, best)
     if cleaned is not best:
@@ -33,7 +33,7 @@ def fitted(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         if saved == 0.0:
             break
         other, pruned = _tuned(context, replace(best, sums=tuple(kept)))
-        if not pruned.left - fit.left < saved:
+        if not pruned.chi_squared - fit.chi_squared < saved:
             break
         best, fit = other, pruned
     return best
@@ -44,16 +44,16 @@ def _tuned(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Fit]:
     sums, steps = hypothesis.sums, context.options.tuning_steps
     observer = [*(found.chain for found in sums), *hypothesis.given]
     fit, _ = tune(context, hypothesis, model_of(context, hypothesis), observer, steps)
-    if not fit.lasts:
+    if not fit.stable:
         # Held to its readings at every step it cannot run away; from there it may be let go.
         held = [_held(chain, context.signals.dt) for chain in observer]
         fit, _ = tune(context, hypothesis, fit.model, held, steps)
         freed, _ = tune(context, hypothesis, fit.model, observer, steps)
-        if freed.lasts:
+        if freed.stable:
             fit = freed
         else:
             sums = tuple(replace(found, chain=chain) for found, chain in zip(sums, held, strict=False))
-    if fit.lasts and hypothesis.form != "absolute":
+    if fit.stable and hypothesis.form != "absolute":
         values, places = fit.model.constants.tolist(), layout(hypothesis)[1]
         sums = tuple(
             replace(found, weights=dict(zip(found.weights, (values[place] for place in at), strict=True)))
@@ -66,8 +66,8 @@ def _tuned(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Fit]:
 def _held(chain: Chain, dt: float) -> Chain:
     """The chain with so much disturbance that its observer believes every reading."""
     period = dt if chain.integrated else 1.0
-    white = max(chain.motion[0], float(chain.sensors[0]) / period)
-    return chain.with_noise(chain.sensors, (white, chain.motion[1], chain.motion[2]))
+    white = max(chain.motion.white, float(chain.sensors[0]) / period)
+    return chain.with_noise(chain.sensors, (white, chain.motion.correlated, chain.motion.correlation_time))
 
 
 def _without_weak(hypothesis: Hypothesis, fit: Fit) -> tuple[list[Sum], float]:

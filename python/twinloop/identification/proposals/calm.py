@@ -10,7 +10,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.errors import engine_input
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import LASTING
+from twinloop.identification.evidence import CORRELATED
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.problem import Problem
@@ -25,7 +25,7 @@ def calm(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     What is left of a law that is right is white. A disturbance that may have any size and any memory explains a little
     of that by luck, and the noise under which the readings are most likely nearly always holds one.
     """
-    if hypothesis.fit is None or not hypothesis.fit.lasts:
+    if hypothesis.fit is None or not hypothesis.fit.stable:
         return
     context.watch("disturbances")
     problem = posed(context, hypothesis)
@@ -38,17 +38,21 @@ def calm(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 def _calmed(problem: Problem, found: Sum) -> Sum:
     """The sum with the most likely noise that does not last; itself where noise that lasts pays."""
     chain = found.chain
-    if chain.motion[1] == 0.0:
+    if chain.motion.correlated == 0.0:
         return found
     regression = problem.regression(chain, problem.usable(list(found.weights)))
     weights = np.array(list(found.weights.values()))
     before = regression.likelihood(weights, chain.sensors, chain.motion)
-    white = (chain.motion[0], 0.0, chain.motion[2])
+    white = (chain.motion.white, 0.0, chain.motion.correlation_time)
     floor = floor_of(chain, problem.dt, problem.integration(chain))
     with engine_input():
         ((sensors, motion, after),) = _core.most_likely_noises(
             [(regression, weights, chain.sensors, white, *floor)], problem.workers
         )
-    if after - before > LASTING:
+    if after - before > CORRELATED:
         return found
-    return replace(found, energy=found.energy + after - before, chain=chain.with_noise(sensors, motion))
+    return replace(
+        found,
+        description_length=found.description_length + after - before,
+        chain=chain.with_noise(sensors, motion),
+    )

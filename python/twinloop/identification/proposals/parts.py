@@ -47,10 +47,10 @@ def parts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         )  # fmt: skip
         whole = replace(whole, searches=tried.searches)
         answer = replace(fitted(context, tried), of_part=True)
-        if answer.evidence.lasts:
+        if answer.evidence.stable:
             found.append(answer)
     of_each = zip(hypothesis.sums, *(answer.sums for answer in found), strict=True)
-    best = [shortest(sums, lambda sum_: sum_.energy) for sums in of_each]
+    best = [shortest(sums, lambda sum_: sum_.description_length) for sums in of_each]
     if any(new is not old for new, old in zip(best, hypothesis.sums, strict=True)):
         yield fitted(context, replace(whole, sums=tuple(best)))
     yield from found

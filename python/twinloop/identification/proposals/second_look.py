@@ -32,5 +32,5 @@ def second_look(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis
             again = strongest([again, filled_by_commands(context, again, latest.sums)])
         latest = fitted(context, again)
         yield latest
-        if not latest.evidence.lasts:
+        if not latest.evidence.stable:
             return

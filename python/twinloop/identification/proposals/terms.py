@@ -18,6 +18,6 @@ def terms(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("terms")
     found = fitted(context, climbed(context, hypothesis))
     yield found
-    if not found.evidence.lasts:
+    if not found.evidence.stable:
         # A short description that runs away is none: the one from above is more modest.
-        yield fitted(context, climbed(context, replace(hypothesis, sums=hypothesis.modest)))
+        yield fitted(context, climbed(context, replace(hypothesis, sums=hypothesis.from_above)))

@@ -111,7 +111,7 @@ def explained(problem: Problem, found: Sum) -> bool:
     if len(found.weights) < 2 or bounded(problem, found):
         return True
     _, slow = floor_of(chain, problem.dt, problem.integration(chain))
-    still = chain.motion[0] <= NOISE * slow[0] and chain.motion[1] <= NOISE * slow[1]
+    still = chain.motion.white <= NOISE * slow[0] and chain.motion.correlated <= NOISE * slow[1]
     return len(found.weights) <= FEW_TERMS and (still or calm(problem, chain) is chain)
 
 

@@ -129,7 +129,7 @@ class _Joints:
                 self.problem, [new.chain], list(known.weights), [None], moves=LEAST, starts=1,
                 largest=self.largest, unit=self.unit.part(number),
             )  # fmt: skip
-            length += min(known.energy, again.energy)
+            length += min(known.description_length, again.description_length)
         return length
 
     def _turn(self, known: Sequence[Sum], unit: Unit) -> list[Sum] | None:

@@ -22,7 +22,7 @@ from twinloop.identification.terms.denominators import Denominator
 STEPS = 12
 """At most."""
 HALVINGS = 5
-"""Of a step at most, until less is left than before."""
+"""Of a step at most, until less is residual than before."""
 STILL = 1e-6
 """Share of χ² that a step must gain for there to be another."""
 RIDGE = 1e-12
@@ -30,9 +30,9 @@ RIDGE = 1e-12
 
 
 class _Point(NamedTuple):
-    """What is left at some constants, the columns that are linear there, and the slopes by each constant below."""
+    """What is residual at some constants, the columns that are linear there, and the slopes by each constant below."""
 
-    left: float
+    residual: float
     columns: Columns
     slopes: Columns
 
@@ -48,7 +48,7 @@ def refined(problem: Problem, chain: Chain, quotient: Quotient) -> Denominator:
     nodes = [node for node, _ in quotient.denominator]
     costs = prices(problem.pool, nodes, problem.readings(chain), len(problem.runs)).tolist()
     price = dict(zip(nodes, costs, strict=True))
-    denominator, left = _descended(problem, chain, quotient)
+    denominator, residual = _descended(problem, chain, quotient)
     while len(denominator) > 1:
         fewer = [tuple(part for part in denominator if part is not out) for out in denominator]
         tried = [
@@ -57,14 +57,14 @@ def refined(problem: Problem, chain: Chain, quotient: Quotient) -> Denominator:
             if matters(problem, parts)
             for other, more in [_descended(problem, chain, replace(quotient, denominator=parts))]
         ]
-        if not tried or not min(tried)[0] < left:
+        if not tried or not min(tried)[0] < residual:
             break
-        denominator, left = min(tried)[2]
+        denominator, residual = min(tried)[2]
     return denominator
 
 
 def _descended(problem: Problem, chain: Chain, quotient: Quotient) -> tuple[Denominator, float]:
-    """The denominator's constants where the least is left, and that, in units of χ²."""
+    """The denominator's constants where the least is residual, and that, in units of χ²."""
     nodes = [node for node, _ in quotient.denominator]
     problem.usable([*quotient.plain, *quotient.above, *nodes])
     under, above = problem.values(nodes), problem.values(quotient.above)
@@ -78,16 +78,16 @@ def _descended(problem: Problem, chain: Chain, quotient: Quotient) -> tuple[Deno
         for halving in range(HALVINGS):
             there = here + step / float(1 << halving)
             then = _at(problem, chain, plain, above, under, there)
-            if then is not None and then.left < now.left:
+            if then is not None and then.residual < now.residual:
                 break
         else:
             break
-        gained = now.left - then.left
+        gained = now.residual - then.residual
         here, now = there, then
-        if gained < STILL * now.left:
+        if gained < STILL * now.residual:
             break
-    left = np.inf if now is None else now.left
-    return tuple(zip(nodes, here.tolist(), strict=True)), left
+    residual = np.inf if now is None else now.residual
+    return tuple(zip(nodes, here.tolist(), strict=True)), residual
 
 
 def _at(

@@ -131,7 +131,9 @@ class Problem:
 
     def integration(self, chain: Chain) -> float:
         """Variance, a period, of what integrating terms leaves of what moves a chain's first state."""
-        return float(self.stages.left[chain.states[0]]) if chain.integrated or self.as_integrated else 0.0
+        return (
+            float(self.stages.integration[chain.states[0]]) if chain.integrated or self.as_integrated else 0.0
+        )
 
     def readings(self, chain: Chain) -> int:
         """Readings of a chain that count."""

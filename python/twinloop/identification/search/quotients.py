@@ -127,12 +127,12 @@ class _Finder:
         for i, quotients in enumerate(candidates):
             for candidate in quotients:
                 found = self._with(known[i], candidate)
-                if found is None or not shorter(found.energy, best[i].energy):
+                if found is None or not shorter(found.description_length, best[i].description_length):
                     continue
                 rival = self._rival(known[i], found.chain)
-                if shorter(found.energy + WORTH, rival.energy):
+                if shorter(found.description_length + WORTH, rival.description_length):
                     best[i] = found
-                elif shorter(rival.energy, best[i].energy):
+                elif shorter(rival.description_length, best[i].description_length):
                     best[i] = rival
         return best
 
@@ -148,7 +148,7 @@ class _Finder:
                 alike = [each for each in self._all([found]) if _terms(each) == _terms(denominator)]
                 tried = [self._carried(found, each, denominator, 0.0) for each in alike]
                 tried.append(self._searched(found.chain, denominator, found))
-                best[i] = shortest([found, *tried], lambda sum_: sum_.energy)
+                best[i] = shortest([found, *tried], lambda sum_: sum_.description_length)
         return best
 
     def renewed(self, known: Sum) -> Sum:
@@ -156,7 +156,7 @@ class _Finder:
         for own in self._all([known]):
             there = refined(self.problem, known.chain, self._split(known, own))
             new = self._carried(known, own, there, self._share(own, [known]))
-            known = new if shorter(new.energy, known.energy) else known
+            known = new if shorter(new.description_length, known.description_length) else known
         return known
 
     def _rival(self, known: Sum, chain: Chain) -> Sum:
@@ -167,7 +167,7 @@ class _Finder:
         terms = [*self.terms, *known.weights]
         tried = [self._search(chain, terms, None, {}, self.moves)]
         tried.append(self._search(chain, list(known.weights), None, {}, self.moves // OWN))
-        return shortest([known, *tried], lambda found: found.energy)
+        return shortest([known, *tried], lambda found: found.description_length)
 
     def _carried(self, known: Sum, own: Denominator, there: Denominator, share: float) -> Sum:
         """A sum whose terms over one denominator are over another; each pays a share of that, nats."""
@@ -226,10 +226,12 @@ class _Finder:
             terms = [*split.plain, *split.above, *ratios]
             again = self._search(found.chain, terms, None, ratios, self.moves // OWN)
             again = self._paid(again, denominator)
-            if not matters(self.problem, denominator) or (best and not shorter(again.energy, best.energy)):
+            if not matters(self.problem, denominator) or (
+                best and not shorter(again.description_length, best.description_length)
+            ):
                 break
             best = again
-            if not shorter(best.energy, known.energy + WORTH):
+            if not shorter(best.description_length, known.description_length + WORTH):
                 break  # as long as that it will hardly become the shorter one
         return best
 
@@ -264,7 +266,9 @@ class _Finder:
     def _paid(self, found: Sum, denominator: Denominator) -> Sum:
         """A sum with the price of a denominator in its description, if it uses that."""
         used = bool(self._split(found, denominator).above)
-        return replace(found, energy=found.energy + self._cost(denominator, found.chain) * used)
+        return replace(
+            found, description_length=found.description_length + self._cost(denominator, found.chain) * used
+        )
 
     def _cost(self, denominator: Denominator, chain: Chain) -> float:
         nodes = [node for node, _ in denominator]

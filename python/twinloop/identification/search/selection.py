@@ -73,7 +73,7 @@ def from_both_sides(
     """The shorter description of each chain, with the noise estimated from below or from above.
 
     From below, little noise makes many terms of few runs and stays little; from above, the strongest terms come
-    first and the noise falls as far as they explain it. The sums from above are kept beside (`modest`).
+    first and the noise falls as far as they explain it. The sums from above are kept beside (`from_above`).
 
     Args:
         context: of the identification.
@@ -88,12 +88,14 @@ def from_both_sides(
         context, hypothesis, problem, terms, known or nothing, below, moves=options.moves, starts=2
     )
     if not options.noise_from_above:
-        return replace(low, modest=low.sums)
+        return replace(low, from_above=low.sums)
     above = [unexplained(problem, chain, options.gusts) for chain in hypothesis.driven]
     high = selected(context, low, problem, terms, nothing, above, moves=options.moves, starts=2)
     both = zip(low.sums, high.sums, strict=True)
     return replace(
-        high, sums=tuple(shortest(pair, lambda found: found.energy) for pair in both), modest=high.sums
+        high,
+        sums=tuple(shortest(pair, lambda found: found.description_length) for pair in both),
+        from_above=high.sums,
     )
 
 
@@ -160,6 +162,9 @@ def undisturbed(context: Context, hypothesis: Hypothesis) -> Hypothesis:
             break
         found = selected(context, calmer, problem, terms, calmer.sums, driven, moves=tried, starts=1)
         pairs = zip(calmer.sums, found.sums, strict=True)
-        kept = tuple(new if shorter(new.energy + CALMER, old.energy) else old for old, new in pairs)
+        kept = tuple(
+            new if shorter(new.description_length + CALMER, old.description_length) else old
+            for old, new in pairs
+        )
         calmer = replace(found, sums=kept)
     return calmer

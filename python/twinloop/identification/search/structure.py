@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -47,15 +48,18 @@ class Sum(Recorded, kind="sum"):
 
     Args:
         weights: coefficients by node.
-        energy: its description length: −2 log of the likelihood at `chain`'s noise, and the price of its terms.
+        description_length: of it: −2 log of the likelihood at `chain`'s noise, and the price of its terms.
         chain: with the noise under which it was found.
-        others: other subsets that are nearly as good, with their energies above the best's.
+        others: other subsets that are nearly as good, with what their description is longer by.
     """
 
     weights: Weights
-    energy: float
+    description_length: float
     chain: Chain
     others: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
+
+    VERSION = 2
+    RENAMED: ClassVar[Mapping[str, str]] = {"energy": "description_length"}
 
 
 def prices(
@@ -298,4 +302,4 @@ def _differ(new: Chain, old: Chain, problem: Problem) -> bool:
 
 def total(sums: Sequence[Sum]) -> float:
     """Description length of all sums."""
-    return sum(found.energy for found in sums)
+    return sum(found.description_length for found in sums)

@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.records import Recorded
+from twinloop.records import Record, Recorded
 from twinloop.signals import Signals
 
-Motion = tuple[float, float, float]
-"""(variance of a white disturbance, variance of a lasting one, its memory in s)."""
-QUIET: Motion = (0.0, 0.0, 1.0)
+
+class Motion(NamedTuple):
+    """What disturbs a chain.
+
+    Args:
+        white: variance of a white disturbance, per second (per period for increments).
+        correlated: variance of a correlated one, such as gusts.
+        correlation_time: after which that is forgotten to 1/e, s.
+    """
+
+    white: float
+    correlated: float
+    correlation_time: float
+
+
+QUIET = Motion(0.0, 0.0, 1.0)
 """Nothing disturbs."""
 
 
@@ -27,8 +41,7 @@ class Chain(Recorded, kind="chain"):
         integrated: whether the output is a derivative, not an increment.
         sensors: variance of each state's sensor, in its unit squared.
         rough: variance of each state's readings about a polynomial through neighbours: the sensor's or more.
-        motion: variance of a white disturbance per second (per period for increments), variance of a lasting one such
-            as gusts, and the time in s after which that is forgotten to 1/e.
+        motion: what disturbs the driven one.
     """
 
     states: tuple[int, ...]
@@ -38,9 +51,19 @@ class Chain(Recorded, kind="chain"):
     rough: Floats
     motion: Motion = QUIET
 
-    def with_noise(self, sensors: Floats, motion: Motion) -> Chain:
+    VERSION = 2
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of the first version, in which disturbances were numbers without names."""
+        motion = record.get("motion")
+        if not isinstance(motion, list) or len(motion) != len(Motion._fields):
+            return record
+        return {**record, "motion": dict(zip(Motion._fields, motion, strict=True))}
+
+    def with_noise(self, sensors: Floats, motion: tuple[float, float, float]) -> Chain:
         """The same states with other noise."""
-        return replace(self, sensors=np.asarray(sensors, dtype=np.float64), motion=motion)
+        return replace(self, sensors=np.asarray(sensors, dtype=np.float64), motion=Motion(*motion))
 
     @property
     def engine(self) -> tuple[list[int], list[float], Motion, bool]:

@@ -100,7 +100,7 @@ def floor_of(chain: Chain, dt: float, integration: float = 0.0) -> tuple[Floats,
     sensors = BEST_SENSOR * BEST_SENSOR * chain.rough
     period = dt if chain.integrated else 1.0
     white = 1e-9 * float(sensors[0]) + integration
-    return sensors, (white / period, 1e-9 * float(sensors[0]) / (period * period), dt)
+    return sensors, Motion(white / period, 1e-9 * float(sensors[0]) / (period * period), dt)
 
 
 def calm(problem: Problem, chain: Chain) -> Chain:
@@ -112,7 +112,7 @@ def calm(problem: Problem, chain: Chain) -> Chain:
     """
     _, slow = floor_of(chain, problem.dt, problem.integration(chain))
     period = problem.dt if chain.integrated else 1.0
-    moved = chain.motion[0] * period + chain.motion[1] * period * period
+    moved = chain.motion.white * period + chain.motion.correlated * period * period
     return chain if moved <= CALM * float(chain.sensors[0]) else chain.with_noise(chain.sensors, slow)
 
 
@@ -161,9 +161,10 @@ def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: boo
         if solved is None:
             break
         with engine_input():
-            ((sensors, motion, _),) = _core.most_likely_noises(
+            ((sensors, found, _),) = _core.most_likely_noises(
                 [(regression, solved[0], sensors, motion, low, slow)], problem.workers
             )
+        motion = Motion(*found)
         used = min(len(terms), 0.7 * readings)
         sensors = sensors * readings / (readings - used)
     return chain.with_noise(sensors, motion)
@@ -174,4 +175,5 @@ def _begun(chain: Chain, low: Floats, slow: Motion, dt: float, gust: float) -> t
     sensors = np.maximum(chain.sensors, low)
     period = dt if chain.integrated else 1.0
     first = float(sensors[0])
-    return sensors, (max(1e-3 * first / period, slow[0]), gust * first / (period * period), 10.0 * dt)
+    white = max(1e-3 * first / period, slow.white)
+    return sensors, Motion(white, gust * first / (period * period), 10.0 * dt)

@@ -132,12 +132,14 @@ class _Group:
         """All offsets, with the group's own."""
         dt = self.signals.dt
         chains = self._believed(0.0)
-        size = dt * _coarse(lambda periods: self._energy(dt * periods, chains))
+        size = dt * _coarse(lambda periods: self._description_length(dt * periods, chains))
         step = 0.5 * abs(size)
         for _ in range(HALVINGS if size != 0.0 else 0):
             # The noise was found too large while it had to explain the offset.
             chains = self._believed(size)
-            around = {tried: self._energy(tried, chains) for tried in (size, size - step, size + step)}
+            around = {
+                tried: self._description_length(tried, chains) for tried in (size, size - step, size + step)
+            }
             size = shortest(list(around), around.__getitem__)
             step *= 0.5
         return self._at(size)
@@ -151,7 +153,7 @@ class _Group:
         runs = moved(self.runs, self.signals, self._at(size))
         return [_unexplained(runs, self.signals, chain) for chain in chains]
 
-    def _energy(self, size: float, chains: Sequence[Chain]) -> float:
+    def _description_length(self, size: float, chains: Sequence[Chain]) -> float:
         """−2 log of the likelihood of the readings if disturbances are all that drives the chains."""
         regressions = self._regressions(size, chains)
         return sum(

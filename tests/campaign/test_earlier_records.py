@@ -1,0 +1,49 @@
+"""Campaigns that earlier versions have written are read, and go on.
+
+The files in `earlier/` were written by version 0.1.0 at commit afe2f00: a pendulum, two flights, a third one asked for.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from conftest import pendulum_step
+from lives import SIGNALS
+from sameness import through_json
+
+EARLIER = Path(__file__).parent / "earlier"
+LAWS = {"default": "- 24.6074*sin(angle)", "paper": "521.991/(212.8*angle + 930.573)"}
+"""What the version that wrote them had printed of their twins."""
+
+
+@pytest.fixture(params=sorted(LAWS))
+def written(request):
+    return json.loads((EARLIER / f"{request.param}.json").read_text(encoding="utf-8"))
+
+
+def test_what_was_told_and_learnt_is_read(written):
+    campaign = tl.Campaign.from_record(written, threads=1)
+    runs = [run for _, run in written["logbook"]["experiments"]]
+    assert len(campaign.experiments) == len(runs) == 2 and len(campaign.waiting) == 1
+    for experiment, run in zip(campaign.experiments, runs, strict=True):
+        assert np.array_equal(experiment.trajectory.states, run["trajectory"]["states"])
+    assert LAWS[campaign.setup.preset] in campaign.twin.equations()
+
+
+def test_it_goes_on_and_what_it_writes_now_is_read_again(written):
+    campaign = tl.Campaign.from_record(written, threads=1)
+    again = tl.Campaign.from_record(through_json(campaign.to_record()), threads=1)
+    for each in (campaign, again):
+        rig, test = tl.systems.Simulated(SIGNALS, pendulum_step, noise=1e-3), each.waiting[0]
+        each.tell(test, rig.run(test))
+    assert campaign.twin.equations(17) == again.twin.equations(17)
+    assert np.array_equal(campaign.best_test.genes, again.best_test.genes)
+
+
+def test_an_unknown_key_of_an_earlier_version_is_refused_by_its_name(written):
+    written["memory"]["latest"]["luck"] = 1.0
+    with pytest.raises(tl.InvalidInput, match="luck"):
+        tl.Campaign.from_record(written)
