@@ -1,4 +1,4 @@
-"""Logs of flights: CSV and NumPy files with a column for the time and one for each state and command."""
+"""Logs of flights: files of CSV, NumPy and PX4 with the time and the values of each state and command."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from twinloop.arrays import Floats
 from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
+from twinloop.ulog import Window, read_ulog
 
 TIME = "t"
 """Name of the column of times, s."""
 DELIMITERS = ",;\t"
+WHOLE = Window()
 MOST_BYTES = 200_000_000
 """Of a log, unpacked: an hour of twenty signals at a kilohertz, as text."""
 
@@ -28,6 +30,9 @@ def load(
     ended: str = "completed",
     reason: str = "",
     name: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    start: float | None = None,
+    stop: float | None = None,
 ) -> Trajectory:
     """A recorded flight from a file.
 
@@ -35,41 +40,68 @@ def load(
     are left out, and the commands of the last row may be empty. A file of NumPy (`.npz`) has arrays `t` (n + 1,),
     `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), the last row of which counts for nothing.
 
+    A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with times of its own. They are brought onto the
+    period of the signals: states are interpolated between the samples beside each time, commands are those sent last.
+    Where two samples are more than two periods apart the log is refused. Of a topic with a quaternion `q` the angles
+    "roll", "pitch" and "yaw" can be named, too.
+
     Args:
         path: of the file.
         signals: names of the columns, and the order of states and commands.
         ended: "completed", "aborted" or "diverged".
         reason: why it did not complete.
         name: what messages call it; None: its path.
+        columns: of a `.ulg` the field of each state and command, such as {"roll": "vehicle_attitude.roll", "motor":
+            "actuator_outputs/1.output[0]"}, in the units of the signals.
+        start: of a `.ulg`, s after its beginning; None: as soon as all fields are there.
+        stop: of a `.ulg`, s after its beginning; None: as long as all fields are there.
 
     Returns:
         The flight.
 
     Raises:
-        InvalidInput: no such file, a column that is missing, or something that is no number.
+        InvalidInput: no such file, a column or field that is missing, something that is no number, or samples of a
+            `.ulg` that are too far apart.
+        NotAvailable: a `.ulg` without the package pyulog.
     """
-    t, states, commands = read_log(path, signals, name)
+    t, states, commands = read_log(path, signals, name, columns, Window(start, stop))
     return Trajectory(t, states, commands, ended=ended, reason=reason)
 
 
-def read_log(path: str | Path, signals: Signals, name: str | None = None) -> tuple[Floats, Floats, Floats]:
-    """The columns of a log as they stand there, whatever is wrong with them.
+def read_log(
+    path: str | Path,
+    signals: Signals,
+    name: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    window: Window = WHOLE,
+) -> tuple[Floats, Floats, Floats]:
+    """The columns of a log as they stand there, whatever is wrong with them; of a `.ulg` on the period of the signals.
 
     Args:
         path: of the file.
         signals: names of the columns, and the order of states and commands.
         name: what messages call it; None: its path.
+        columns: of a `.ulg` the field of each state and command.
+        window: of a `.ulg`, the part that is meant.
 
     Returns:
         Times (n + 1,), states (n + 1, n_x) and commands (n, n_u); of an `.npz` file in the shapes that it has.
 
     Raises:
-        InvalidInput: no such file, a column that is missing, or something that is no number.
+        InvalidInput: no such file, a column that is missing, something that is no number, or `columns` and a part of a
+            log that is no `.ulg`.
+        NotAvailable: a `.ulg` without the package pyulog.
     """
     path = Path(path)
     called = str(path) if name is None else name
     try:
         _check_size(called, path.stat().st_size)
+        if path.suffix.lower() == ".ulg":
+            return read_ulog(path, called, signals, columns, window)
+        if window != WHOLE:
+            raise InvalidInput(
+                f"Log {called}: expected a .ulg to take a part of, found another file; cut it first."
+            )
         t, states, commands = (
             _arrays(path, called) if path.suffix == ".npz" else _columns(path, called, signals)
         )

@@ -29,7 +29,7 @@ MOST_BYTES = 10_000_000
 """Of a campaign file."""
 SECTIONS = (
     *("dt", "states", "commands", "kinematics", "controller", "task", "first", "campaign", "options"),
-    *("autopilot", "system"),
+    *("autopilot", "system", "log"),
 )
 TASK = ("initial_state", "target_state", "duration")
 CAMPAIGN = ("preset", "seed", "goal", "quality", "weights")
@@ -88,6 +88,11 @@ seed = 0
 # goal = "both"                  # "control", "model" or "both"
 # quality = "iae"                # "iae", "ise" or "final_distance"
 # weights = {{ angle = 2.0 }}      # of states in it; by default 1, of rates 0, each in units of its scale
+
+# [log]                          # of a log of PX4 (.ulg): the field of each state and command; q of a topic as angles
+# angle = "vehicle_attitude.pitch"
+# rate = "vehicle_angular_velocity.xyz[1]"
+# torque = "vehicle_torque_setpoint.xyz[1]"
 
 # [system]                       # what flies by itself: twinloop run {file}; leave it out if a person flies
 # use = "rig:Rig"                # a class in rig.py beside this file, which is run; or a name: {names}
@@ -221,6 +226,20 @@ def read_signals(path: str | Path) -> tuple[Signals, Mapping[str, Any]]:
     found = _toml_of(path)
     _keys(found, SECTIONS, ("dt", "states", "commands"), str(path))
     return _signals(found), _section(found, "options", None, ())
+
+
+def read_fields(path: str | Path) -> Mapping[str, str]:
+    """What a campaign file says of the fields of an autopilot's log, by signal; nothing where it has no [log].
+
+    Args:
+        path: of the file.
+
+    Raises:
+        InvalidInput: no such file, no TOML, or an unknown section.
+    """
+    found = _toml_of(Path(path))
+    _keys(found, SECTIONS, (), str(path))
+    return _section(found, "log", None, ())
 
 
 def _signals(found: Mapping[str, Any]) -> Signals:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from twinloop.campaign.campaign_file import read_signals
+from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.campaign.presets import options_of
 from twinloop.errors import InvalidInput
@@ -56,12 +56,12 @@ def identify(
     as_json: bool,
     force: bool,
 ) -> None:
-    """Learn a twin from LOGs alone, as CSV or .npz: nobody asks for a flight, and no controller is tuned.
+    """Learn a twin from LOGs alone, as CSV, .npz or .ulg: nobody asks for a flight, and no controller is tuned.
 
     FILE.toml says dt, states and commands, as for a campaign; [options] counts, and other sections need not be there.
     """
     if not logs:
-        raise InvalidInput("identify: expected at least one log, found none; name CSV or .npz files.")
+        raise InvalidInput("identify: expected at least one log, found none; name CSV, .npz or .ulg files.")
     for path, suffix in ((output, ".json"), (report, ".html")):
         if path is not None:
             check_writable(path, [suffix])
@@ -94,7 +94,7 @@ def identify(
 
 
 def _flight(file: Path, signals: Signals, config: Path) -> Trajectory:
-    flight = load(file, signals)
+    flight = load(file, signals, columns=read_fields(config))
     try:
         return check_recorded(flight, Limits(signals), None)
     except InvalidInput as reason:

@@ -9,25 +9,37 @@ import click
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.campaign.campaign_file import read_signals
+from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.examination.log_check import LogCheck, check_log
 from twinloop.errors import InvalidInput
+from twinloop.faces.files import check_writable
 from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.text import table
-from twinloop.logs import read_log
+from twinloop.logs import TIME, read_log, write_columns
+from twinloop.ulog import Window
 
 
 @click.command()
 @click.argument("log", type=Path)
 @click.argument("config", type=Path, metavar="FILE.toml")
+@click.option("--from", "start", type=float, metavar="S", help="Of a .ulg: s after its beginning.")
+@click.option("--to", "stop", type=float, metavar="S", help="Of a .ulg: s after its beginning.")
+@click.option(
+    "-o", "--output", type=Path, metavar="FILE.csv", help="Also write what was read there, to tell it."
+)
 @click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
-def check(log: Path, config: Path, as_json: bool) -> int:
-    """Look at a LOG, as CSV or .npz, before it is told: its clock, gaps, sensors, commands and units.
+def check(
+    log: Path, config: Path, start: float | None, stop: float | None, output: Path | None, as_json: bool
+) -> int:
+    """Look at a LOG, as CSV, .npz or .ulg, before it is told: its clock, gaps, sensors, commands and units.
 
-    FILE.toml says dt, states and commands, as for a campaign. Exits with 1 where something has to be mended first.
+    FILE.toml says dt, states and commands, as for a campaign; of a .ulg its section [log] says which field each of them
+    is. Exits with 1 where something has to be mended first.
     """
+    if output is not None:
+        check_writable(output, [".csv"])
     signals, _ = read_signals(config)
-    t, states, commands = read_log(log, signals)
+    t, states, commands = read_log(log, signals, None, read_fields(config), Window(start, stop))
     name = f"Log {log}"
     found = check_log(
         _numbers(f"{name}, t", t, np.shape(t)[:1]),
@@ -40,6 +52,11 @@ def check(log: Path, config: Path, as_json: bool) -> int:
         click.echo(to_json(plain_dict(facts)), nl=False)
     else:
         click.echo(_text(log, found), nl=False)
+    if output is not None:
+        columns = dict(zip(signals.state_names, states.T, strict=True))
+        columns |= dict(zip(signals.command_names, commands.T, strict=True))
+        write_columns(output, {TIME: t, **columns})
+        click.echo(f"Log: {output}", err=True)
     return 0 if found.fit else 1
 
 

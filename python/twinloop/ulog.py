@@ -1,0 +1,210 @@
+"""Logs of PX4 (ULog): fields of topics, each with times of its own, brought onto one period."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twinloop.arrays import Floats
+from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.signals import Signals
+
+ADDRESS = re.compile(r"([a-z0-9_]+)(?:/([0-9]{1,3}))?\.(\S+)", re.ASCII | re.IGNORECASE)
+"""A topic, which of several of that name, and a field: "vehicle_attitude.roll", "sensor_gyro/1.x"."""
+EULER = ("roll", "pitch", "yaw")
+"""Angles that stand in no field and are made of a topic's quaternion q, which turns by yaw, then pitch, then roll."""
+APART = 2.0
+"""Periods by which two samples of a field may be apart: between them nobody knows what was."""
+MOST_FIELDS = 20_000
+"""Of a topic, arrays and nested ones unfolded: a few bytes of a file could ask for billions."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of a log that is meant.
+
+    Args:
+        start: seconds after its beginning; None: as soon as all fields are there.
+        stop: seconds after its beginning; None: as long as all fields are there.
+    """
+
+    start: float | None = None
+    stop: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """A field as it was logged: times (m,) in s after the beginning of the log, values (m,)."""
+
+    address: str
+    times: Floats
+    values: Floats
+
+
+def read_ulog(
+    path: Path, called: str, signals: Signals, columns: Mapping[str, str] | None, window: Window
+) -> tuple[Floats, Floats, Floats]:
+    """Times (n + 1,) from 0, states (n + 1, n_x) and commands (n, n_u) of a log, a row each period.
+
+    States are interpolated between the two samples beside each time, commands are those sent last.
+
+    Args:
+        path: of the file, whose size was checked.
+        called: what messages call it.
+        signals: that are wanted; their `dt` is the period.
+        columns: the field of each state and command.
+        window: the part that is meant.
+
+    Raises:
+        InvalidInput: a damaged or hostile file, a field that is missing, samples too far apart, or no time in common.
+        NotAvailable: the package pyulog is missing.
+    """
+    names = (*signals.state_names, *signals.command_names)
+    fields = _fields(called, names, columns)
+    log = _parsed(path, called, sorted({topic for topic, _, _ in fields.values()}))
+    found = {name: _samples(log, called, *fields[name]) for name in names}
+    start, stop = _common(called, list(found.values()), window, signals.dt)
+    for samples in found.values():
+        _refuse_gaps(called, samples, start, stop, signals.dt)
+    count = int((stop - start) / signals.dt + 1e-6)
+    times = np.asarray(start + signals.dt * np.arange(count + 1), dtype=np.float64)
+    states = [np.interp(times, found[name].times, found[name].values) for name in signals.state_names]
+    commands = [_held(found[name], times[:-1]) for name in signals.command_names]
+    return times - start, np.stack(states, axis=1), np.stack(commands, axis=1)
+
+
+def _fields(
+    called: str, names: Sequence[str], columns: Mapping[str, str] | None
+) -> dict[str, tuple[str, int, str]]:
+    """Topic, instance and field of each signal."""
+    example = '{"roll": "vehicle_attitude.roll", "p": "vehicle_angular_velocity.xyz[0]"}'
+    if not columns:
+        raise InvalidInput(
+            f"Log {called}: expected the field of each state and command, such as columns={example}, found none; name"
+            " them, or write them into the section [log] of a campaign file and make a CSV:"
+            f" twinloop check {called} FILE.toml -o flight.csv"
+        )
+    found = {}
+    for name in names:
+        if name not in columns:
+            raise InvalidInput(f"Log {called}, columns: expected a field for {name!r}, found none; name it.")
+        address = columns[name]
+        match = ADDRESS.fullmatch(address) if isinstance(address, str) else None
+        if match is None:
+            raise InvalidInput(
+                f"Log {called}, columns: expected topic.field or topic/1.field for {name!r}, found {address!r}."
+            )
+        found[name] = match[1], int(match[2] or 0), match[3]
+    for name in columns:
+        if name not in names:
+            raise unknown(f"signal in the columns of the log {called}", name, names)
+    return found
+
+
+def _parsed(path: Path, called: str, topics: list[str]) -> Any:
+    """The log with these topics, as pyulog reads it; whatever it stumbles over is one sentence."""
+    try:
+        from pyulog import ULog
+    except ImportError as missing:
+        raise NotAvailable(
+            "Logs of PX4 need the package pyulog, which is not installed: pip install 'twinloop[ulog]'."
+        ) from missing
+
+    class Bounded(ULog):  # type: ignore[misc]
+        class _MessageAddLogged(ULog._MessageAddLogged):  # type: ignore[misc]
+            def _parse_nested_type(self, prefix: str, name: str, formats: Any) -> None:
+                sizes = [max(1, size) for _, size, _ in formats[name].fields]
+                if len(self.field_data) + sum(sizes) > MOST_FIELDS or prefix.count(".") > 8:
+                    raise ValueError(f"more than {MOST_FIELDS} fields in {name}")
+                super()._parse_nested_type(prefix, name, formats)
+
+    try:
+        # pyulog prints its warnings, and does not close what it opened where it fails.
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
+            log = Bounded(file, topics)
+    except OSError:
+        raise
+    except Exception as reason:
+        raise InvalidInput(
+            f"Log {called}: expected a log of PX4 (ULog), found another file or a damaged one: {reason}."
+        ) from reason
+    if log.file_corruption:
+        raise InvalidInput(
+            f"Log {called}: expected a whole log, found a damaged one; take it from the card again, or save what is"
+            " whole of it as CSV."
+        )
+    return log
+
+
+def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> _Samples:
+    same = [data for data in log.data_list if data.name == topic]
+    if not same:
+        raise unknown(f"topic, which the log {called} should have:", topic, sorted(log.message_formats))
+    data = next((each.data for each in same if each.multi_id == instance), None)
+    address = f"{topic}/{instance}.{field}" if instance else f"{topic}.{field}"
+    if data is None or "timestamp" not in data:
+        raise InvalidInput(
+            f"Log {called}: expected {address}, found the instances"
+            f" {', '.join(str(each.multi_id) for each in same)} of {topic}; name one of them."
+        )
+    quaternion = [f"q[{i}]" for i in range(4)]
+    if field in data:
+        values = np.asarray(data[field], dtype=np.float64)
+    elif field in EULER and all(part in data for part in quaternion):
+        values = _angle(field, *(np.asarray(data[part], dtype=np.float64) for part in quaternion))
+    else:
+        raise unknown(f"field of {topic} in the log {called}", field, sorted(data))
+    micro = data["timestamp"]
+    if len(micro) < 2 or (micro[1:] <= micro[:-1]).any() or micro[0] < log.start_timestamp:
+        raise InvalidInput(
+            f"Log {called}: expected at least two samples of {address}, at times that go on, found others."
+        )
+    return _Samples(address, (micro - np.uint64(log.start_timestamp)).astype(np.float64) * 1e-6, values)
+
+
+def _angle(name: str, w: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
+    """An angle of attitudes, rad, without jumps by a turn; the last bits of the C library's arcs are rounded away."""
+    if name == "pitch":
+        angle = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    elif name == "roll":
+        angle = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    else:
+        angle = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return np.asarray(np.round(np.unwrap(angle), 12))
+
+
+def _common(called: str, found: Sequence[_Samples], window: Window, dt: float) -> tuple[float, float]:
+    """From when to when all fields are there, within what is meant."""
+    first, last = max(each.times[0] for each in found), min(each.times[-1] for each in found)
+    start = first if window.start is None else window.start
+    stop = last if window.stop is None else window.stop
+    if not (first - 1e-9 <= start and start + 2.0 * dt <= stop and stop <= last + 1e-9):
+        raise InvalidInput(
+            f"Log {called}: expected a time of at least two periods ({2.0 * dt:g} s) within {first:.6g} to {last:.6g} s"
+            f" after its beginning, where all fields are there, found {start:.6g} to {stop:.6g} s; name another one."
+        )
+    return float(start), float(stop)
+
+
+def _refuse_gaps(called: str, samples: _Samples, start: float, stop: float, dt: float) -> None:
+    inside: NDArray[np.bool_] = (samples.times[1:] > start) & (samples.times[:-1] < stop)
+    gaps = np.where(inside, np.diff(samples.times), 0.0)
+    place = int(np.argmax(gaps))
+    if gaps[place] > APART * dt * (1.0 + 1e-6):
+        raise InvalidInput(
+            f"Log {called}: expected samples of {samples.address} at most {APART:g} periods ({1e3 * APART * dt:g} ms)"
+            f" apart, found {1e3 * gaps[place]:.4g} ms after {samples.times[place]:.6g} s; log it more often, choose a"
+            " longer dt, or a part without that gap."
+        )
+
+
+def _held(samples: _Samples, times: Floats) -> Floats:
+    return samples.values[np.searchsorted(samples.times, times + 1e-9, side="right") - 1]

@@ -1,0 +1,190 @@
+"""Logs of PX4: fields by name onto one period, quaternions as angles, gaps and hostile files refused."""
+
+import json
+import struct
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import twinloop as tl
+from command import invoke
+from lives import RIG
+from ulogs import MAGIC, message, ulog
+
+pytest.importorskip("pyulog", reason="twinloop[ulog] is not installed")
+
+SIGNALS = tl.Signals(
+    [tl.State("roll", "rad", scale=1.0), tl.State("p", "rad/s", scale=5.0, derivative_of="roll")],
+    [tl.Command("aileron", "1", bounds=(-1.0, 1.0))],
+    dt=0.02,
+)
+FORMATS = {
+    "vehicle_attitude": "uint64_t timestamp;double[4] q;",
+    "rates": "uint64_t timestamp;double[3] xyz;",
+    "actuator": "uint64_t timestamp;double[2] control;",
+}
+COLUMNS = {"roll": "vehicle_attitude.roll", "p": "rates.xyz[0]", "aileron": "actuator/1.control[1]"}
+
+
+def quaternion(yaw, pitch, roll):
+    x, y, z, w = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_quat()
+    return [w, x, y, z]
+
+
+def roll(t):
+    return 4.0 * t  # more than a turn in two seconds
+
+
+def rows(seconds=2.0, without=()):
+    found = []
+    for k in range(round(seconds / 0.005)):
+        at = 0.0013 + 0.005 * k
+        found.append((at, "vehicle_attitude", 0, quaternion(0.3, -0.2, roll(at))))
+    for k in range(round(seconds / 0.011)):
+        at = 0.011 * k
+        found.append((at, "rates", 0, [np.sin(at), 0.0, 0.0]))
+    for k in range(round(seconds / 0.02) + 1):
+        found.append((0.02 * k, "actuator", 0, [9.0, 9.0]))
+        found.append((0.02 * k + 0.004, "actuator", 1, [0.0, 0.01 * (k % 50)]))
+    return sorted(
+        row for row in found if not any(row[1] == topic and a < row[0] < b for topic, a, b in without)
+    )
+
+
+def written(tmp_path, content):
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(content)
+    return path
+
+
+def test_fields_of_several_rates_come_onto_one_period(tmp_path):
+    run = tl.load(written(tmp_path, ulog(FORMATS, rows())), SIGNALS, columns=COLUMNS)
+    start = 0.004  # the command comes last
+    t = start + 0.02 * np.arange(len(run.t))
+    np.testing.assert_allclose(run.t, t - start, atol=1e-12)
+    np.testing.assert_allclose(run.states[:, 0], roll(t), atol=1e-6)  # a straight line, and no jump by a turn
+    np.testing.assert_allclose(run.states[:, 1], np.sin(t), atol=2e-5)  # 11 ms apart: half of 0.011² / 8
+    np.testing.assert_allclose(run.commands[:, 0], 0.01 * (np.arange(run.steps) % 50), atol=1e-12)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0))
+@settings(max_examples=25)
+def test_angles_are_those_that_the_quaternion_was_made_of(yaw, pitch, turned):
+    held = [
+        (0.01 * k, topic, 1 if topic == "actuator" else 0, values)
+        for k in range(20)
+        for topic, values in (
+            ("actuator", [0.0, 0.0]), ("rates", [0.0, 0.0, 0.0]), ("vehicle_attitude", quaternion(yaw, pitch, turned))
+        )
+    ]  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        path = written(Path(folder), ulog(FORMATS, held))
+        for name, angle in (("roll", turned), ("pitch", pitch), ("yaw", yaw)):
+            run = tl.load(path, SIGNALS, columns={**COLUMNS, "roll": f"vehicle_attitude.{name}"})
+            np.testing.assert_allclose(run.states[:, 0], angle, atol=1e-9)
+
+
+def test_a_part_of_a_log_is_the_same_as_the_whole_there(tmp_path):
+    path = written(tmp_path, ulog(FORMATS, rows()))
+    part = tl.load(path, SIGNALS, columns=COLUMNS, start=0.5, stop=1.1)
+    assert part.steps == 30
+    np.testing.assert_allclose(part.states[:, 0], roll(0.5 + part.t), atol=1e-6)
+
+
+@pytest.mark.parametrize("topic", ["vehicle_attitude", "rates", "actuator"])
+def test_a_gap_is_refused_and_said_but_not_where_it_is_not_asked_for(tmp_path, topic):
+    path = written(tmp_path, ulog(FORMATS, rows(without=[(topic, 1.0, 1.06)])))
+    with pytest.raises(tl.InvalidInput, match=rf"samples of {topic}.*at most 2 periods \(40 ms\)"):
+        tl.load(path, SIGNALS, columns=COLUMNS)
+    assert tl.load(path, SIGNALS, columns=COLUMNS, stop=0.9).steps > 40
+
+
+@pytest.mark.parametrize(
+    ("columns", "more", "word"),
+    [
+        (None, {}, "expected the field of each state and command"),
+        ({**COLUMNS, "roll": "vehicle_atitude.roll"}, {}, "did you mean 'vehicle_attitude'"),
+        ({**COLUMNS, "roll": "vehicle_attitude.rol"}, {}, "field of vehicle_attitude"),
+        ({**COLUMNS, "roll": "vehicle_attitude/3.roll"}, {}, "the instances 0"),
+        ({**COLUMNS, "roll": "roll"}, {}, "topic.field"),
+        ({**COLUMNS, "roll": 3}, {}, "topic.field"),
+        ({**COLUMNS, "yaw": "vehicle_attitude.yaw"}, {}, "yaw"),
+        ({"roll": "vehicle_attitude.roll"}, {}, "a field for 'p'"),
+        (COLUMNS, {"start": 5.0}, "where all fields are there"),
+        (COLUMNS, {"start": 1.0, "stop": 1.01}, "at least two periods"),
+    ],
+)
+def test_what_was_asked_for_wrongly_is_said(tmp_path, columns, more, word):
+    path = written(tmp_path, ulog(FORMATS, rows()))
+    with pytest.raises(tl.InvalidInput, match=word):
+        tl.load(path, SIGNALS, columns=columns, **more)
+
+
+def bomb():
+    """A few bytes that ask for 60000² fields."""
+    formats = {"vehicle_attitude": "uint64_t timestamp;inner[60000] a;", "inner": "double[60000] b;"}
+    body = b"".join(message("F", f"{name}:{fields}".encode()) for name, fields in formats.items())
+    added = message("A", struct.pack("<BH", 0, 0) + b"vehicle_attitude")
+    return MAGIC + struct.pack("<Q", 0) + message("B", bytes(40)) + body + added
+
+
+def endless():
+    body = message("F", b"vehicle_attitude:uint64_t timestamp;vehicle_attitude[2] again;")
+    added = message("A", struct.pack("<BH", 0, 0) + b"vehicle_attitude")
+    return MAGIC + struct.pack("<Q", 0) + message("B", bytes(40)) + body + added
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"\x80\x04pickle", MAGIC, MAGIC + bytes(8), bomb(), endless(), ulog(FORMATS, [])],
+    ids=["empty", "pickle", "cut", "nothing", "bomb", "endless", "no data"],
+)
+def test_hostile_and_damaged_files_are_one_sentence(tmp_path, content):
+    with pytest.raises(tl.InvalidInput, match=r"flight\.ulg"):
+        tl.load(written(tmp_path, content), SIGNALS, columns=COLUMNS)
+
+
+@given(st.data())
+@settings(max_examples=60)
+def test_a_log_with_any_bytes_changed_is_read_or_refused(data):
+    content = bytearray(ulog(FORMATS, rows(0.2)))
+    for _ in range(data.draw(st.integers(1, 5))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    with tempfile.TemporaryDirectory() as folder:
+        path = written(Path(folder), bytes(content))
+        try:
+            assert tl.load(path, SIGNALS, columns=COLUMNS).steps >= 2
+        except tl.InvalidInput as refusal:
+            assert "flight.ulg" in str(refusal) or "Trajectory" in str(refusal)
+
+
+def test_without_its_package_it_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyulog", None)
+    with pytest.raises(tl.NotAvailable, match=r"pip install 'twinloop\[ulog\]'"):
+        tl.load(written(tmp_path, ulog(FORMATS, rows())), SIGNALS, columns=COLUMNS)
+
+
+def test_check_reads_it_by_the_campaign_file_and_writes_what_can_be_told(tmp_path):
+    fields = 'angle = "vehicle_attitude.pitch"\nrate = "rates.xyz[0]"\ntorque = "actuator/1.control[1]"\n'
+    (tmp_path / "rig.toml").write_text(RIG + "[log]\n" + fields)
+    path = written(tmp_path, ulog(FORMATS, rows(3.0)))
+    csv = tmp_path / "flight.csv"
+    part = ("--from", "0.5", "--to", "2.5", "-o", str(csv), "--json")
+    said = invoke("check", str(path), str(tmp_path / "rig.toml"), *part)
+    found = json.loads(said.stdout)
+    assert found["rows"] == 41 and found["gaps"] == 0 and found["period"] == pytest.approx(0.05)
+    signals = tl.Signals(
+        [tl.State("angle", "rad", scale=3.0), tl.State("rate", "rad/s", scale=8.0, derivative_of="angle")],
+        [tl.Command("torque", "N m", bounds=(-2.0, 2.0))], dt=0.05,
+    )  # fmt: skip
+    columns = {"angle": "vehicle_attitude.pitch", "rate": "rates.xyz[0]", "torque": "actuator/1.control[1]"}
+    straight = tl.load(path, signals, columns=columns, start=0.5, stop=2.5)
+    told = tl.load(csv, signals)
+    np.testing.assert_array_equal(told.states, straight.states)
+    np.testing.assert_array_equal(told.commands, straight.commands)
