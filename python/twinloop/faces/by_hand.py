@@ -11,6 +11,7 @@ import click
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.answering import answer, json_option
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import quality_unit, to_json
@@ -28,14 +29,16 @@ STOPPED = "stopped before its end"
 
 @click.command()
 @click.argument("file", type=Path)
-def new(file: Path) -> None:
+@json_option
+def new(file: Path, as_json: bool) -> None:
     """Write a commented campaign FILE.toml to fill in for a system of your own."""
     check_writable(file, [".toml"])
     if file.exists():
         raise InvalidInput(f"File {file}: expected none there, found one; choose another name, or remove it.")
     store = file.with_suffix(".db")
     write_text(file, template(str(store)))
-    click.echo(f"Wrote {file}: fill it in, then ask for the first test: twinloop ask {store}")
+    text = f"Wrote {file}: fill it in, then ask for the first test: twinloop ask {store}"
+    answer({"files": [str(file)], "store": str(store)}, text, as_json)
 
 
 @click.command()
@@ -109,6 +112,7 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     "--aborted", type=Path, metavar="FLIGHT", help="The test was stopped before its end; what was recorded."
 )
 @click.option("--reason", metavar="REASON", help="With --aborted: why it was stopped.")
+@json_option
 def tell(
     store: str,
     test: int,
@@ -116,6 +120,7 @@ def tell(
     failed: str | None,
     aborted: Path | None,
     reason: str | None,
+    as_json: bool,
 ) -> None:
     """Tell what happened to a TEST: a FLIGHT as CSV or .npz, whole or aborted, or why there is none."""
     log = _told(store, test, flight, failed, aborted, reason)
@@ -131,10 +136,17 @@ def tell(
                 aborted="" if aborted is None else STOPPED if reason is None else reason,
                 otherwise=f"tell that it was stopped: {_aborted(store, test, log, 'why')}",
             )
-        click.echo(
+        text = (
             f"Kept: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
             f" {shown_name(store)}."
         )
+        runs = [run.quality for run in campaign.experiments if run.number == asked.number]
+        quality = {
+            "predicted": asked.predicted,
+            "spread": asked.spread,
+            "quality": runs[-1] if runs else None,
+        }
+        answer({**_standing(campaign, asked), **quality}, text, as_json)
 
 
 def _told(
@@ -171,21 +183,32 @@ def _aborted(store: str, test: int, log: Path, why: str) -> str:
 @click.command()
 @click.argument("store")
 @click.argument("flight", type=Path)
-def attach(store: str, flight: Path) -> None:
+@json_option
+def attach(store: str, flight: Path, as_json: bool) -> None:
     """Add a FLIGHT that nobody asked for, as CSV or .npz, to what is learnt."""
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
-        click.echo(f"Kept: {flight}; {_count(campaign)} in {shown_name(store)}.")
+        text = f"Kept: {flight}; {_count(campaign)} in {shown_name(store)}."
+        answer({"file": str(flight), "experiments": len(campaign.experiments)}, text, as_json)
 
 
 @click.command()
 @click.argument("store")
 @click.argument("test", type=int)
-def abandon(store: str, test: int) -> None:
+@json_option
+def abandon(store: str, test: int, as_json: bool) -> None:
     """Say that a TEST will not be flown."""
     with closing(_campaign(store)) as campaign:
-        campaign.abandon(numbered(campaign, test))
-        click.echo(f"Kept: test {test} abandoned in {shown_name(store)}.")
+        asked = numbered(campaign, test)
+        campaign.abandon(asked)
+        text = f"Kept: test {test} abandoned in {shown_name(store)}."
+        answer(_standing(campaign, asked), text, as_json)
+
+
+def _standing(campaign: Campaign, test: Test) -> dict[str, object]:
+    """Where a test is in its life, for a program."""
+    told = len(campaign.experiments)
+    return {"test": test.number, "status": campaign.status(test), "experiments": told}
 
 
 def _count(campaign: Campaign) -> str:

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from twinloop import __version__
-from twinloop.arrays import Floats
 from twinloop.autopilots import Autopilot
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foretold
 from twinloop.campaign.certificate import Certificate
 from twinloop.errors import NotAvailable
+from twinloop.faces.figures.figure import Band, Line, Mark, Panel
+from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
+from twinloop.faces.figures.svg import panel_svg
+from twinloop.faces.figures.units import labelled, shown_unit, words
 from twinloop.faces.result import plain_dict, quality_unit
-
-WIDTH, HEIGHT = 240.0, 120.0
-"""Of a picture of a state, in its own units."""
 
 
 def facts(
@@ -126,6 +126,7 @@ def page(facts: Mapping[str, Any], names: Sequence[str], units: Sequence[str]) -
         number=_number,
         degrees=lambda value: None if value is None else math.degrees(value),
         plots=_plots(facts["prediction"], names, units),
+        figures=f":root{{{variables(LIGHT)}}}@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}{RULES}",
     )
 
 
@@ -156,7 +157,7 @@ def _number(value: float | None) -> str:
 def _plots(
     prediction: Mapping[str, Any] | None, names: Sequence[str], units: Sequence[str]
 ) -> list[dict[str, str]]:
-    """Pictures of the predicted states: points of lines, and the same in words."""
+    """Pictures of the predicted states, each with its axes, and the same in words."""
     if prediction is None:
         return []
     t, states = np.array(prediction["t"]), np.array(prediction["states"])
@@ -164,22 +165,17 @@ def _plots(
     target = np.broadcast_to(np.array(prediction["target"]), states.shape) if states.size else states
     plots = []
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):
-        curves = [
-            states[:, i],
-            target[: len(states), i],
-            *([] if band is None else [band[0, :, i], band[1, :, i]]),
+        factor, label = labelled(name, unit)
+        marks: list[Mark] = (
+            []
+            if band is None
+            else [Band(t, factor * band[0, :, i], factor * band[1, :, i], "twin", "90 % band")]
+        )
+        marks += [
+            Line(t, factor * target[: len(states), i], "target", "target"),
+            Line(t, factor * states[:, i], "twin", "twin"),
         ]
-        finite = np.concatenate(curves)[np.isfinite(np.concatenate(curves))]
-        low, high = float(finite.min()), float(finite.max())
-        lines = [_points(t, curve, low, high) for curve in curves]
-        area = f"{lines[2]} {' '.join(reversed(lines[3].split()))}" if band is not None else ""
-        ends = f"from {states[0, i]:.3g} to {states[-1, i]:.3g} {unit} in {t[-1]:.3g} s; shown: {low:.3g} to {high:.3g}"
-        plots.append({"name": name, "curve": lines[0], "target": lines[1], "band": area, "words": ends})
+        first, last = factor * states[0, i], factor * states[-1, i]
+        said = f"from {first:.3g} to {last:.3g} {shown_unit(unit)[1]} in {t[-1]:.3g} s"
+        plots.append({"svg": panel_svg(Panel(words(name), marks, "time (s)", label)), "words": said})
     return plots
-
-
-def _points(t: Floats, values: Floats, low: float, high: float) -> str:
-    across = np.zeros(len(t)) if t[-1] == 0.0 else WIDTH * t / t[-1]
-    up = HEIGHT * (0.5 if high == low else 0.05 + 0.9 * (high - values) / (high - low))
-    up = np.broadcast_to(up, across.shape)
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, up, strict=True) if math.isfinite(y))

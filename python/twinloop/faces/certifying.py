@@ -10,6 +10,7 @@ from twinloop.autopilots import Autopilot
 from twinloop.autopilots.files import FORMATS
 from twinloop.campaign.certificate import Certificate
 from twinloop.errors import InvalidInput
+from twinloop.faces.answering import answer, json_option
 from twinloop.faces.certificate import facts, page
 from twinloop.faces.files import write_text
 from twinloop.faces.for_autopilots import for_an_autopilot, prepared
@@ -20,6 +21,7 @@ from twinloop.store import shown_name
 @click.command()
 @click.argument("store")
 @for_an_autopilot
+@json_option
 @click.pass_context
 def certify(
     context: click.Context,
@@ -28,6 +30,7 @@ def certify(
     kind: str | None,
     mapping: Path | None,
     name: str | None,
+    as_json: bool,
 ) -> None:
     """Certify the controller to fly of STORE, or say why not.
 
@@ -51,12 +54,15 @@ def certify(
         write_text(output / file, text)
     write_text(output / "certificate.json", to_json(certified))
     write_text(output / "certificate.html", html)
-    files = ", ".join(str(output / file) for file, _ in texts.values())
-    if found.granted:
-        click.echo(f"Granted: {output / 'certificate.html'}" + (f"; {files}" if files else "") + ".")
-        return
-    click.echo(f"Refused. {' '.join(found.refusals)} In full: {output / 'certificate.html'}")
-    context.exit(1)
+    files = [str(output / file) for file, _ in texts.values()]
+    sheet = output / "certificate.html"
+    text = f"Granted: {'; '.join([str(sheet), *([', '.join(files)] if files else [])])}."
+    if not found.granted:
+        text = f"Refused. {' '.join(found.refusals)} In full: {sheet}"
+    written = [str(sheet), str(output / "certificate.json"), *files]
+    answer({"granted": found.granted, "refusals": found.refusals, "files": written}, text, as_json)
+    if not found.granted:
+        context.exit(1)
 
 
 def _parameter_files(found: Certificate, autopilot: Autopilot | None) -> dict[str, tuple[str, str]]:

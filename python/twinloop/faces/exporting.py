@@ -8,6 +8,7 @@ import click
 
 from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput, unknown
+from twinloop.faces.answering import answer, json_option
 from twinloop.law.exports.export import PRECISIONS, SUFFIXES
 from twinloop.law.twin import load_twin
 from twinloop.store import is_address
@@ -28,6 +29,7 @@ WHAT = ("twin", "controller")
 @click.option(
     "--force", is_flag=True, help="Also a twin that fails its checks, and without comparing what is made."
 )
+@json_option
 def export(
     source: str,
     what: str,
@@ -36,6 +38,7 @@ def export(
     name: str | None,
     precision: str,
     force: bool,
+    as_json: bool,
 ) -> None:
     """Exports the TWIN (or the CONTROLLER) of SOURCE: a store with a campaign, or a twin as JSON.
 
@@ -71,9 +74,10 @@ def export(
             )
         made = _campaign(source, name).export_controller(to, precision=precision, force=force)
     if isinstance(made, str):
-        click.echo(made, nl=False)
+        answer({"kind": kind, "text": made}, made.removesuffix("\n"), as_json)
     else:
-        click.echo(f"Wrote {', '.join(str(path) for path in made)}.")
+        files = [str(path) for path in made]
+        answer({"kind": kind, "files": files}, f"Wrote {', '.join(files)}.", as_json)
 
 
 def _campaign(store: str, name: str | None) -> Campaign:

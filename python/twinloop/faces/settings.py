@@ -11,6 +11,7 @@ from twinloop.arrays import Floats
 from twinloop.autopilots.sweep import AXES
 from twinloop.campaign import Campaign
 from twinloop.errors import NotAvailable
+from twinloop.faces.answering import answer, json_option
 from twinloop.faces.files import write_text
 from twinloop.faces.for_autopilots import for_an_autopilot, prepared
 from twinloop.faces.telling import numbered
@@ -22,8 +23,15 @@ from twinloop.test import Test
 @click.argument("store")
 @click.argument("test", type=int)
 @for_an_autopilot
+@json_option
 def settings(
-    store: str, test: int, output: Path, kind: str | None, mapping: Path | None, name: str | None
+    store: str,
+    test: int,
+    output: Path,
+    kind: str | None,
+    mapping: Path | None,
+    name: str | None,
+    as_json: bool,
 ) -> None:
     """Write a TEST of STORE as settings: gains, commands over time and, where it can be, a chirp.
 
@@ -60,10 +68,9 @@ def settings(
         write_text(output / file, text)
     table = output / f"test-{test}-commands.csv"
     write_columns(table, columns)
-    click.echo(
-        f"Wrote {', '.join(str(output / file) for file in [*texts, table.name])}."
-        + (f" {said.strip()}" if said else "")
-    )
+    written = [str(output / file) for file in [*texts, table.name]]
+    text = f"Wrote {', '.join(written)}." + (f" {said.strip()}" if said else "")
+    answer({"files": written, "note": said.strip()}, text, as_json)
 
 
 def _columns(campaign: Campaign, test: Test) -> dict[str, Floats]:

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.faces.answering import answer, json_option
 from twinloop.faces.dashboard.fence import LOOPBACK
 
 PORT = 8731
@@ -30,10 +31,13 @@ SHORTEST = 16
 )
 @click.option("--token", help=f"Of at least {SHORTEST} characters; by default one is made and printed.")
 @click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
-def dashboard(store: str, port: int, host: str, token: str | None, threads: int | None) -> None:
+@json_option
+def dashboard(
+    store: str, port: int, host: str, token: str | None, threads: int | None, as_json: bool
+) -> None:
     """Show STORE in the browser: the report, live, the next test, and forms to approve and to tell."""
     server, address = prepared(store, port, host, token, threads)
-    click.echo(f"Dashboard: {address}  (Ctrl-C ends it)")
+    answer({"address": address}, f"Dashboard: {address}  (Ctrl-C ends it)", as_json)
     with suppress(KeyboardInterrupt):  # the way to end it: there is nothing to say of that
         server.run()
 

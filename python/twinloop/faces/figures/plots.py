@@ -42,5 +42,9 @@ class Plots:
             raise AttributeError(f"expected a figure, one of {', '.join(FIGURES)}, found {name!r}")
         return lambda: asked(self._campaign.examine(), name)
 
+    def __repr__(self) -> str:
+        """Which figures there are, and how they are asked for."""
+        return f"Figures of {self._campaign!r}, such as campaign.plot.unseen(): {', '.join(FIGURES)}."
+
     def __dir__(self) -> Iterable[str]:
         return [*super().__dir__(), *FIGURES]

@@ -7,10 +7,11 @@ from pathlib import Path
 import click
 
 from twinloop.errors import InvalidInput
+from twinloop.faces.answering import answer, json_option
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.saving import FORMATS, check_format, picture, written
 from twinloop.faces.files import check_writable, write_text
-from twinloop.faces.report.comparison import comparison, comparison_page
+from twinloop.faces.report.comparison import compared, comparison, comparison_page
 from twinloop.faces.report.page import source_page, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.text import table
@@ -25,10 +26,12 @@ from twinloop.faces.text import table
 @click.option(
     "--format", "form", help=f"Instead of the page, all figures as files in FOLDER: {', '.join(FORMATS)}."
 )
-def report(campaign: str, name: str | None, output: Path | None, form: str | None) -> None:
+@json_option
+def report(campaign: str, name: str | None, output: Path | None, form: str | None, as_json: bool) -> None:
     """One page on CAMPAIGN, a store or a record in a file: what to believe, and why."""
     if form is not None:
-        _figures(campaign, name, output or Path("figures"), form)
+        files = _figures(campaign, name, output or Path("figures"), form)
+        answer({"files": files}, "\n".join(f"Figure: {file}" for file in files), as_json, err=True)
         return
     path = Path("report.html") if output is None else output
     check_writable(path, [".html"])
@@ -36,10 +39,10 @@ def report(campaign: str, name: str | None, output: Path | None, form: str | Non
     found = source(campaign, name)
     text = source_page(found)
     write_text(path, text)
-    click.echo(f"Report: {path}", err=True)
+    answer({"files": [str(path)]}, f"Report: {path}", as_json, err=True)
 
 
-def _figures(campaign: str, name: str | None, folder: Path, form: str) -> None:
+def _figures(campaign: str, name: str | None, folder: Path, form: str) -> list[str]:
     check_format(form)
     if not folder.is_dir():
         if folder.exists() or not folder.parent.is_dir():
@@ -48,13 +51,14 @@ def _figures(campaign: str, name: str | None, folder: Path, form: str) -> None:
                 " another one."
             )
         folder.mkdir()
-    examined = source(campaign, name).campaign.examine()
+    examined, files = source(campaign, name).campaign.examine(), []
     for figure_name, drawn in FIGURES.items():
         figure = drawn(examined)
         if figure is not None:
             path = folder / f"{figure_name}.{form}"
             written(picture(figure, form), path)
-            click.echo(f"Figure: {path}", err=True)
+            files.append(str(path))
+    return files
 
 
 @click.command()
@@ -64,7 +68,8 @@ def _figures(campaign: str, name: str | None, folder: Path, form: str) -> None:
     "--name", "names", multiple=True, help="Of the campaign in each store, where they hold several; twice."
 )
 @click.option("-o", "--output", type=Path, metavar="FILE.html", help="Also as a page.")
-def compare(first: str, second: str, names: tuple[str, ...], output: Path | None) -> None:
+@json_option
+def compare(first: str, second: str, names: tuple[str, ...], output: Path | None, as_json: bool) -> None:
     """Two campaigns side by side, FIRST and SECOND: stores, or records in files."""
     if len(names) not in (0, 1, 2):
         raise InvalidInput(f"--name: expected it at most twice, found {len(names)} of them.")
@@ -73,8 +78,9 @@ def compare(first: str, second: str, names: tuple[str, ...], output: Path | None
         templates()
     chosen = (names or (None,)) * 2 if len(names) < 2 else names
     sources = [source(where, name) for where, name in zip((first, second), chosen, strict=False)]
-    found = comparison(sources)
-    click.echo(table(list(found.head), found.rows))
+    names_shown, answers = [each.name for each in sources], compared(sources)
+    found = comparison(names_shown, answers)
+    answer({"campaigns": names_shown, "answers": answers}, table(list(found.head), found.rows), as_json)
     if output is not None:
-        write_text(output, comparison_page(sources))
+        write_text(output, comparison_page(found))
         click.echo(f"Page: {output}", err=True)

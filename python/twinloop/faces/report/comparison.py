@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from twinloop import _core
 from twinloop.campaign.assessment import foretold
@@ -16,32 +16,41 @@ from twinloop.faces.report.tables import Table, shown_value
 Row = tuple[str, object]
 
 
-def comparison(sources: Sequence[Source]) -> Table:
-    """A row a question, a column a campaign.
+def compared(sources: Sequence[Source]) -> dict[str, list[object]]:
+    """By question what each campaign answers, None where it does not.
 
     Args:
         sources: at least one.
     """
     answers = [dict(_answers(source)) for source in sources]
     questions = list(dict.fromkeys(question for each in answers for question in each))
-    rows = [[question, *(shown_value(each.get(question)) for each in answers)] for question in questions]
-    return Table("comparison", "Side by side", ["", *(source.name for source in sources)], rows)
+    return {question: [each.get(question) for each in answers] for question in questions}
 
 
-def comparison_page(sources: Sequence[Source]) -> str:
+def comparison(names: Sequence[str], found: Mapping[str, Sequence[object]]) -> Table:
+    """A row a question, a column a campaign.
+
+    Args:
+        names: of the campaigns.
+        found: what they answer.
+    """
+    rows = [[question, *(shown_value(value) for value in values)] for question, values in found.items()]
+    return Table("comparison", "Side by side", ["", *names], rows)
+
+
+def comparison_page(table: Table) -> str:
     """The same as one page of HTML.
 
     Args:
-        sources: at least one.
+        table: of the campaigns.
 
     Raises:
         NotAvailable: Jinja2 is missing.
     """
-    title = " against ".join(source.name for source in sources)
     text: str = (
         templates()
         .get_template("compare.html")
-        .render(title=title, table=comparison(sources), version=_core.__version__)
+        .render(title=" against ".join(table.head[1:]), table=table, version=_core.__version__)
     )
     return text
 

@@ -1,0 +1,27 @@
+"""What a verb says at its end: a sentence for a person, or one JSON object for a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import click
+
+from twinloop.faces.result import to_json
+from twinloop.faces.terminal import is_utf_8
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+
+
+def answer(facts: Mapping[str, object], sentence: str, as_json: bool, err: bool = False) -> None:
+    """Prints what was done.
+
+    Args:
+        facts: for a program.
+        sentence: for a person.
+        as_json: which of the two.
+        err: whether the sentence goes to standard error, where the verb's own output is a file or a table.
+    """
+    if as_json:
+        click.echo(to_json(facts, ascii_only=not is_utf_8()), nl=False)
+    else:
+        click.echo(sentence, err=err)
