@@ -1,6 +1,7 @@
 """The command line as a person calls it, in this process and in one of its own."""
 
 import json
+import signal
 import subprocess
 import sys
 
@@ -13,6 +14,11 @@ def twinloop_command(*arguments, **how):
     return subprocess.run(
         [sys.executable, "-m", "twinloop", *arguments], capture_output=True, text=True, timeout=120, **how
     )
+
+
+def hearing_ctrl_c():
+    """To be called in a new process: whoever started the tests in the background has them, and theirs, ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def invoke(*arguments):

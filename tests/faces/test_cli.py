@@ -11,7 +11,7 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 
 import twinloop
-from command import invoke, same_but_for_run_info, twinloop_command
+from command import hearing_ctrl_c, invoke, same_but_for_run_info, twinloop_command
 
 PAPER = ["run", "quadrotor", "--preset", "paper"]
 SMALL = [*PAPER, "--generations", "30", "--experiments", "2", "--set", "model_population=40"]
@@ -370,8 +370,7 @@ def test_ctrl_c_and_sigterm_end_with_130_and_the_best_so_far(tmp_path, sent):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        # A shell may have started us with SIGINT ignored, which children inherit.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        preexec_fn=hearing_ctrl_c,
     )
     try:
         for line in working.stderr:  # until the models are being learnt
@@ -392,7 +391,7 @@ def test_ctrl_c_and_sigterm_end_with_130_and_the_best_so_far(tmp_path, sent):
 
 @pytest.mark.parametrize("finished", [0, 1])
 def test_ctrl_c_under_default_shows_the_best_so_far_if_there_is_any(monkeypatch, finished):
-    learn, calls = twinloop.campaign.identify_and_plan.method.identify_runs, []
+    learn, calls = twinloop.campaign.identify_and_plan.learning.identify_runs, []
 
     def interrupted(*arguments, **how):
         calls.append(1)
@@ -400,7 +399,7 @@ def test_ctrl_c_under_default_shows_the_best_so_far_if_there_is_any(monkeypatch,
             raise KeyboardInterrupt
         return learn(*arguments, **how)
 
-    monkeypatch.setattr("twinloop.campaign.identify_and_plan.method.identify_runs", interrupted)
+    monkeypatch.setattr("twinloop.campaign.identify_and_plan.learning.identify_runs", interrupted)
     done = invoke(*QUICK, "--json")
     assert done.exit_code == 130
     if not finished:

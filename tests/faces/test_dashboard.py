@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from command import hearing_ctrl_c
 from conftest import PENDULUM_GAINS
 from dashboards import begun, call, flight, look, served
 from lives import PLANT, stored
@@ -183,7 +184,7 @@ def test_ctrl_c_ends_it_without_a_word(store):
     """It is the way to end it, and no failure."""
     process = subprocess.Popen(
         [sys.executable, "-m", "twinloop", "dashboard", str(store), "--port", "0"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hearing_ctrl_c,
     )  # fmt: skip
     address = process.stdout.readline().split()[1]
     for _ in range(200):

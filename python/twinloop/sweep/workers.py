@@ -116,7 +116,8 @@ def _client(cluster: Any) -> Iterator[Client]:
                     n_workers=count,
                     threads_per_worker=1,
                     host="127.0.0.1",
-                    dashboard_address=None,
+                    # Dask's own page on any free port: of its usual one a second sweep is warned on standard error.
+                    dashboard_address="127.0.0.1:0",
                     memory_limit=None,
                     silence_logs=logging.CRITICAL,
                 )
