@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+import sympy
 
 import twinloop as tl
 from late_sensors import BODY, DT, PENDULUM
@@ -169,3 +170,25 @@ def test_sensors_in_time_read_every_state_as_it_is():
     assert names["readings"]([[0.1, 0.2], [0.3, 0.4]]) == [[0.1, 0.2], [0.3, 0.4]]
     assert "_read" not in twin_of(["r4 = r2 * 11.0"]).export("c", force=True)
     assert written.layout(twin_of(["r7 = r6 * 2.0"], signals=TURNING_BODY, inputs=7).law, False)
+
+
+@pytest.mark.parametrize("periods", [1.6, -0.2])
+def test_sympy_and_latex_write_what_a_late_sensor_reads_as_an_equation(periods):
+    twin = late_twin("a chain of three", periods)
+    names = {}
+    exec(twin.export("sympy", force=True), names)
+    t, read = names["t"], names["READ"]
+    latex = twin.export("latex", force=True)
+    late = [(i, offset) for i, offset in enumerate(twin.law.offsets) if offset]
+    assert len(read) == len(late) > 0
+    for i, offset in late:
+        name = twin.signals.state_names[i]
+        moment = sympy.Symbol("moment")
+        # A sensor that is late by some time gives at any moment what was that long before.
+        (given,) = [value for state, value in read.items() if str(state) == name]
+        assert float(moment - given.subs(t, moment).args[0]) == pytest.approx(offset, rel=1e-15)
+        assert (
+            rf"\mathit{{{name}}}_{{\mathrm{{read}}}}(t) &= \mathit{{{name}}}(t {'-' if offset > 0 else '+'} "
+            in latex
+        )
+    assert latex.count("{") == latex.count("}")

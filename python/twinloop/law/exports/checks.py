@@ -100,6 +100,9 @@ def _numbers(values: list[float]) -> SimpleNamespace:
         return [next(remaining) for _ in names.split()]
 
     return SimpleNamespace(
+        # What late sensors read has a time, and no number here.
+        Symbol=lambda name, real: 0.0,
+        Function=lambda name, real: float,
         symbols=symbols,
         Matrix=list,
         Abs=abs,

@@ -19,7 +19,7 @@ SYMPY = Dialect({
 })  # fmt: skip
 
 
-TAKEN = ("sp", "STATES", "COMMANDS", "HIDDEN", "EQUATIONS")
+TAKEN = ("sp", "STATES", "COMMANDS", "HIDDEN", "EQUATIONS", "READ", "t")
 """Names of the script's own."""
 
 
@@ -31,7 +31,8 @@ def sympy_source(law: Law) -> str:
 
     Returns:
         Python that leaves `STATES`, `COMMANDS` (in units of their scales), `HIDDEN` and `EQUATIONS`, a matrix with the
-        derivative of each state, or with what the form of the twin says. Divisions are plain ones.
+        derivative of each state, or with what the form of the twin says; where sensors are late or early also `READ`,
+        by state what its sensor gives at the time `t`. Divisions are plain ones.
     """
     roots = equation_roots(law)
     symbols = [f"{symbol}_" if symbol in TAKEN else symbol for symbol in law.symbols]
@@ -65,7 +66,17 @@ def sympy_source(law: Law) -> str:
         *(f"    {joined(writer.terms(root), between)}," for root in roots),
         "])",
     ]
+    late = _late(law)
+    if late:
+        lines.append('t = sp.Symbol("t", real=True)')
+        read = (f"{symbols[i]}: sp.Function({symbols[i]!r}, real=True)(t - {offset!r})" for i, offset in late)
+        lines.append(f"READ = {{{', '.join(read)}}}")
     return "\n".join(lines) + "\n"
+
+
+def _late(law: Law) -> list[tuple[int, float]]:
+    """States that are read later or earlier than those that the law drives, and by how much, s."""
+    return [(i, offset) for i, offset in enumerate(law.offsets) if offset != 0.0]
 
 
 def _latex_number(value: float, digits: int) -> str:
@@ -100,7 +111,7 @@ def latex_source(law: Law, digits: int = 6) -> str:
         digits: significant digits of constants.
 
     Returns:
-        An `align*` environment of amsmath with an equation a state.
+        An `align*` environment of amsmath with an equation a state, and one for each that is read late or early.
     """
     target = Expressions()
     for place in range(law.inputs):
@@ -134,6 +145,10 @@ def latex_source(law: Law, digits: int = 6) -> str:
                 right = f"{symbol} - {right[1:]}" if right.startswith("-") else f"{symbol} + {right}"
         lines.append(rf"  {left} &= {right}")
     lines = [re.sub(r"\bt_([0-9]+)", r"t_{\1}", line) for line in lines]
+    for place, offset in _late(law):
+        symbol, shift = latex_name(law.signals.state_names[place]), _latex_number(abs(offset), digits)
+        sign = "-" if offset > 0.0 else "+"
+        lines.append(rf"  {symbol}_{{\mathrm{{read}}}}(t) &= {symbol}(t {sign} {shift}\,\mathrm{{s}})")
     notes = "".join(f"% {note}\n" for note in _notes(law, digits))
     return notes + "\\begin{align*}\n" + " \\\\\n".join(lines) + "\n\\end{align*}\n"
 
