@@ -49,7 +49,7 @@ def chosen(
         experiments=runs, tests=[FLOWN], setup=SimpleNamespace(signals=SIGNALS),
         of_task=lambda genes, number: tl.Test(FAMILY, genes, np.zeros(2), np.array([1.0, 0.0]), 20, number=number),
     )  # fmt: skip
-    planner = SimpleNamespace(family=FAMILY, judge=judge, lasting=lambda members, genes: members)
+    planner = SimpleNamespace(family=FAMILY, judge=judge, stable_members=lambda members, genes: members)
     choice = Choice(planner, Committee([None], np.zeros(2), trusted), book, 4, confidence)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,

@@ -199,7 +199,7 @@ def test_what_was_identified_comes_back_and_is_learnt_on_from_with_the_same_bits
 
     def learn(known, iteration):
         return identify_runs(
-            runs[:iteration], pendulum_signals, options, iteration=iteration, known=known, workers=WORKERS
+            runs[:iteration], pendulum_signals, options, iteration=iteration, earlier=known, workers=WORKERS
         )
 
     identified = learn(None, 1)

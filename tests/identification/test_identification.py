@@ -661,7 +661,7 @@ def test_what_was_learnt_before_is_not_changed_and_the_same_bits_come_again():
     first = identify_runs(runs[:1], signals, options, workers=WORKERS, iteration=1)
     before = (len(first.pool), first.model.constants, dict(first.sums[0].weights))
     later = [
-        identify_runs(runs, signals, options, workers=workers, iteration=2, known=first)
+        identify_runs(runs, signals, options, workers=workers, iteration=2, earlier=first)
         for workers in (WORKERS, _core.Workers(threads=2), WORKERS)
     ]
     assert len(first.pool) == before[0] and dict(first.sums[0].weights) == before[2]

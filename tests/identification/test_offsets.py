@@ -96,7 +96,7 @@ def test_what_was_found_is_kept_once_there_are_many_runs():
     runs = [read(swinging, PENDULUM, seed, 0.3 * DT) for seed in range(5)]
     first = learnt(runs[:2], PENDULUM)
     options = options_of("default", FAST)
-    later = identify_runs(runs, PENDULUM, options, workers=WORKERS, iteration=2, known=first)
+    later = identify_runs(runs, PENDULUM, options, workers=WORKERS, iteration=2, earlier=first)
     assert same_bits(later.offsets, first.offsets)
 
 

@@ -34,11 +34,18 @@ QUICK = {"moves": 2000, "starts": 2, "generations": 2, "population": 30, "commit
 NAMES = [proposal.__name__ for proposal in PROPOSALS]
 
 
-def context_of(signals, runs, rests=(), known=None, watch=None, **changes):
+def context_of(signals, runs, rests=(), earlier=None, watch=None, **changes):
     options = options_of("default", {**QUICK, **changes})
     said = [] if watch is None else watch
     return Context(
-        runs, signals, options, Unit(3, (len(runs),)), WORKERS, rests=rests, known=known, watch=said.append
+        runs,
+        signals,
+        options,
+        Unit(3, (len(runs),)),
+        WORKERS,
+        rests=rests,
+        earlier=earlier,
+        watch=said.append,
     )
 
 
@@ -171,13 +178,13 @@ def test_what_was_known_is_a_start_of_its_own_that_changes_no_other():
         runs[:2], signals, options, rests=[np.ones(2)], seed=3, iteration=2, workers=WORKERS
     )
     assert known.model.form == "acceleration" and known.actuation.hidden
-    context = context_of(signals, runs, rests=[np.ones(2)], known=known)
+    context = context_of(signals, runs, rests=[np.ones(2)], earlier=known)
     before = copied(known)
     one, two = (start() for start in starts(context, "acceleration"))
     assert same(known, before)
     assert one.fit is None and one.actuation.hidden == () and two.start == RENEWED
     assert two.evidence.stable and two.actuation.hidden
-    assert len(starts(replace(context, known=None), "acceleration")) == 1
+    assert len(starts(replace(context, earlier=None), "acceleration")) == 1
     # The order in which they are searched does not matter, for they share nothing that changes.
     late = end_of(context, two)
     assert same(end_of(context, one).best, end_of(context, one).best)

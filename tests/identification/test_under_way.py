@@ -28,7 +28,7 @@ def with_a_hidden_state():
 def learnt(signals, runs, rests, known, **more):
     options = options_of("default", QUICK)
     return identify_runs(
-        runs, signals, options, rests=rests, seed=3, iteration=len(runs), known=known,
+        runs, signals, options, rests=rests, seed=3, iteration=len(runs), earlier=known,
         workers=_core.Workers(1), **more,
     )  # fmt: skip
 

@@ -74,10 +74,10 @@ def advice(twin: Twin, setup: Setup, lessons: Sequence[Lesson], best: Test | Non
     )
 
 
-def foretold(best: Test, experiments: Sequence[Experiment]) -> tuple[float | None, float | None]:
+def predicted_quality(best: Test, experiments: Sequence[Experiment]) -> tuple[float | None, float | None]:
     """The quality that was predicted of a controller, and its spread.
 
-    Where its flight was foretold, that is what was said before it: what a twin makes of a flight that it has learnt is
+    Where its flight was predicted, that is what was said before it: what a twin makes of a flight that it has learnt is
     no prediction. Elsewhere it is what the twin says now.
 
     Args:

@@ -25,20 +25,20 @@ class Use:
         name: of the state.
         unit: of it.
         envelope: between which it is safe; None: nothing is declared.
-        foretold: least and largest value of the predicted band.
+        predicted: least and largest value of the predicted band.
         flown: least and largest reading of all flights.
     """
 
     name: str
     unit: str
     envelope: tuple[float, float] | None
-    foretold: tuple[float, float]
+    predicted: tuple[float, float]
     flown: tuple[float, float]
 
     @property
     def beyond_flown(self) -> bool:
         """Whether it leads where nobody has flown."""
-        return self.foretold[0] < self.flown[0] or self.foretold[1] > self.flown[1]
+        return self.predicted[0] < self.flown[0] or self.predicted[1] > self.flown[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ def _uses(experiments: tuple[Experiment, ...], step: Trajectory) -> tuple[Use, .
                 name=state.name,
                 unit=state.unit,
                 envelope=state.envelope,
-                foretold=(float(low[:, i].min()), float(high[:, i].max())),
+                predicted=(float(low[:, i].min()), float(high[:, i].max())),
                 flown=(min(float(x.min()) for x in flown), max(float(x.max()) for x in flown)),
             )
         )
@@ -143,7 +143,7 @@ def _not_tested(
         f"Other starts and targets than the task's, and flights longer than {best.steps * signals.dt:g} s."
     )
     said += [
-        f"{use.name} is foretold between {use.foretold[0]:.3g} and {use.foretold[1]:.3g} {use.unit}, and was flown"
+        f"{use.name} is predicted between {use.predicted[0]:.3g} and {use.predicted[1]:.3g} {use.unit}, and was flown"
         f" between {use.flown[0]:.3g} and {use.flown[1]:.3g}: the twin goes on from its equations there."
         for use in uses
         if use.beyond_flown

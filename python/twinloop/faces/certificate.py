@@ -12,7 +12,7 @@ import numpy as np
 from twinloop import __version__
 from twinloop.autopilots import Autopilot
 from twinloop.campaign import Campaign
-from twinloop.campaign.assessment import foretold
+from twinloop.campaign.assessment import predicted_quality
 from twinloop.campaign.certificate import Certificate
 from twinloop.errors import NotAvailable
 from twinloop.faces.figures.figure import Band, Line, Mark, Panel
@@ -73,7 +73,7 @@ def facts(
         "autopilot": None,
     }
     if best is not None and found.step is not None:
-        predicted, spread = foretold(best, found.experiments)
+        predicted, spread = predicted_quality(best, found.experiments)
         result["prediction"] = {
             "kind": quality.kind,
             "unit": quality_unit(quality),

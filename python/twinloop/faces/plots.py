@@ -144,7 +144,7 @@ def _qualities(axes: Any, campaign: Campaign, label: str) -> None:
         color=TWIN, marker="D", markersize=4.5, linestyle="none", capsize=3.0, label="predicted ± spread",
     )  # fmt: skip
     best = controller_to_fly(campaign)[0]
-    expected = None if best is None else assessment.foretold(best, campaign.experiments)[0]
+    expected = None if best is None else assessment.predicted_quality(best, campaign.experiments)[0]
     if expected is not None and math.isfinite(expected):
         axes.axhline(expected, color=TWIN, linewidth=0.8, linestyle=":", label="controller to fly, predicted")
     axes.set_xlabel("test")

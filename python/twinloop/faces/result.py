@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.campaign.assessment import disturbances, expected_quality, foretold
+from twinloop.campaign.assessment import disturbances, expected_quality, predicted_quality
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
 from twinloop.law.accuracy import TestErrors
@@ -106,7 +106,7 @@ def _quality(quality: Quality) -> dict[str, object]:
 
 def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, object]:
     bounds = campaign.family.at_bounds(best.genes)
-    predicted, spread = foretold(best, campaign.experiments)
+    predicted, spread = predicted_quality(best, campaign.experiments)
     found: dict[str, object] = {
         "test": best.number,
         "gains": [

@@ -31,7 +31,7 @@ class Context:
         unit: of work; what is drawn for a hypothesis is a part of it.
         workers: how the work is carried out.
         rests: commands whose effect may be there at the start of a run (n_u,).
-        known: what was learnt from fewer runs.
+        earlier: what was learnt from fewer runs.
         watch: called with each step that begins.
         as_integrated: whether chains on increments bear what integration leaves, too: where forms are compared, what a
             derivative could not show is no evidence for them.
@@ -43,7 +43,7 @@ class Context:
     unit: Unit
     workers: _core.Workers
     rests: Sequence[Floats] = ()
-    known: Identified | None = None
+    earlier: Identified | None = None
     watch: Watch = unwatched
     as_integrated: bool = False
 
@@ -55,7 +55,7 @@ class Context:
     @property
     def settled(self) -> bool:
         """Whether form, lags, delays and offsets that are known are searched no more; lags are tuned all the same."""
-        return self.known is not None and len(self.runs) > SEARCHED_ANEW
+        return self.earlier is not None and len(self.runs) > SEARCHED_ANEW
 
     @property
     def may_lag(self) -> bool:
@@ -69,9 +69,9 @@ class Context:
 
     def under(self, form: str) -> Context:
         """The same once a form is believed: what was known under another one is no help."""
-        known = self.known if self.known is not None and self.known.model.form == form else None
-        return replace(self, known=known)
+        earlier = self.earlier
+        return replace(self, earlier=earlier if earlier is not None and earlier.model.form == form else None)
 
     def brief(self, runs: Sequence[Run]) -> Context:
         """The same for a short look at some runs, of which nothing is known."""
-        return replace(self, runs=runs, options=self.options.brief(), known=None, watch=unwatched)
+        return replace(self, runs=runs, options=self.options.brief(), earlier=None, watch=unwatched)

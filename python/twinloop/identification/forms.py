@@ -95,8 +95,8 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
         The form, and a remark where there was a choice.
     """
     forms = candidates(context.options, context.signals, context.runs)
-    if context.known is not None and context.settled and context.known.model.form in forms:
-        forms = (context.known.model.form,)
+    if context.earlier is not None and context.settled and context.earlier.model.form in forms:
+        forms = (context.earlier.model.form,)
     if len(forms) == 1:
         return forms[0], []
     context.watch("form")

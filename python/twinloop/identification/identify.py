@@ -82,7 +82,7 @@ def identify_runs(
     rests: Sequence[Floats] = (),
     seed: int = 0,
     iteration: int = 0,
-    known: Identified | None = None,
+    earlier: Identified | None = None,
     workers: _core.Workers,
     watch: Watch = unwatched,
     under_way: UnderWay | None = None,
@@ -97,7 +97,7 @@ def identify_runs(
         rests: commands whose effect may be there at the start of a run (n_u,).
         seed: of the campaign.
         iteration: of the campaign, which tells its random numbers from those of others.
-        known: what was learnt from fewer runs; its terms are candidates again.
+        earlier: what was learnt from fewer runs; its terms are candidates again.
         workers: how the work is carried out.
         watch: called with each step that begins.
         under_way: what was kept of the same identification, from where it goes on; None: it begins.
@@ -108,7 +108,14 @@ def identify_runs(
     """
     continued = [run.continued(signals) for run in runs]
     context = Context(
-        continued, signals, options, Unit(seed, (iteration,)), workers, rests=rests, known=known, watch=watch
+        continued,
+        signals,
+        options,
+        Unit(seed, (iteration,)),
+        workers,
+        rests=rests,
+        earlier=earlier,
+        watch=watch,
     )
     if under_way is None:
         context = cleaned(context)

@@ -47,6 +47,7 @@ class IdentificationOptions:
         noise_from_above: whether the noise is also searched from the largest that could be, so that the strongest terms
             come first, rather than only from what all terms together leave.
         gusts: whether disturbances may last, as gusts do, rather than be white.
+        price_disturbances: whether correlated disturbances that explain less than they cost are dropped in the end.
         implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
             masses.
         lags: whether lags and delays of the actuators are searched.
@@ -79,6 +80,7 @@ class IdentificationOptions:
     most_terms: int = 450
     noise_from_above: bool = True
     gusts: bool = True
+    price_disturbances: bool = True
     implicit: bool = True
     lags: bool = True
     longest_delay: int = 2

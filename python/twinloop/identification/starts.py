@@ -37,7 +37,7 @@ def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:
         form: what outputs mean.
     """
     aligned = cache(lambda: with_offsets(context, begun(context, form, _first_pool(context), ANEW)))
-    known = context.known
+    known = context.earlier
     if known is None or not known.actuation.hidden:
         return (lambda: anew(context, aligned()),)
     # What is hidden shows when terms are nearly right, and these when it shows.
@@ -71,7 +71,7 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
 
 def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     """The hypothesis with runs as they would have been read had all sensors been read at once."""
-    signals, runs, known = context.signals, context.runs, context.known
+    signals, runs, known = context.signals, context.runs, context.earlier
     offsets = hypothesis.offsets
     if context.options.offsets and known is not None and context.settled:
         offsets = known.offsets
@@ -86,7 +86,7 @@ def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
 
 def anew(context: Context, aligned: Hypothesis) -> Hypothesis:
     """Noise and terms searched anew, with lags as they were known to begin with."""
-    known = context.known
+    known = context.earlier
     if known is None:
         return from_both_sides(context, aligned)
     sums = [_without_hidden(found, aligned.pool) for found in known.sums]
@@ -108,13 +108,15 @@ def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothe
 def _first_pool(context: Context) -> Pool:
     """A pool of the search's own: what it enters must not change what was known."""
     signals = context.signals
-    if context.known is not None:
-        return context.known.pool.copy()
+    if context.earlier is not None:
+        return context.earlier.pool.copy()
     return Pool(signals.n_x + signals.n_u, len(context.options.operators))
 
 
 def _known_terms(context: Context) -> Sequence[int]:
-    return [] if context.known is None else [node for found in context.known.sums for node in found.weights]
+    return (
+        [] if context.earlier is None else [node for found in context.earlier.sums for node in found.weights]
+    )
 
 
 def _without_hidden(found: Sum, pool: Pool) -> Sum | None:

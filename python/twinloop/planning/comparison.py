@@ -122,7 +122,7 @@ class Comparison:
         self.drafts, self.flown, self.wanted = drafts, flown, wanted
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
         # A member that blows up whatever is flown is no member (E-SINDy).
-        self.members = judge.lasting(committee.members, genes, excitation, ends)
+        self.members = judge.stable_members(committee.members, genes, excitation, ends)
         self.quiet = judge.judge(self.members, genes, committee.sds, 1, excitation, ends)
         # Differences below these are rounding.
         smallest = np.array([1e-6 * state.scale for state in judge.signals.states])

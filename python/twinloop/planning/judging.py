@@ -65,7 +65,7 @@ class Judged:
         return lost
 
     @property
-    def lasting(self) -> Judged:
+    def finite(self) -> Judged:
         """The flights that do not diverge, with zeros for those that do."""
         lasts = np.isfinite(self.qualities)
         return Judged(np.where(lasts, self.qualities, 0.0), np.where(lasts, self.usages, 0.0))
@@ -161,7 +161,7 @@ class Judge:
         )  # fmt: skip
         return Judged(values, usages)
 
-    def lasting(
+    def stable_members(
         self,
         members: Sequence[_core.Model],
         genes: Floats,

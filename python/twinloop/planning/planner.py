@@ -101,7 +101,7 @@ class Planner(Judge):
 
         def score(genes: Floats) -> Floats:
             judged = self.judge(members, genes, sds, draws)
-            lasts = judged.lasting
+            lasts = judged.finite
             mean = lasts.qualities.sum(axis=(0, 1)) / np.maximum(
                 1, np.isfinite(judged.qualities).sum(axis=(0, 1))
             )

@@ -91,7 +91,7 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
         wide = last.inside >= INSIDE
         yield Check(
             "band", "twin", last.inside, INSIDE, wide, True,
-            f"{100.0 * last.inside:.0f} % of the readings of {which} were inside the band that was foretold for 90 % of"
+            f"{100.0 * last.inside:.0f} % of the readings of {which} were inside the band predicted for 90 % of"
             f" them; at least {100.0 * INSIDE:.0f} % are asked for.",
         )  # fmt: skip
     miss = found.last_miss

@@ -64,7 +64,7 @@ def share_of(planner: Planner, committee: Committee, test: Test, draws: int) -> 
     if test.excitation is None:
         return 1.0
     genes, excitation = test.genes[np.newaxis], test.excitation[np.newaxis]
-    members = planner.lasting(committee.members, genes, excitation)
+    members = planner.stable_members(committee.members, genes, excitation)
     alone = planner.judge(members, genes, committee.sds, draws, measured=True)
     excited = planner.judge(
         members, genes, committee.sds, draws, excitation, measured=True, hold_back=test.hold_back

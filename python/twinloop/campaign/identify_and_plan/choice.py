@@ -58,7 +58,7 @@ class Choice:
         """
         flown = best if best is not None and standing.finishes(self.book, best.number) else None
         genes = np.stack([tuned] if flown is None else [tuned, flown.genes])
-        members = self.planner.lasting(self.committee.members, genes)
+        members = self.planner.stable_members(self.committee.members, genes)
         judged = self._judge(members, genes)
         recorded = self._judge(members, genes, measured=True).qualities
         refused = self._refused(members, judged, tuned)

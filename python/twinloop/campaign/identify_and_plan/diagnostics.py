@@ -28,7 +28,7 @@ LITTLE = 0.02
 """Share of their bounds by which commands may differ whatever they do."""
 
 
-def doubts(
+def diagnostics_of(
     experiments: Sequence[Experiment],
     signals: Signals,
     follows: bool,

@@ -84,7 +84,7 @@ def following(
     return Following(free, lasted, frozen)
 
 
-def foretold(
+def expected_misses(
     model: _core.Model,
     flights: Sequence[Experiment],
     noise: Noise,

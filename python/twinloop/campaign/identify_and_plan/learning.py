@@ -10,8 +10,8 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Lesson
-from twinloop.campaign.identify_and_plan.diagnostics import doubts, other_commands
-from twinloop.campaign.identify_and_plan.following import Following, following, foretold, unexplained
+from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, other_commands
+from twinloop.campaign.identify_and_plan.following import Following, expected_misses, following, unexplained
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.selection import learnt_from
@@ -78,7 +78,7 @@ class Learner:
     def _identified(
         self,
         book: Logbook,
-        known: Identified | None,
+        earlier: Identified | None,
         under_way: UnderWay | None,
         keep: Callable[[UnderWay], None],
     ) -> Identified:
@@ -90,7 +90,7 @@ class Learner:
             rests=self._rests(),
             seed=self.setup.seed,
             iteration=len(book.experiments),
-            known=known,
+            earlier=earlier,
             workers=self.workers,
             watch=self.watch,
             under_way=under_way,
@@ -120,7 +120,7 @@ class Learner:
             Unit(self.setup.seed).part(len(book.experiments), 1),
         )
         model, limits = identified.members[0], self.setup.limits
-        expected = foretold(model, book.experiments, noise, unit, limits, self.workers)
+        expected = expected_misses(model, book.experiments, noise, unit, limits, self.workers)
         missed: list[float] = unexplained(followed.free[0], followed.frozen, expected).tolist()
         return missed
 
@@ -149,7 +149,7 @@ class Learner:
             follows=follows,
             remarks=(
                 *identified.remarks,
-                *doubts(
+                *diagnostics_of(
                     book.experiments,
                     self.setup.signals,
                     follows

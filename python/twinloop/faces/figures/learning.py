@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from twinloop.campaign.assessment import foretold
+from twinloop.campaign.assessment import predicted_quality
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Cells, Figure, Level, Line, Mark, Panel, Spans
 from twinloop.faces.figures.units import said, words
@@ -82,7 +82,7 @@ def qualities(found: Examination) -> Figure | None:
         ),
     ]
     best = found.best
-    predicted = None if best is None else foretold(best, found.experiments)[0]
+    predicted = None if best is None else predicted_quality(best, found.experiments)[0]
     if predicted is not None and math.isfinite(predicted):
         marks.append(Level(predicted, "target", "controller to fly, predicted"))
     most = max([q for _, q in flown] + [q + 2 * s for _, q, s in predictions] + [0.0])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from twinloop import _core
-from twinloop.campaign.assessment import foretold
+from twinloop.campaign.assessment import predicted_quality
 from twinloop.campaign.examination.checking import checks
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.page import templates
@@ -81,7 +81,7 @@ def _answers(source: Source) -> list[Row]:
     ]
     rows.append(("controller", "none" if best is None else f"test {best.number}"))
     if best is not None:
-        predicted, spread = foretold(best, found.experiments)
+        predicted, spread = predicted_quality(best, found.experiments)
         rows += [
             ("quality predicted (less is better)", predicted),
             ("± spread", spread),

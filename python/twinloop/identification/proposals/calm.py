@@ -25,7 +25,7 @@ def calm(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     What is left of a law that is right is white. A disturbance that may have any size and any memory explains a little
     of that by luck, and the noise under which the readings are most likely nearly always holds one.
     """
-    if hypothesis.fit is None or not hypothesis.fit.stable:
+    if not context.options.price_disturbances or hypothesis.fit is None or not hypothesis.fit.stable:
         return
     context.watch("disturbances")
     problem = posed(context, hypothesis)

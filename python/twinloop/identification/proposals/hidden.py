@@ -94,7 +94,9 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
 def with_hidden(context: Context, candidates: Candidates) -> Candidates:
     """The candidates with terms of a hidden state on the first rung, and with those that were known of it."""
     grown = candidates.growing()
-    known = [] if context.known is None else [node for found in context.known.sums for node in found.weights]
+    known = (
+        [] if context.earlier is None else [node for found in context.earlier.sums for node in found.weights]
+    )
     return grown.with_terms([*filled(grown.pool), *(node for node in known if grown.pool.is_hidden(node))])
 
 
@@ -119,7 +121,9 @@ def enter_directions(pool: Pool, found: Sequence[Direction]) -> None:
 
 def _known(context: Context, hypothesis: Hypothesis) -> tuple[HiddenState, ...]:
     """Hidden states that were found before."""
-    return hypothesis.actuation.hidden or (() if context.known is None else context.known.actuation.hidden)
+    return hypothesis.actuation.hidden or (
+        () if context.earlier is None else context.earlier.actuation.hidden
+    )
 
 
 def _unit(context: Context, hypothesis: Hypothesis) -> Unit:

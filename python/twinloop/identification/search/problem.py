@@ -102,7 +102,7 @@ class Problem:
             return _core.Regression(len(states), self.dt, chain.integrated, records)
 
     def feedthrough(self, chain: Chain, terms: Sequence[int]) -> Floats:
-        """How much of a reading's noise terms give back within the period that the reading ends.
+        """Share of a reading's noise that each term has in the prediction of the same reading.
 
         Args:
             chain: whose first state is read; it is the integral of the terms.

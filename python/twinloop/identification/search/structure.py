@@ -33,11 +33,11 @@ FEW_RUNS = 5
 """Runs up to which each is taken to tell something of its own."""
 RESEMBLANCE = 0.75
 """Power with which prices rise from there on; with 1, no weak term that is true would be found by flying on."""
-GIVEN_BACK = 0.25
-"""Share of a reading's noise from which a law is taken to explain it with itself: nothing that can be flown grows by
-half, of itself, in a period."""
-GIVEN_BACK_PRICES = (1e2, 1e3, 1e4, 1e5, 1e6)
-"""What giving back all of a reading's noise is made to cost, a reading, in units of χ²."""
+MOST_FEEDTHROUGH = 0.25
+"""Share of a reading's noise in its own prediction from which a law is taken to explain the noise with itself: nothing
+that can be flown grows by half, of itself, in a period."""
+FEEDTHROUGH_PRICES = (1e2, 1e3, 1e4, 1e5, 1e6)
+"""What a feedthrough of 1 is made to cost, a reading, in units of χ²."""
 RUNG = 20.0
 """What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
 
@@ -195,9 +195,9 @@ def _chosen(
     costs: Sequence[Floats],
     walk: Walk,
 ) -> list[list[Judged]]:
-    """For each chain what walks find and what was known, the best first; none that gives a reading's noise back.
+    """For each chain what walks find and what was known, the best first; none that predicts a reading by its own noise.
 
-    A law that gives a share J of a reading's noise back within the period that the reading ends leaves (1 − J) of it:
+    Where a share J of a reading's noise is in the prediction of the same reading, the law leaves (1 − J) of that noise:
     it explains the noise with itself. Runs under one and the same controller offer such laws, for their commands are
     sums of readings, and what tells the sum of all readings from that of all but the last is the last. Where one is
     found, walks are repeated in which J costs something, and more until they find laws without.
@@ -207,19 +207,19 @@ def _chosen(
     posed = list(zip(chains, known, grams, walks, costs, strict=True))
     subsets = [_best_subsets(problem, usable, place, *of_chain) for of_chain in posed]
     for i, (chain, sum_, gram, _, cost) in enumerate(posed):
-        if not chain.integrated or _given_back(problem, chain, usable, subsets[i][0]) <= GIVEN_BACK:
+        if not chain.integrated or _feedthrough(problem, chain, usable, subsets[i][0]) <= MOST_FEEDTHROUGH:
             continue
         rows = problem.feedthrough(chain, usable)
-        for attempt, price in enumerate(GIVEN_BACK_PRICES):
+        for attempt, price in enumerate(FEEDTHROUGH_PRICES):
             with engine_input():
                 dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
-                (walked,) = walk([dear], [cost], 1 + i * len(GIVEN_BACK_PRICES) + attempt)
+                (walked,) = walk([dear], [cost], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
             # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
             found = [
                 law
                 for of in (gram, dear)
                 for law in _best_subsets(problem, usable, place, chain, sum_, of, walked, cost)
-                if _given_back(problem, chain, usable, law) <= GIVEN_BACK
+                if _feedthrough(problem, chain, usable, law) <= MOST_FEEDTHROUGH
             ]
             if found:
                 subsets[i] = found
@@ -227,8 +227,8 @@ def _chosen(
     return subsets
 
 
-def _given_back(problem: Problem, chain: Chain, usable: Sequence[int], judged: Judged) -> float:
-    """Share of a reading's noise that a law gives back within the period that the reading ends."""
+def _feedthrough(problem: Problem, chain: Chain, usable: Sequence[int], judged: Judged) -> float:
+    """Share of a reading's noise that is in a law's prediction of the same reading."""
     subset, _, weights = judged
     if not subset:
         return 0.0
@@ -273,7 +273,7 @@ def _noisy(
     chains: Sequence[Chain],
     used: Sequence[int],
 ) -> list[Chain]:
-    """The chains with the noise under which what is left is most likely, and the freedom that was used given back."""
+    """The chains with the noise under which residuals are most likely, corrected for the degrees of freedom used."""
     posed = [
         (
             regression,

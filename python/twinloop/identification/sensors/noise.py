@@ -16,7 +16,7 @@ from twinloop.identification.records import Run
 from twinloop.identification.search.description import shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.sensors.chains import Chain, Motion
-from twinloop.identification.sensors.coasting import coasted
+from twinloop.identification.sensors.kinematic_steps import kinematic_step
 from twinloop.signals import Signals
 
 GUSTS = (1e-3, 1e-1, 10.0)
@@ -73,7 +73,7 @@ def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chai
         The chain with that noise; as it was where readings are too few.
     """
     (angle,) = chain.states
-    residuals = [(run.states[1:] - coasted(run.states, signals))[:, angle] for run in runs]
+    residuals = [(run.states[1:] - kinematic_step(run.states, signals))[:, angle] for run in runs]
     if sum(len(residual) for residual in residuals) < FEW_READINGS:
         return chain
     # A single wild reading must not be taken for noise.
@@ -140,7 +140,7 @@ def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:
 
 
 def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: bool = True) -> Chain:
-    """The noise that a fit of all terms leaves, with the freedom that it used up given back.
+    """The noise that a fit of all terms leaves, corrected for its degrees of freedom.
 
     Args:
         problem: of the chain.

@@ -18,7 +18,7 @@ from twinloop.errors import engine_input
 from twinloop.identification.records import Run
 from twinloop.identification.search.description import shortest
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.sensors.coasting import coasted, coasting
+from twinloop.identification.sensors.kinematic_steps import kinematic_model, kinematic_step
 from twinloop.identification.sensors.noise import floor_of
 from twinloop.signals import Signals
 
@@ -76,7 +76,9 @@ def _moved(run: Run, signals: Signals, offsets: Floats) -> Run:
             begun[:, others] -= size * shares[others] * slopes[:, others]
         # Back in time, derivatives of odd order have the other sign.
         signs = np.where(orders % 2 == 1, np.sign(size), 1.0)
-        ended = signs * coasting(signals, abs(size)).step(signs * begun, np.zeros((len(states), signals.n_u)))
+        ended = signs * kinematic_model(signals, abs(size)).step(
+            signs * begun, np.zeros((len(states), signals.n_u))
+        )
         states[:, late] = ended[:, late]
     return replace(run, states=states, smooth=states)
 
@@ -185,7 +187,7 @@ def _unexplained(runs: Sequence[Run], signals: Signals, chain: Chain) -> _core.R
         readings = run.states[:, list(chain.states)]
         nothing = np.zeros((len(run.commands), 1))
         if chain.output is None:
-            turned = coasted(run.states, signals) - run.states[:-1]
+            turned = kinematic_step(run.states, signals) - run.states[:-1]
             readings[1:] -= np.cumsum(turned[:, list(chain.states)], axis=0)
         records.append((readings, run.weights[:, list(chain.states)], nothing, nothing, nothing))
     with engine_input():

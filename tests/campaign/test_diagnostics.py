@@ -8,7 +8,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
-from twinloop.campaign.identify_and_plan.diagnostics import distinct, doubts, other_commands
+from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, distinct, other_commands
 from twinloop.campaign.identify_and_plan.following import unexplained
 from twinloop.campaign.identify_and_plan.readings import froze, ratio
 
@@ -37,7 +37,7 @@ def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False, commands
 
 
 def said(*runs, follows=True):
-    return [remark.sentence for remark in doubts(runs, SIGNALS, follows, STEPS)]
+    return [remark.sentence for remark in diagnostics_of(runs, SIGNALS, follows, STEPS)]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003, 0.1])
@@ -90,7 +90,7 @@ def test_where_the_records_show_no_wrong_sign_none_is_looked_for():
 
 
 def remarked(*runs, **found):
-    return [(remark.code, remark.serious) for remark in doubts(runs, SIGNALS, True, STEPS, **found)]
+    return [(remark.code, remark.serious) for remark in diagnostics_of(runs, SIGNALS, True, STEPS, **found)]
 
 
 def test_a_free_run_that_noise_does_not_explain_is_a_serious_remark():
@@ -125,7 +125,7 @@ def test_commands_of_another_controller_are_found(new_campaign, pendulum):
 
 
 def codes(*runs):
-    return [remark.code for remark in doubts(runs, SIGNALS, True, STEPS)]
+    return [remark.code for remark in diagnostics_of(runs, SIGNALS, True, STEPS)]
 
 
 def frozen(x, i=1, row=STEPS // 2):
@@ -136,7 +136,7 @@ def frozen(x, i=1, row=STEPS // 2):
 
 @pytest.mark.parametrize("noise", [0.0, 0.003])
 def test_a_sensor_that_freezes_half_way_is_a_serious_remark(noise):
-    found = doubts([flown(noise=noise, change=frozen)], SIGNALS, True, STEPS)
+    found = diagnostics_of([flown(noise=noise, change=frozen)], SIGNALS, True, STEPS)
     assert ("frozen", True) in [(remark.code, remark.serious) for remark in found]
     assert "angle gives one number" in " ".join(remark.sentence for remark in found)
     back = flown(noise=noise, change=lambda x: np.concatenate([frozen(x, row=60)[:100], x[100:]]))

@@ -1,4 +1,4 @@
-"""Coasting: what states do where nothing drives them, by their declared kinematics alone."""
+"""What states do where nothing drives them, by their declared kinematics alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals
 
 
-def coasting(signals: Signals, dt: float) -> _core.Model:
+def kinematic_model(signals: Signals, dt: float) -> _core.Model:
     """A model whose outputs are nothing.
 
     Args:
@@ -29,7 +29,7 @@ def coasting(signals: Signals, dt: float) -> _core.Model:
         return _core.Model(program, "acceleration", replace(signals, dt=dt).engine)
 
 
-def coasted(states: Floats, signals: Signals) -> Floats:
+def kinematic_step(states: Floats, signals: Signals) -> Floats:
     """What states become a period later by kinematics alone, under the mean of what moves them.
 
     Args:
@@ -47,4 +47,4 @@ def coasted(states: Floats, signals: Signals) -> Floats:
     ]
     begun = states[:-1].copy()
     begun[:, moving] = 0.5 * (states[:-1, moving] + states[1:, moving])
-    return np.asarray(coasting(signals, signals.dt).step(begun, np.zeros((len(begun), signals.n_u))))
+    return np.asarray(kinematic_model(signals, signals.dt).step(begun, np.zeros((len(begun), signals.n_u))))
