@@ -55,7 +55,7 @@ def select(objectives: ArrayLike, count: int) -> Integers:
         Their numbers (count,), best first.
 
     Raises:
-        InvalidInput: not a matrix, a number in it that is not finite, or a count that is none.
+        InvalidInput: not a matrix, a number in it that is not finite, or a count below 1.
     """
     with engine_input():
         return _core.select(_matrix(objectives), whole("Select, count", count))

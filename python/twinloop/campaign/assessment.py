@@ -122,7 +122,7 @@ def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
         lesson: the last one.
 
     Returns:
-        One a state; none by exact readings, of which nothing is told: the least that is believed was held.
+        One a state; none for exact readings: their noise was held at the least that is believed.
     """
     if twin.noise is None or exact(lesson.misfit):
         return ()

@@ -273,7 +273,7 @@ def _near(value: float, reading: float, state: State) -> float:
 
 
 def _extent(curves: Sequence[Any]) -> tuple[float, float]:
-    """Limits that show the real runs; a twin that runs away must not flatten them."""
+    """Limits that show the real runs; a twin that diverges must not flatten them."""
     values = np.concatenate(curves)
     low, high = float(values.min()), float(values.max())
     margin = 0.25 * max(high - low, 1e-3)

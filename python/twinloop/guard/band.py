@@ -46,7 +46,7 @@ class BandWatch:
     ) -> None:
         self.signals = twin.signals
         drawn = twin.drawn(test, DRAWS)
-        assert drawn is not None and twin.noise is not None  # whoever makes a watch has looked
+        assert drawn is not None and twin.noise is not None  # checked where a band is made
         states, noise = drawn
         lasts = np.isfinite(states).all(axis=(1, 2))
         self.sensors = np.maximum(twin.noise.sensors, [1e-9 * state.scale for state in twin.signals.states])

@@ -54,7 +54,7 @@ class Context:
 
     @property
     def settled(self) -> bool:
-        """Whether form, lags, delays and offsets that are known are searched no more; lags are tuned all the same."""
+        """Whether form, lags, delays and offsets are kept as they were learnt earlier; lags are still tuned."""
         return self.earlier is not None and len(self.runs) > SEARCHED_ANEW
 
     @property
@@ -73,5 +73,5 @@ class Context:
         return replace(self, earlier=earlier if earlier is not None and earlier.model.form == form else None)
 
     def brief(self, runs: Sequence[Run]) -> Context:
-        """The same for a short look at some runs, of which nothing is known."""
+        """The same for a short look at some runs, without what was learnt earlier."""
         return replace(self, runs=runs, options=self.options.brief(), earlier=None, watch=unwatched)

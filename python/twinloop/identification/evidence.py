@@ -40,11 +40,11 @@ class Evidence:
 
     @property
     def stage(self) -> tuple[bool, ...]:
-        """How far it was worked out; what runs away is worth nothing, however its terms were selected."""
+        """How far it was worked out; a model that diverges is worth nothing, however its terms were selected."""
         return self.fitted, self.stable, self.stable and self.smoothed
 
     def beats(self, other: Evidence) -> bool:
-        """Whether this hypothesis is believed rather than the other; of two that run away neither is."""
+        """Whether this hypothesis is believed rather than the other; of two whose models diverge neither is."""
         if self.stage != other.stage:
             return self.stage > other.stage
         return self.stable and shorter(self.length, other.length)

@@ -1,8 +1,7 @@
 """What a law's outputs mean is a hypothesis too: derivatives, or increments, as a simulator's own step makes them.
 
-The map over a period of a law that is a polynomial is none. The step of a simulator that takes one Euler step a period
-is that polynomial. Both forms are learnt briefly from the same readings, and the shorter description of these is
-believed.
+Over a period, a polynomial law does not give a polynomial map; a simulator that takes one Euler step a period does.
+Both forms are learnt briefly from the same readings, and the shorter description of these is believed.
 """
 
 from __future__ import annotations

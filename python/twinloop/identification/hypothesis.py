@@ -26,7 +26,7 @@ class Fit(Recorded, kind="fit"):
     Args:
         model: the tuned one.
         observer: all chains, with the noise under which its predictions were made.
-        chi_squared: of the whitened prediction errors; infinite where the model runs away from its own runs.
+        chi_squared: of the whitened prediction errors; infinite where the model diverges on its own runs.
         readings: that counted.
         covariance: of the constants and lags that were free; empty where a small change makes the model diverge.
     """
@@ -58,7 +58,7 @@ class Hypothesis(Recorded, kind="hypothesis"):
         driven: chains that outputs drive, with a first guess of their noise.
         given: chains that other states drive, with their noise.
         sums: terms that drive each of `driven`, with the noise under which they were found.
-        from_above: sums that were found with the noise from above, for where the model of `sums` runs away.
+        from_above: sums that were found with the noise from above, for where the model of `sums` diverges.
         fit: the model of the sums; None until it is tuned.
         smoothed: whether the states in `runs` were smoothed by a model.
         of_part: whether a part of the only run has led to it.
@@ -84,7 +84,7 @@ class Hypothesis(Recorded, kind="hypothesis"):
 
     @property
     def pool(self) -> Pool:
-        """Of all expressions; whoever enters more does so in a copy (`Candidates.growing`)."""
+        """All expressions; terms are entered in a copy only (`Candidates.growing`)."""
         return self.candidates.pool
 
     @property
@@ -101,5 +101,5 @@ class Hypothesis(Recorded, kind="hypothesis"):
         return Evidence(self.fit is not None, stable, self.smoothed, length)
 
     def searched(self, sums: Sequence[Sum]) -> Hypothesis:
-        """The same with what one more search has found, which nobody has fitted yet."""
+        """The same with the sums of one more search, not fitted yet."""
         return replace(self, sums=tuple(sums), searches=self.searches + 1, fit=None)

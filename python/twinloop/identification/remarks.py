@@ -116,7 +116,7 @@ def other_noise(observer: Sequence[Chain], signals: Signals) -> list[Remark]:
     for chain in observer:
         for i, state in enumerate(signals.states[number] for number in chain.states):
             found = float(np.sqrt(chain.sensors[i]))
-            # An angle of a rigid body, or a sensor that is as good as is ever believed: less cannot be told from this.
+            # An angle of a rigid body, or a sensor at the least noise that is believed: smaller noise looks the same.
             limit = (
                 chain.output is None or chain.sensors[i] <= 1.5 * BEST_SENSOR * BEST_SENSOR * chain.rough[i]
             )

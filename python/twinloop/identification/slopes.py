@@ -23,7 +23,7 @@ class Slopes(NamedTuple):
     """Derivatives by the number of the reading.
 
     Args:
-        missed: mean square by which a reading is missed that is foretold from its neighbours.
+        missed: mean squared error of a reading predicted from its neighbours.
         at: at each reading (n + 1,).
         between: in the middle between each and the next (n,).
     """
@@ -46,7 +46,7 @@ def slopes(values: Floats) -> Slopes | None:
         (_missed(values, degree, width), degree, width)
         for degree in DEGREES
         for width in WIDTHS
-        # With as many constants as readings none is foretold from the others.
+        # With as many constants as readings, no reading is predicted from the others.
         if degree + 1 < width <= len(values)
     ]
     if not tried:
@@ -57,7 +57,7 @@ def slopes(values: Floats) -> Slopes | None:
 
 
 def _missed(values: Floats, degree: int, width: int) -> float:
-    """Mean square by which each reading is missed if it is foretold from its neighbours alone."""
+    """Mean squared error of each reading predicted from its neighbours alone."""
     own = _own(degree, width)
     places = _places(len(values), width)
     errors = (values - _applied(values, degree, width, "value")) / (1.0 - own[places])

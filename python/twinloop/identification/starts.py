@@ -25,8 +25,8 @@ from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 
 ANEW, PARTS, RENEWED, FORMS = 0, 1, 10, 100
-"""Numbers of starts, by which what one draws is told from what others draw: whole runs anew, the first part of the only
-run, what was known, the first form; those of further parts and forms follow."""
+"""Numbers of starts; each start draws from streams under its own number. In order: whole runs anew, the first part of
+the only run, what was known, the first form. Further parts and forms take the numbers that follow."""
 
 
 def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:

@@ -21,7 +21,7 @@ Term = tuple[str, str]
 
 
 def decimal(value: float, digits: int) -> str:
-    """A constant as text, with so many significant digits; 17 are exact."""
+    """A constant as text with a number of significant digits; 17 are exact."""
     return repr(value) if digits == EXACT else f"{value:.{digits}g}"
 
 
@@ -34,7 +34,7 @@ class Dialect:
         division: how a protected division is written of its operands; None: as a / b.
         times: what stands between factors.
         power: how a whole power is written of its base and exponent.
-        number: a constant with so many digits as text.
+        number: writes a constant with a number of digits.
         longest: characters above which a part of an expression gets a name.
         worth: characters above which a part that is written several times gets a name.
     """

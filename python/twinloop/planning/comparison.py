@@ -121,7 +121,7 @@ class Comparison:
         self.judge, self.options, self.committee = judge, options, committee
         self.drafts, self.flown, self.wanted = drafts, flown, wanted
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
-        # A member that blows up whatever is flown is no member (E-SINDy).
+        # A member that diverges whatever is flown is no member (E-SINDy).
         self.members = judge.stable_members(committee.members, genes, excitation, ends)
         self.quiet = judge.judge(self.members, genes, committee.sds, 1, excitation, ends)
         # Differences below these are rounding.

@@ -38,7 +38,7 @@ def first_chirps(
     fade: float,
     stream: _core.Stream,
 ) -> Floats:
-    """Chirps for a first flight, of which nothing is known but the controller.
+    """Chirps for a first flight: only the controller is known.
 
     A controller that one trusts is made for the authority of its commands: ten times the authority, a tenth of the
     gain. So the size is measured by what the controller itself would do: whatever the phases of the chirps are, it

@@ -168,7 +168,7 @@ class Judge:
         excitation: Floats | None = None,
         ends: Ends | None = None,
     ) -> list[_core.Model]:
-        """Members that do not blow up on half of the flights; the best one in any case."""
+        """Members that diverge on fewer than half of the flights; the best one in any case."""
         judged = self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
         share = np.isinf(judged.qualities).any(axis=1).mean(axis=1)
         return [member for i, member in enumerate(members) if i == 0 or share[i] < 0.5]

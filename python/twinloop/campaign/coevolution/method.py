@@ -31,7 +31,8 @@ class Memory:
     """What the preset `paper` remembers.
 
     Args:
-        asked: what was learnt when the last test was asked for. Learning begins here, whoever looks in between.
+        asked: what was learnt when the last test was asked for. Learning begins here; looking at results
+            in between changes nothing.
         latest: what was learnt last, or is being learnt; shown to whoever looks, and gone on with if it is of all that
             was told.
         choosing: the test loop that is under way over the models of `latest`, and how many generations are still to be

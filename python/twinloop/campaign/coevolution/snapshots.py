@@ -63,7 +63,7 @@ class ModelSnapshot(Recorded, kind="model_search"):
             workers: how the work is carried out.
 
         Raises:
-            InvalidInput: the snapshot is none of a search with these options and signals.
+            InvalidInput: the snapshot is not of a search with these options and signals.
         """
         programs = grammar(options, signals)
         with engine_input():
@@ -143,7 +143,7 @@ class TestSnapshot(Recorded, kind="test_search"):
             workers: how the work is carried out.
 
         Raises:
-            InvalidInput: the snapshot is none of a search with these options and controllers.
+            InvalidInput: the snapshot is not of a search with these options and controllers.
         """
         with engine_input():
             return _core.TestSearch.restored(

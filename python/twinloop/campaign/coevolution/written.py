@@ -105,7 +105,7 @@ class WrittenChoosing(Recorded, kind="choosing"):
             workers: how the work is carried out.
 
         Raises:
-            InvalidInput: it is none of this campaign, or more generations are left than there were.
+            InvalidInput: it belongs to another campaign, or more generations are left than there were.
         """
         if not 0 <= self.ahead <= options.generations_of_tests:
             raise InvalidInput(

@@ -68,7 +68,7 @@ def autocorrelation(runs: Sequence[Floats], lags: int) -> Correlations:
 
 
 def crosscorrelation(runs: Sequence[Floats], causes: Sequence[Floats], lags: int) -> Correlations:
-    """Of each column with each cause so many periods before: what a cause explains that the model does not.
+    """Correlation of each column with each cause at each lag: what a cause explains that the model does not.
 
     Causes of runs in closed loop also answer to noise, after it: only what comes before counts, from lag 1 on.
 

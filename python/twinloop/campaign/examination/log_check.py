@@ -35,7 +35,7 @@ class Column:
         name: of the state or command.
         unit: of it.
         command: whether it is a command.
-        least: its least value that is a number; None where there is none.
+        least: its least value that is a number; None where it has no number.
         greatest: its greatest.
         missing: rows without a finite number.
         moved: of a state, root mean square about its mean over the most noise that it can have; None: unknown.

@@ -158,7 +158,7 @@ class Choice:
         return self._answer(self.book.of_task(genes, number), measured, judged, recorded, 0, reason)
 
     def _flown(self, flown: Test, judged: Judged, recorded: Floats, reason: str) -> Test:
-        # That of another task says nothing of the campaign's own, and is none to be given back.
+        # A test of another task says nothing of the campaign's own, and is not returned.
         measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
         test = self.book.of_task(flown.genes, flown.number)
         return self._answer(test, measured, judged, recorded, 1, reason)

@@ -24,7 +24,7 @@ DRAWS = 8
 TIMES = 3.0
 """Times further from a flight than these that a free run is no more explained by them."""
 RELEVANT = 0.03
-"""Share of how far a flight went below which nobody minds."""
+"""Misses below this share of how far a flight went do not matter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ def unexplained(free: Floats, frozen: Floats, expected: Floats) -> Floats:
 
 
 def _cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:
-    """What was flown, from a state and for so many steps."""
+    """The first steps of what was flown, from a state."""
     if isinstance(test, Replay):
         return dataclasses.replace(test, initial_state=start, commands=test.commands[:steps])
     target = test.target_state if test.target_state.ndim == 1 else test.target_state[: steps + 1]

@@ -45,9 +45,10 @@ class Memory(Recorded, kind="memory_of_default"):
     """What the preset `default` remembers; all of it are values that never change.
 
     Args:
-        asked: what was known when the last test was asked for. Learning begins here, whoever looks in between.
-        latest: what was learnt last; shown to whoever looks, and used by `ask` if it is of all that was told.
-        gains: tuned on the latest committee, after so many experiments and failures.
+        asked: what was known when the last test was asked for. Learning begins here; looking at results in
+            between changes nothing.
+        latest: what was learnt last; it is what results show, and `ask` uses it if it covers all that was told.
+        gains: tuned on the latest committee, behind the number of experiments and failures by then.
         best: the controller to fly, at the revision of the logbook that it was chosen at.
         under_way: an identification that is not finished, and of how many experiments it is.
         scores: of the gains that were judged, of a tuning on the latest committee that is not finished.

@@ -21,9 +21,9 @@ def distinct(experiments: Sequence[Experiment]) -> list[Experiment]:
 
 
 def learnt_from(experiments: Sequence[Experiment], most: int) -> list[Experiment]:
-    """Flights of at most so many readings: the newest one, then in turn one that surprised and one that is recent.
+    """The flights to learn from, within a number of readings: the newest, then in turn a surprising and a recent one.
 
-    What a twin did not foretell is what it has to learn; what is recent is how the machine is now.
+    A twin has to learn what it did not predict; a recent flight shows how the machine is now.
 
     Args:
         experiments: in the order told, at least one.
@@ -53,7 +53,7 @@ def _readings(run: Experiment) -> int:
 def _surprise(run: Experiment) -> tuple[float, float]:
     """Error of the twin that had not learnt it, over that of a model that never moves; then how much it moved.
 
-    What no twin has seen before it was told could not be foretold at all.
+    A flight that no twin had predicted counts as the greatest surprise.
     """
     if run.before is None:
         return float("inf"), run.frozen

@@ -143,7 +143,7 @@ def _target(signals: Signals, i: int, target: Floats, factor: float) -> Mark:
 
 
 def _ends(marks: Sequence[Mark], flown: Floats) -> tuple[float, float] | None:
-    """Limits that show the flight; a twin that runs away must not flatten it."""
+    """Limits that show the flight; a twin that diverges must not flatten it."""
     low, high = float(flown.min()), float(flown.max())
     room = max(high - low, 1e-9)
     least, most = low - room, high + room

@@ -10,7 +10,7 @@ def held_at(gain: Mapping[str, Any]) -> str:
     """Where a gain of a result stands at a bound, for a person.
 
     Args:
-        gain: of the controller; results of before this was told have none of it.
+        gain: of the controller; results of earlier versions do not say it.
 
     Returns:
         "at its upper bound", "at its lower bound" or "".

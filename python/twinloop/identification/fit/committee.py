@@ -24,7 +24,7 @@ PLAUSIBLE = 1.5
 ROUNDING = 2.0**-50
 """Share of a reading that rounding takes of it in a step or two: no model follows it more closely."""
 SEATS = 4
-"""Of so many members one is of a part of the only run."""
+"""One of this many members comes from a part of the only run."""
 
 
 def committee(

@@ -45,7 +45,7 @@ def _tuned(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Fit]:
     observer = [*(found.chain for found in sums), *hypothesis.given]
     fit, _ = tune(context, hypothesis, model_of(context, hypothesis), observer, steps)
     if not fit.stable:
-        # Held to its readings at every step it cannot run away; from there it may be let go.
+        # Held to its readings at every step it cannot diverge; from there it may be let go.
         held = [_held(chain, context.signals.dt) for chain in observer]
         fit, _ = tune(context, hypothesis, fit.model, held, steps)
         freed, _ = tune(context, hypothesis, fit.model, observer, steps)

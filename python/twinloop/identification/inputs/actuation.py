@@ -1,4 +1,4 @@
-"""Which commands are alike: those share an actuator, and fill hidden states together."""
+"""Which commands are alike: alike commands share an actuator, and fill hidden states together."""
 
 from __future__ import annotations
 

@@ -12,12 +12,12 @@ from twinloop.identification.search.selection import climbed
 
 
 def terms(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """The hypothesis with the best sums of all rungs, fitted; where it runs away, one that began from above, too."""
+    """The hypothesis with the best sums of all rungs, fitted; where its model diverges, also from above."""
     if hypothesis.fit is not None:
         return
     context.watch("terms")
     found = fitted(context, climbed(context, hypothesis))
     yield found
     if not found.evidence.stable:
-        # A short description that runs away is none: the one from above is more modest.
+        # A short description whose model diverges is worth nothing; the one from above has fewer terms.
         yield fitted(context, climbed(context, replace(hypothesis, sums=hypothesis.from_above)))

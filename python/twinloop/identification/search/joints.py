@@ -91,7 +91,7 @@ def with_joints(
 
 
 def _told(problem: Problem, found: Sum) -> bool:
-    """Whether anything is known of a chain's terms beforehand."""
+    """Whether a user has stated priors on a chain's terms."""
     return bounded(problem, found) or found.chain.states[0] in problem.priors.fixed
 
 

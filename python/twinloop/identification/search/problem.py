@@ -55,7 +55,7 @@ class Problem:
         self._usable: set[int] = set()
 
     def usable(self, terms: Sequence[int]) -> list[int]:
-        """Terms whose values are finite on all rows, evaluated; none of a hidden state where there is none."""
+        """Terms whose values are finite on all rows, with the values; those of a hidden state only where one is."""
         new = [term for term in terms if term not in self._values]
         if self.stages.start.shape[1] == self.pool.inputs:
             new = [term for term in new if not self.pool.is_hidden(term)]

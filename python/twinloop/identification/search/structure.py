@@ -39,7 +39,7 @@ that can be flown grows by half, of itself, in a period."""
 FEEDTHROUGH_PRICES = (1e2, 1e3, 1e4, 1e5, 1e6)
 """What a feedthrough of 1 is made to cost, a reading, in units of χ²."""
 RUNG = 20.0
-"""What a richer library must gain before it is believed, in units of χ²: aliases of the law are legion there."""
+"""What a richer library must gain before it is believed, in units of χ²: it holds many aliases of the law."""
 
 
 @dataclass(eq=False)

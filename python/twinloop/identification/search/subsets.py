@@ -67,6 +67,6 @@ def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Li
     weights, left = solved
     nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
     if nothing and len(nothing) < len(subset):
-        # Held at 0 a term is none.
+        # A term that is held at 0 is no term.
         return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
     return subset, left + float(costs[list(subset)].sum()), weights

@@ -30,7 +30,7 @@ NOTHING = 0.01
 CALM = 1e-2
 """Variance, in a sensor's, of what disturbs in a period and is hardly seen."""
 FEW_READINGS = 20
-"""Below so many, the noise of an angle that body rates turn is not estimated."""
+"""Fewest readings from which the noise of an angle that body rates turn is estimated."""
 OUTLYING = 6.0
 """Medians of its residuals' size beyond which one counts no more."""
 RIDGE = 1e-9

@@ -59,7 +59,7 @@ class Candidates(Recorded, kind="candidates"):
         return Candidates(pool, tuple((*terms, *strangers) for terms in ladder), priors)
 
     def growing(self) -> Candidates:
-        """The same with a copy of the pool, which whoever asks for it may enter terms in."""
+        """The same with a copy of the pool, in which the caller may enter terms."""
         return replace(self, pool=self.pool.copy())
 
     def with_terms(self, terms: Iterable[int]) -> Candidates:

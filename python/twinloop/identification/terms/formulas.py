@@ -113,7 +113,7 @@ def bare_term(node: int, pool: Pool) -> tuple[int, float]:
 
 
 def _bound(written: str, text: str, without: float) -> float:
-    """A number; where none is written the bound that is none."""
+    """A number; where no number is written, an infinite bound."""
     if not written.strip():
         return without
     try:

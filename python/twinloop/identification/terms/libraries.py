@@ -97,7 +97,7 @@ def quotients(pool: Pool, signals: Signals) -> Terms:
 
 
 def cubic(pool: Pool, signals: Signals) -> Terms:
-    """Products of three inputs; none where there are so many inputs that the list alone is too long."""
+    """Products of three inputs; none where the list of inputs alone is too long."""
     if pool.inputs > CUBIC_INPUTS:
         return []
     triples = combinations_with_replacement(coordinates(pool, signals), 3)

@@ -25,7 +25,7 @@ def as_read(law: Law, plain: Linear, inputs: Floats) -> Linear:
         inputs: of the equations at the point.
 
     Returns:
-        The same; where time is discrete with the states of so many periods before as the sensors reach back.
+        The same; in discrete time, with the states of as many earlier periods as the sensors reach back.
     """
     offsets = np.array(law.offsets)
     if not offsets.any():
@@ -49,7 +49,7 @@ def as_read(law: Law, plain: Linear, inputs: Floats) -> Linear:
 
 
 def _with_past(plain: Linear, n_x: int, reach: int) -> Linear:
-    """With the states of so many periods before behind the others, the latest first."""
+    """With the states of earlier periods behind the others, the latest first."""
     size = len(plain.A)
     n = size + reach * n_x
     A, B = np.zeros((n, n)), np.zeros((n, plain.B.shape[1]))
