@@ -107,7 +107,7 @@ def read_log(
         )
     except OSError as reason:
         raise InvalidInput(
-            f"Log {called}: expected a file, found {reason.strerror}; check its name."
+            f"Log {called}: expected a file that can be read, found: {reason.strerror}; check its name."
         ) from reason
     return t, states, commands[:-1] if len(commands) == len(t) else commands
 
@@ -177,9 +177,14 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         ) from reason
     rows = [row for row in lines if any(cell.strip() for cell in row)]
     names = [name.strip() for name in rows[0]] if rows else []
-    for name in (TIME, *signals.state_names, *signals.command_names):
-        if name not in names:
-            raise unknown(f"column, which the log {called} should have:", name, names)
+    wanted = (TIME, *signals.state_names, *signals.command_names)
+    missing = [name for name in wanted if name not in names]
+    if missing:
+        there = ", ".join(names[:20]) or "none"
+        raise InvalidInput(
+            f"Log {called}: expected columns called {', '.join(wanted)}, found {there}; {', '.join(missing)}"
+            f" {'is' if len(missing) == 1 else 'are'} missing: name columns as the signals are named."
+        )
     body = rows[1:]
 
     def column(name: str, count: int) -> list[float]:

@@ -166,6 +166,8 @@ def _told(
             "tell: expected --reason with a few words beside --aborted FLIGHT, found it without one of the two; a test"
             " that failed says why itself: --failed REASON."
         )
+    if failed is not None and not failed.strip():
+        raise InvalidInput('tell: expected what happened behind --failed, found nothing; such as "motor cut out".')
     if failed is None and flight is None and aborted is None:
         raise InvalidInput(
             "tell: expected a flight, found none; name its file, or say --aborted FLIGHT or --failed REASON."
