@@ -46,6 +46,22 @@ class RemarkWarning(UserWarning):
     """A serious remark on data or a twin: look into it before you use the result. `twin.remarks` has it as a value."""
 
 
+@contextmanager
+def at(where: str) -> Iterator[None]:
+    """Refusals of what stands somewhere, told with its place.
+
+    Args:
+        where: such as a file and its section.
+
+    Raises:
+        InvalidInput: as inside, with the place before it.
+    """
+    try:
+        yield
+    except InvalidInput as reason:
+        raise InvalidInput(f"{where}: {reason}") from reason
+
+
 def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:
     """The error for a name that is not on a list.
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import zipfile
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.errors import InvalidInput, unknown
+from twinloop.errors import InvalidInput
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 from twinloop.ulog import Window, read_ulog
@@ -181,9 +182,15 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
     missing = [name for name in wanted if name not in names]
     if missing:
         there = ", ".join(names[:20]) or "none"
+        meant = [near[0] for name in missing for near in [get_close_matches(name, names, n=1)] if near]
+        advice = (
+            f"did you mean {', '.join(map(repr, meant))}?"
+            if meant
+            else "name columns as the signals are named."
+        )
         raise InvalidInput(
             f"Log {called}: expected columns called {', '.join(wanted)}, found {there}; {', '.join(missing)}"
-            f" {'is' if len(missing) == 1 else 'are'} missing: name columns as the signals are named."
+            f" {'is' if len(missing) == 1 else 'are'} missing: {advice}"
         )
     body = rows[1:]
 

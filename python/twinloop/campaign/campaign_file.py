@@ -13,7 +13,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.presets import PRESETS
 from twinloop.campaign.system_section import SystemSection, said_by, system_section
 from twinloop.controllers import UnboundFamily
-from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.errors import InvalidInput, NotAvailable, at, unknown
 from twinloop.records import read
 from twinloop.signals import Command as Channel
 from twinloop.signals import RigidBody, Signals, State
@@ -287,8 +287,12 @@ def _toml_of(path: Path) -> dict[str, Any]:
 
 
 def _members(found: Mapping[str, Any], name: str, kind: type[State] | type[Channel]) -> list[Any]:
-    section = _section(found, name, None, ())
-    return [_tagged({"name": key, **_table(value, f"{name}.{key}")}, kind) for key, value in section.items()]
+    members = []
+    for key, value in _section(found, name, None, ()).items():
+        table = {"name": key, **_table(value, f"{name}.{key}")}
+        with at(f"Campaign file, [{name}.{key}]"):
+            members.append(_tagged(table, kind))
+    return members
 
 
 def _tagged(table: Any, kind: Any) -> Any:

@@ -10,7 +10,7 @@ import click
 
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file, template
-from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.from_file import file_beside
@@ -62,7 +62,7 @@ def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | N
         waiting = campaign.waiting
         # Whatever was attached: the first test is the controller that is trusted.
         if all(run.attached for run in campaign.experiments) and not campaign.failures:
-            test = next(iter(campaign.tests), None) or campaign.test(_first(store))
+            test = next(iter(campaign.tests), None) or _first(store, campaign)
         else:
             test = waiting[0] if waiting and not (last or again) else campaign.ask(last=last)
         text, described = _shown(store, campaign, test)
@@ -167,7 +167,9 @@ def _told(
             " that failed says why itself: --failed REASON."
         )
     if failed is not None and not failed.strip():
-        raise InvalidInput('tell: expected what happened behind --failed, found nothing; such as "motor cut out".')
+        raise InvalidInput(
+            'tell: expected what happened behind --failed, found nothing; such as "motor cut out".'
+        )
     if failed is None and flight is None and aborted is None:
         raise InvalidInput(
             "tell: expected a flight, found none; name its file, or say --aborted FLIGHT or --failed REASON."
@@ -242,11 +244,13 @@ def _campaign(store: str, threads: int | None = None) -> Campaign:
     )
 
 
-def _first(store: str) -> dict[str, float]:
+def _first(store: str, campaign: Campaign) -> Test:
+    """The test of the controller that is trusted, by the campaign file beside a store."""
     file = file_beside(store)
     if file is None or not file.exists():
         where = "a campaign file beside the store" if file is None else str(file)
         raise NotAvailable(
             f"ask: expected the gains of the first test in {where}, found no such file; add it."
         )
-    return dict(read_file(file).first)
+    with at(f"Campaign file {file}, [first]"):
+        return campaign.test(dict(read_file(file).first))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from twinloop.campaign import Campaign
-from twinloop.errors import InvalidInput
+from twinloop.errors import InvalidInput, at
 from twinloop.logs import load
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -66,7 +66,8 @@ def tell(
             f" {otherwise}."
         )
     _refuse_told(campaign, run, called, test)
-    campaign.tell(test, run)
+    with at(f"Log {called}"):
+        campaign.tell(test, run)
     return test
 
 
@@ -85,7 +86,8 @@ def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> None:
     called = str(log) if name is None else name
     run = load(log, campaign.signals, name=called)
     _refuse_told(campaign, run, called, None)
-    campaign.attach(run)
+    with at(f"Log {called}"):
+        campaign.attach(run)
 
 
 def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None = None) -> Test:
