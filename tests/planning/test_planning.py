@@ -13,11 +13,11 @@ from twinloop.campaign.history import Experiment
 from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
 from twinloop.limits import Limits
-from twinloop.planning.comparison import Flown
 from twinloop.planning.excitation import SHARE, answered, binary, chirps, first_chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
+from twinloop.planning.proposal import Flown
 from twinloop.planning.quality import KINDS, quality_of
 from twinloop.streams import Unit
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +14,7 @@ from twinloop.flights import disagreements
 from twinloop.planning.candidates import Candidates
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
+from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.reasons import Why, reason
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.worth import apart, gain, limit
@@ -26,75 +26,6 @@ TOGETHER = 4
 """Of them at once."""
 ANYWHERE = 64
 """Flights by which it is asked how much of the twin is unknown."""
-
-
-@dataclass(frozen=True, eq=False)
-class Flown:
-    """What has flown so far.
-
-    Args:
-        best: genes of the best flight; those tuned where no test was flown.
-        flies: whether they are known to fly: to the end, and inside the envelope.
-        usages: largest usage of the envelope in each flight.
-        good: quality of the best flight that kept the envelope; infinite where none has: one that keeps it may then be
-            worse.
-        failed: genes of tests that failed on the system, or were cut.
-    """
-
-    best: Floats
-    flies: bool
-    usages: Sequence[float]
-    good: float
-    failed: Sequence[Floats] = ()
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What the next test is for.
-
-    Args:
-        goal: "both", "model" or "control".
-        number: of the test, for its streams.
-        exploit: whether the tuned gains are flown as they are.
-        plain: whether the test that promises most is wanted, rather than the one that tells most.
-    """
-
-    goal: str
-    number: int
-    exploit: bool
-    plain: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Proposal:
-    """A test that is proposed.
-
-    Args:
-        genes: its gains (size,).
-        initial_state: where it starts (n_x,).
-        target_state: where it leads (n_x,).
-        excitation: (n, n_u), or None.
-        predicted: mean quality over members and draws, as a record of the flight would give it; infinite if any
-            diverges.
-        spread: standard deviation of it over members and noise; infinite likewise.
-        risk: share of predicted flights that leave the envelope, with half a flight added on either side.
-        safe: whether every member keeps the margin, and the envelope under every draw of the sensors' noise.
-        disagreement: of the committee, log det.
-        gain: quality that knowing the right member would bring, by the committee's own estimate.
-        reason: for a person.
-    """
-
-    genes: Floats
-    initial_state: Floats
-    target_state: Floats
-    excitation: Floats | None
-    predicted: float
-    spread: float
-    risk: float
-    safe: bool
-    disagreement: float
-    gain: float
-    reason: str
 
 
 class Comparison:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,45 +10,17 @@ from numpy.typing import NDArray
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.controllers import Family
+from twinloop.planning.scored import Score
 from twinloop.streams import Purpose, Unit
 
-Score = Callable[[Floats], Floats]
-"""Of genes (K, size) the share of their flights that diverges and a score (K, 2), to be minimised in this order."""
 OFFSPRING = 32
 """Genes of a generation."""
 NEAR = 0.02
 """Shares of the box by which each gain may differ before a controller is taken for another one."""
+INSIDE = 0.02
+"""Share of the box by which a search begins inside it: from an edge, half of its first places would be outside."""
 LEAST = 1e-300
 """What a place outside the box costs where its score is zero: less than any score."""
-
-
-@dataclass
-class Scored:
-    """Scores in the order in which they are asked for: first those that were kept, then those that are judged.
-
-    Searches are a function of their scores, and these are what takes time: searches that were cut go on from them.
-
-    Args:
-        kept: scores that were judged before, one array for each set of genes that was asked for.
-        keep: called with all of them whenever there is one more.
-    """
-
-    kept: tuple[Floats, ...] = ()
-    keep: Callable[[tuple[Floats, ...]], None] = lambda kept: None
-    _given: int = field(default=0, init=False)
-
-    def __call__(self, score: Score) -> Score:
-        """The same score, remembered."""
-
-        def remembered(genes: Floats) -> Floats:
-            at, self._given = self._given, self._given + 1
-            # What is no score of these genes was kept of another search, and all behind it.
-            if at >= len(self.kept) or self.kept[at].shape != (len(genes), 2):
-                self.kept = (*self.kept[:at], score(genes))
-                self.keep(self.kept)
-            return self.kept[at]
-
-        return remembered
 
 
 def nearby(family: Family, genes: Floats, others: Sequence[Floats]) -> NDArray[np.bool_]:
@@ -94,7 +65,7 @@ def tune_gains(
     """
     best_genes, best = np.asarray(starts[0], dtype=np.float64), tuple(score(np.atleast_2d(starts[0]))[0])
     for number, start in enumerate(starts):
-        mean = np.clip(family.to_unit(start), 0.02, 0.98)
+        mean = np.clip(family.to_unit(start), INSIDE, 1.0 - INSIDE)
         search = _core.CmaEs(mean, spread, OFFSPRING, unit.part(number).named(purpose))
         for _ in range(max(1, evaluations // (len(starts) * OFFSPRING))):
             places = search.ask()

@@ -13,11 +13,13 @@ from twinloop.controllers import Family
 from twinloop.hold_back import HoldBack
 from twinloop.limits import Limits
 from twinloop.planning.candidates import candidates
-from twinloop.planning.comparison import Comparison, Flown, Proposal, Wanted
+from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, first_chirps
-from twinloop.planning.gains import Scored, tune_gains
+from twinloop.planning.gains import tune_gains
 from twinloop.planning.judging import Committee, Judge, Task
+from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.quality import Quality
+from twinloop.planning.scored import Scored
 from twinloop.planning.settings import PlanningOptions
 from twinloop.steps import Watch, unwatched
 from twinloop.streams import Purpose

@@ -32,10 +32,10 @@ from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.hold_back import HoldBack
 from twinloop.identification.identify import UnderWay
 from twinloop.law.twin import Twin
-from twinloop.planning.comparison import Flown, Proposal
-from twinloop.planning.gains import Scored
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
+from twinloop.planning.proposal import Flown, Proposal
+from twinloop.planning.scored import Scored
 from twinloop.records import Record
 from twinloop.steps import STEPS, Step
 from twinloop.test import Test
