@@ -1,5 +1,6 @@
 #!/bin/sh
-# Installs a wheel into an empty environment, without Rust, and runs the demo there; says how long it took.
+# Installs a wheel into an empty environment, without Rust, and runs the demo there; says how long it took, and how large
+# the native module is, which must not grow beyond 4 MB.
 #
 # usage: scripts/try_wheel.sh PYTHON WHEEL
 set -eu
@@ -21,6 +22,19 @@ found = json.load(open(sys.argv[1], encoding="utf-8"))
 assert len(found["experiments"]) == 4 and not found["interrupted"], "expected four experiments"
 CHECK
 seconds=$(($(date +%s) - begun))
+"$place/venv/bin/python" - <<'SIZE'
+import sys
+from pathlib import Path
+
+import twinloop
+
+most = 4_000_000
+(module,) = Path(twinloop.__file__).parent.glob("_core*.so")
+size = module.stat().st_size
+print(f"{module.name}: {size} bytes of {most} at most")
+if size > most:
+    sys.exit("expected a smaller native module: `nm --size-sort -C` says what is compiled how often")
+SIZE
 # What is no Python has come along: templates, styles, sources of exports.
 "$place/venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary :all: "$wheel[report,dashboard]"
 (

@@ -3,7 +3,7 @@
 
 use crate::error::{Result, invalid};
 use crate::hidden::{Filling, Hidden};
-use crate::lanes::{Vector, numbers, vectors_once, zeros};
+use crate::lanes::{Vector, numbers, vectors, zeros};
 
 /// The way from one command to its effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +121,7 @@ impl<V: Vector> Line<V> {
             None => actuation.times().into_iter().flat_map(|time| vec![time; V::LANES]).collect(),
         };
         let (kept, gains) = fading(&lanes, dt);
-        let (kept, gains): (Vec<V>, Vec<V>) = (vectors_once(&kept), vectors_once(&gains));
+        let (kept, gains): (Vec<V>, Vec<V>) = (vectors(&kept), vectors(&gains));
         let effects = || zeros(kept.len());
         Self {
             memory: zeros(commands),
@@ -192,6 +192,31 @@ pub fn effects(actuation: &Actuation, factors: &[f64], dt: f64, commands: &[f64]
         }
     }
     out
+}
+
+/// The same of commands (n × n_u) in units of these scales, behind actuation that is checked first; and how many effects
+/// a row has.
+pub fn checked_effects(
+    actuation: Actuation,
+    scales: &[f64],
+    dt: f64,
+    commands: &[f64],
+) -> Result<([Vec<f64>; 3], usize)> {
+    let n_u = scales.len();
+    let positive = |x: f64| x.is_finite() && x > 0.0;
+    if n_u == 0 || !commands.len().is_multiple_of(n_u) || !scales.iter().chain([&dt]).all(|&x| positive(x)) {
+        return invalid(format!(
+            "effects: expected scales of commands and a period above 0, and rows of as many commands, found {scales:?}, \
+             {dt} and {} numbers",
+            commands.len()
+        ));
+    }
+    let factors: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
+    // Actuators that all act at once are kept: here they only pass commands on.
+    let actuators = actuation.actuators.clone();
+    let checked = Actuation { actuators, ..actuation.validated(n_u)? };
+    let columns = n_u + checked.hidden.len();
+    Ok((effects(&checked, &factors, dt, commands), columns))
 }
 
 #[cfg(test)]

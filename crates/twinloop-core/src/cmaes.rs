@@ -94,14 +94,18 @@ pub struct CmaEs {
 }
 
 impl CmaEs {
+    /// More points of a generation than this are refused.
+    pub const MOST_POINTS: usize = 1_000_000;
+
     /// A search around a point with standard deviations `step`; each generation has a stream of its unit.
     pub fn new(mean: &[f64], step: f64, population: usize, unit: Unit) -> Result<Self> {
         if mean.is_empty() || !mean.iter().all(|x| x.is_finite()) {
             return invalid(format!("CMA-ES, mean: expected at least one finite number, found {mean:?}"));
         }
-        if !(step.is_finite() && step > 0.0) || population < 2 {
+        if !(step.is_finite() && step > 0.0 && (2..=Self::MOST_POINTS).contains(&population)) {
             return invalid(format!(
-                "CMA-ES: expected a step above 0 and a population of at least 2, found {step} and {population}"
+                "CMA-ES: expected a step above 0 and a population of 2 to {}, found {step} and {population}",
+                Self::MOST_POINTS
             ));
         }
         let dimension = mean.len();

@@ -38,11 +38,16 @@ impl Periods {
     /// `a - b` of a state: at most half a period in either direction where it has one.
     #[inline(always)]
     pub fn difference<V: Vector>(&self, state: usize, a: V, b: V) -> V {
-        let mut difference = a - b;
-        if let Some(period) = self.of(state) {
-            V::apart(Shortest { difference: &mut difference, period });
+        let difference = a - b;
+        match self.of(state) {
+            None => difference,
+            Some(period) => {
+                // In a place of its own: one that a call may write is kept out of registers on every path.
+                let mut shortest = difference;
+                V::apart(Shortest { difference: &mut shortest, period });
+                shortest
+            }
         }
-        difference
     }
 
     /// Brings every periodic state (n_x) within half a period of 0.

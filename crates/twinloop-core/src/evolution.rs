@@ -49,10 +49,12 @@ pub trait Problem: Sync {
 pub struct Variation {
     /// Individuals of a generation.
     pub population: usize,
-    /// Share of offspring made by mutation; what mutation and crossover leave is copied.
+    /// Share of offspring made by mutation.
     pub mutation_share: f64,
     /// Share of offspring made by crossover.
     pub crossover_share: f64,
+    /// Share of offspring that are copies.
+    pub reproduction_share: f64,
     /// Share of the best that are copied before anything else.
     pub elite_share: f64,
     /// Expected offspring of the best over that of the mean, 1 to 2.
@@ -69,8 +71,8 @@ impl Variation {
 
     /// Refuses what makes no generation.
     pub fn validated(self) -> Result<Self> {
-        let Self { population, mutation_share, crossover_share, elite_share, .. } = self;
-        let shares = [mutation_share, crossover_share, elite_share];
+        let Self { population, mutation_share, crossover_share, reproduction_share, elite_share, .. } = self;
+        let shares = [mutation_share, crossover_share, reproduction_share];
         if !(2..=Self::MOST_INDIVIDUALS).contains(&population) || self.archive_cap == 0 {
             return invalid(format!(
                 "variation: expected a population of 2 to {} and an archive of 1 or more, found {population} and {}",
@@ -78,17 +80,16 @@ impl Variation {
                 self.archive_cap
             ));
         }
-        if !shares.iter().all(|share| (0.0..=1.0).contains(share))
-            || mutation_share + crossover_share > 1.0 + 1e-9
-        {
+        let sum: f64 = shares.iter().sum();
+        if !shares.iter().all(|share| (0.0..=1.0).contains(share)) || (sum - 1.0).abs() > 1e-9 {
             return invalid(format!(
-                "variation: expected shares between 0 and 1 that sum to 1, found {shares:?}"
+                "variation: expected shares of the operators between 0 and 1 that sum to 1, found {shares:?}"
             ));
         }
-        if elite_share >= 1.0 {
-            return invalid(
-                "variation: expected an elite smaller than the population, found an elite share of 1",
-            );
+        if !(0.0..1.0).contains(&elite_share) {
+            return invalid(format!(
+                "variation: expected an elite smaller than the population, found an elite share of {elite_share}"
+            ));
         }
         LinearRanking::new(population, self.ranking_pressure)?;
         Ok(self)

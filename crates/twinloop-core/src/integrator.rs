@@ -27,18 +27,20 @@ pub trait Field<V: Vector> {
 /// Moves `state` by `dt` along the field.
 #[inline(always)]
 pub fn rk4<V: Vector>(state: &mut [V], dt: f64, stages: &mut Stages<V>, mut field: impl Field<V>) {
-    let Stages { slope, point, sum } = stages;
+    // Slices of one length: their loops then need no checks.
+    let n = state.len();
+    let (slope, point, sum) = (&mut stages.slope[..n], &mut stages.point[..n], &mut stages.sum[..n]);
     point.copy_from_slice(state);
     // Fraction of the step at which the next stage is taken, and weight of this one in the sum.
     for (stage, (ahead, weight)) in [(0.5, 1.0), (0.5, 2.0), (1.0, 2.0), (0.0, 1.0)].into_iter().enumerate() {
         field.slope(point, slope);
-        for j in 0..state.len() {
+        for j in 0..n {
             let weighted = slope[j] * weight;
             sum[j] = if stage == 0 { weighted } else { sum[j] + weighted };
             point[j] = state[j] + slope[j] * (ahead * dt);
         }
     }
-    for j in 0..state.len() {
+    for j in 0..n {
         state[j] = state[j] + sum[j] * (dt / 6.0);
     }
 }

@@ -45,7 +45,8 @@ pub use test_loop::{TestSearch, TestSettings};
 
 // Identification.
 pub use regression::{
-    Annealing, Chain, Choices, Found, Gram, Noise, Record, Solution, likelihood, most_likely_noise, search,
+    Annealing, Chain, Choices, Found, Gram, Leftover, Noise, Record, Regression, Solution, likelihood,
+    most_likely_noise, most_likely_noises, search, search_all,
 };
 pub use tuning::{Observed, Recorded, Tuned, Tuning};
 
@@ -61,12 +62,12 @@ pub use objective::{
 pub use lgp::{Bank, Code, Grammar, Inputs, Instruction, Learnt, Operand, Operation, Page, Program, Shape};
 
 // Dynamics: models, plants, and what stands between them and the world.
-pub use actuators::{Actuation, Actuator, effects};
+pub use actuators::{Actuation, Actuator, checked_effects};
 pub use any_dynamics::{AnyDynamics, AnyWorkspace};
 pub use dynamics::{Dynamics, state_of};
 pub use hidden::Hidden;
 pub use integrator::{Field, Stages, rk4};
-pub use model::{Form, Frame, Model};
+pub use model::{Form, Frame, Model, OwnedModel, views};
 pub use plants::{Gyroscopic, Quadrotor};
 pub use sensors::Sensors;
 

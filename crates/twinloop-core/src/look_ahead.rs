@@ -7,8 +7,8 @@ use crate::controller::Controllers;
 use crate::dynamics::Dynamics;
 use crate::error::{Result, invalid};
 use crate::excitation::{Excitation, HoldBack};
-use crate::lanes::{Scalar, Vector};
-use crate::model::{Model, ModelWorkspace};
+use crate::lanes::{Scalar, Vector, scalars};
+use crate::model::{Model, ModelWorkspace, OwnedModel};
 use crate::rollout::{Commands, Midway, Seen, Start, Watch, resumed};
 use crate::setting::Setting;
 use crate::task::{Task, is_target};
@@ -44,6 +44,7 @@ pub struct Leaving {
 
 /// Where a flight is: what its controller and the actuators of each member remember.
 pub struct LookAhead {
+    members: Vec<OwnedModel>,
     flight: Ahead,
     parameters: Vec<Scalar>,
     target: Vec<Scalar>,
@@ -55,8 +56,9 @@ pub struct LookAhead {
 }
 
 impl LookAhead {
-    /// At the start of a flight. The members are handed in at each call, always the same ones.
-    pub fn new(members: &[Model<'_>], flight: Ahead) -> Result<Self> {
+    /// At the start of a flight.
+    pub fn new(members: Vec<OwnedModel>, flight: Ahead) -> Result<Self> {
+        members.iter().try_for_each(|member| member.check_for(flight.setting.signals()))?;
         let Ahead { setting, parameters, target, excitation, hold_back, steps, envelope } = &flight;
         let (family, n_x, n_u) = (setting.family(), setting.signals().states(), setting.signals().commands());
         if family.is_foreign() {
@@ -77,35 +79,46 @@ impl LookAhead {
         if let Some(hold_back) = hold_back {
             hold_back.check(n_x)?;
         }
-        let hold_back = hold_back.as_ref().map_or_else(Vec::new, |found| lanes(found.lines()));
-        let parameters = lanes(parameters);
+        let hold_back = hold_back.as_ref().map_or_else(Vec::new, |found| scalars(found.lines()));
+        let parameters = scalars(parameters);
         let controllers = family.start(&parameters);
-        let (target, excitation) = (lanes(target), lanes(excitation));
-        let workspaces = members.iter().map(Model::workspace).collect();
-        Ok(Self { parameters, target, excitation, hold_back, controllers, workspaces, period: 0, flight })
+        let (target, excitation) = (scalars(target), scalars(excitation));
+        let workspaces = fresh(&members);
+        Ok(Self {
+            members,
+            parameters,
+            target,
+            excitation,
+            hold_back,
+            controllers,
+            workspaces,
+            period: 0,
+            flight,
+        })
     }
 
     /// Back to the start.
-    pub fn reset(&mut self, members: &[Model<'_>]) {
+    pub fn reset(&mut self) {
         self.controllers.reset();
-        self.workspaces = members.iter().map(Model::workspace).collect();
+        self.workspaces = fresh(&self.members);
         self.period = 0;
     }
 
     /// The soonest leaving within so many periods of a reading (n_x), if the controller goes on; none after the last step.
-    pub fn leaving(&self, members: &[Model<'_>], reading: &[f64], horizon: usize) -> Option<Leaving> {
+    pub fn leaving(&self, reading: &[f64], horizon: usize) -> Result<Option<Leaving>> {
+        finite("reading", reading, self.states())?;
         let left = self.flight.steps.saturating_sub(self.period);
         let mut soonest: Option<Leaving> = None;
-        for (member, (model, workspace)) in members.iter().zip(&self.workspaces).enumerate() {
+        for (member, (model, workspace)) in self.members.iter().zip(&self.workspaces).enumerate() {
             let within = soonest.map_or(horizon, |found| found.periods - 1).min(left);
             if within == 0 {
                 break;
             }
-            if let Some((periods, state)) = self.of_one(*model, workspace, reading, within) {
+            if let Some((periods, state)) = self.of_one(model.view(), workspace, reading, within) {
                 soonest = Some(Leaving { periods, state, member });
             }
         }
-        soonest
+        Ok(soonest)
     }
 
     fn of_one(
@@ -129,7 +142,7 @@ impl LookAhead {
                     hold_back: &self.hold_back,
                 },
             },
-            initial: &model.state_of(&lanes(reading)),
+            initial: &model.state_of(&scalars(reading)),
             steps,
             limits: self.flight.setting.limits(),
             noise: &[],
@@ -144,32 +157,43 @@ impl LookAhead {
     }
 
     /// Moves the flight on by a period: what the controller read, where it led, and what was sent.
-    pub fn sent(&mut self, members: &[Model<'_>], reading: &[f64], target: &[f64], command: &[f64]) {
+    pub fn sent(&mut self, reading: &[f64], target: &[f64], command: &[f64]) -> Result<()> {
+        finite("reading", reading, self.states())?;
+        finite("target", target, self.states())?;
+        finite("command", command, self.flight.setting.signals().commands())?;
         let mut own = vec![Scalar::splat(0.0); command.len()];
         self.flight.setting.family().command(
             &mut self.controllers,
-            &lanes(reading),
-            &lanes(target),
+            &scalars(reading),
+            &scalars(target),
             &mut own,
         );
-        let command = lanes(command);
-        for (model, workspace) in members.iter().zip(&mut self.workspaces) {
-            model.remember(workspace, &command);
+        let command = scalars(command);
+        for (model, workspace) in self.members.iter().zip(&mut self.workspaces) {
+            model.view().remember(workspace, &command);
         }
         self.period += 1;
+        Ok(())
     }
 
     /// What the first member expects to be read (n_x) a period after a reading (n_x) and a command (n_u).
-    pub fn following(&self, members: &[Model<'_>], reading: &[f64], command: &[f64]) -> Vec<f64> {
-        let mut following = lanes(reading);
-        if let (Some(model), Some(workspace)) = (members.first(), self.workspaces.first()) {
+    pub fn following(&self, reading: &[f64], command: &[f64]) -> Result<Vec<f64>> {
+        finite("state", reading, self.states())?;
+        finite("command", command, self.flight.setting.signals().commands())?;
+        let mut following = scalars(reading);
+        if let (Some(model), Some(workspace)) = (self.members.first(), self.workspaces.first()) {
+            let model = model.view();
             let (mut workspace, mut state) = (workspace.clone(), model.state_of(&following));
             // Late sensors read what they have seen.
             model.read(&mut workspace, &state, &mut following);
-            model.step(&mut workspace, &mut state, &lanes(command));
+            model.step(&mut workspace, &mut state, &scalars(command));
             model.read(&mut workspace, &state, &mut following);
         }
-        following.iter().map(|lane| lane.lane(0)).collect()
+        Ok(following.iter().map(|lane| lane.lane(0)).collect())
+    }
+
+    fn states(&self) -> usize {
+        self.flight.setting.signals().states()
     }
 }
 
@@ -196,6 +220,15 @@ impl Watch<Scalar> for Fence<'_> {
     }
 }
 
-fn lanes(values: &[f64]) -> Vec<Scalar> {
-    values.iter().map(|&value| Scalar::splat(value)).collect()
+/// Workspaces at the start of a flight.
+fn fresh(members: &[OwnedModel]) -> Vec<ModelWorkspace<Scalar>> {
+    members.iter().map(|member| member.view().workspace()).collect()
+}
+
+/// Refuses anything but so many finite numbers.
+fn finite(what: &str, found: &[f64], expected: usize) -> Result<()> {
+    if found.len() == expected && found.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    invalid(format!("look-ahead: expected a {what} of {expected} finite numbers, found {found:?}"))
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::error::{Result, invalid};
 use crate::evolution::{Problem, Search, Snapshot, Variation};
 use crate::lgp::{Grammar, Learnt, Program};
-use crate::model::{Form, Frame, Model};
+use crate::model::{Form, Frame, Model, OwnedModel};
 use crate::objective::of_model;
 use crate::pareto::{crowding_distances, order};
 use crate::rng::{Purpose, Stream};
@@ -58,6 +58,7 @@ pub struct ModelSearch {
     search: Search<Learnt>,
     grammar: Arc<Grammar>,
     frame: Arc<Frame>,
+    signals: Arc<Signals>,
     variation: Variation,
 }
 
@@ -76,7 +77,8 @@ impl ModelSearch {
         let frame = frame(&grammar, form, selected.signals())?;
         let problem = Models { grammar: &grammar, frame: &frame, selected };
         let search = Search::start(&problem, &variation, seed, 1, workers);
-        Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), variation })
+        let signals = selected.signals().clone();
+        Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), signals, variation })
     }
 
     /// The search that a snapshot was taken of.
@@ -84,34 +86,33 @@ impl ModelSearch {
         grammar: Grammar,
         form: Form,
         variation: Variation,
-        signals: &Signals,
+        signals: Arc<Signals>,
         snapshot: Snapshot<Learnt>,
         workers: &Workers,
     ) -> Result<Self> {
         let (grammar, variation) = (grammar.validated()?, variation.validated()?);
-        let frame = frame(&grammar, form, signals)?;
+        let frame = frame(&grammar, form, &signals)?;
         let programs = snapshot.population.iter().chain(&snapshot.members);
         programs.map(|learnt| &learnt.program).try_for_each(|program| grammar.check(program))?;
         if !snapshot.objectives.columns().is_multiple_of(2) {
             return invalid("model search: expected two objectives a test, found an odd number");
         }
         let search = Search::restored(snapshot, &variation, workers)?;
-        Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), variation })
+        Ok(Self { search, grammar: Arc::new(grammar), frame: Arc::new(frame), signals, variation })
     }
 
     /// The same population and non-dominated set, judged on other tests: the next iteration.
     pub fn learn(self, selected: &SelectedTests, workers: &Workers) -> Result<Self> {
         some_test(selected)?;
-        let Self { search, grammar, frame, variation } = self;
-        if !frame.fits(selected.signals()) {
+        if !self.frame.fits(selected.signals()) {
             return invalid(
                 "model search: expected tests with the states, commands and period of its models, found others; start a \
                  search for them",
             );
         }
-        let problem = Models { grammar: &grammar, frame: &frame, selected };
-        let search = search.judged_again(&problem, &variation, workers);
-        Ok(Self { search, grammar, frame, variation })
+        let problem = Models { grammar: &self.grammar, frame: &self.frame, selected };
+        let search = self.search.judged_again(&problem, &self.variation, workers);
+        Ok(Self { search, ..self })
     }
 
     /// The search some generations later.
@@ -123,10 +124,9 @@ impl ModelSearch {
                 selected.len()
             ));
         }
-        let Self { search, grammar, frame, variation } = self;
-        let problem = Models { grammar: &grammar, frame: &frame, selected };
-        let search = search.advance(&problem, &variation, generations, workers);
-        Ok(Self { search, grammar, frame, variation })
+        let problem = Models { grammar: &self.grammar, frame: &self.frame, selected };
+        let search = self.search.advance(&problem, &self.variation, generations, workers);
+        Ok(Self { search, ..self })
     }
 
     /// Whether the best member gets the row of objectives on these tests that it has.
@@ -141,6 +141,12 @@ impl ModelSearch {
     /// Population, archive and counters.
     pub fn search(&self) -> &Search<Learnt> {
         &self.search
+    }
+
+    /// A member of the non-dominated set as a model.
+    pub fn model(&self, member: usize) -> OwnedModel {
+        let learnt = self.search.archive().members()[member].clone();
+        OwnedModel::of(learnt, self.frame.clone(), self.signals.clone())
     }
 
     /// What makes the programs dynamics.

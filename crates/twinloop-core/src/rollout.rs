@@ -4,7 +4,7 @@ use crate::any_dynamics::{AnyDynamics, AnyWorkspace};
 use crate::controller::{Controllers, Family};
 use crate::dynamics::{Dynamics, read_apart};
 use crate::excitation::Excitation;
-use crate::lanes::{Apart, Vector};
+use crate::lanes::{Apart, Vector, zeros};
 use crate::task::target_at;
 
 /// What runs start from, one a lane.
@@ -69,19 +69,6 @@ pub fn rollout<V: Vector>(
     start: &Start<'_, V>,
     watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
-    let (mut lasted, mut aside) = (vec![], Aside(watch));
-    let watch: &mut dyn Watch<V> = &mut aside;
-    V::apart(Run { dynamics, midway: None, start, watch, lasted: &mut lasted });
-    lasted
-}
-
-/// The same with a loop of its own: for what is run more than all else.
-#[inline(always)]
-pub(crate) fn own_rollout<V: Vector>(
-    dynamics: AnyDynamics<'_>,
-    start: &Start<'_, V>,
-    watch: &mut impl Watch<V>,
-) -> Vec<usize> {
     let mut lasted = vec![];
     V::apart(Run { dynamics, midway: None, start, watch, lasted: &mut lasted });
     lasted
@@ -103,14 +90,13 @@ pub(crate) fn resumed<'a, V: Vector>(
     start: &Start<'_, V>,
     watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
-    let (mut lasted, mut aside) = (vec![], Aside(watch));
-    let watch: &mut dyn Watch<V> = &mut aside;
+    let mut lasted = vec![];
     V::apart(Run { dynamics, midway: Some(midway), start, watch, lasted: &mut lasted });
     lasted
 }
 
-/// The roll-out as a function of its own: it is compiled once for each vector, whatever looks on by a pointer.
-struct Run<'a, 'd, V: Vector, W: ?Sized> {
+/// The roll-out as a function of its own, for each vector and what looks on.
+struct Run<'a, 'd, V: Vector, W> {
     dynamics: AnyDynamics<'d>,
     /// Where the run is; none at its beginning.
     midway: Option<Midway<AnyWorkspace<'d, V>, V>>,
@@ -119,31 +105,10 @@ struct Run<'a, 'd, V: Vector, W: ?Sized> {
     lasted: &'a mut Vec<usize>,
 }
 
-impl<V: Vector, W: Watch<V> + ?Sized> Apart for Run<'_, '_, V, W> {
+impl<V: Vector, W: Watch<V>> Apart for Run<'_, '_, V, W> {
     #[inline(always)]
     fn run(self) {
         *self.lasted = looped(&self.dynamics, self.midway, self.start, self.watch);
-    }
-}
-
-/// A watcher that is called: its own function has the instructions of the vector, which one of a trait object lacks.
-struct Aside<'a, W>(&'a mut W);
-
-impl<V: Vector, W: Watch<V>> Watch<V> for Aside<'_, W> {
-    fn see(&mut self, seen: Seen<'_, V>) {
-        V::apart(Look { watch: &mut *self.0, seen });
-    }
-}
-
-struct Look<'a, V, W> {
-    watch: &'a mut W,
-    seen: Seen<'a, V>,
-}
-
-impl<V: Vector, W: Watch<V>> Apart for Look<'_, V, W> {
-    #[inline(always)]
-    fn run(self) {
-        self.watch.see(self.seen);
     }
 }
 
@@ -152,7 +117,7 @@ impl<V: Vector, W: Watch<V>> Apart for Look<'_, V, W> {
 pub(crate) fn closed<D: Dynamics, V: Vector>(
     dynamics: &D,
     start: &Start<'_, V>,
-    watch: &mut dyn Watch<V>,
+    watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
     looped(dynamics, None, start, watch)
 }
@@ -162,7 +127,7 @@ fn looped<D: Dynamics, V: Vector>(
     dynamics: &D,
     midway: Option<Midway<D::Workspace<V>, V>>,
     start: &Start<'_, V>,
-    watch: &mut (impl Watch<V> + ?Sized),
+    watch: &mut impl Watch<V>,
 ) -> Vec<usize> {
     let Start { commands, initial, steps, limits, noise, disturbance } = *start;
     let states = initial.len();
@@ -184,7 +149,7 @@ fn looped<D: Dynamics, V: Vector>(
     if !late.is_empty() {
         read_apart(dynamics, &mut workspace, &state, &mut late);
     }
-    let mut command = vec![V::splat(0.0); width];
+    let mut command = zeros(width);
     let mut alive = V::splat(1.0);
     let mut lasted = vec![steps; V::LANES];
     for step in 0..steps {

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use crate::controller::Parameters;
 use crate::error::{Result, invalid};
 use crate::evolution::{Problem, Search, Snapshot, Variation};
-use crate::lgp::Learnt;
-use crate::model::{Frame, Model};
+use crate::model::OwnedModel;
 use crate::objective::{discrimination, final_distances, instability};
 use crate::rng::{Purpose, Stream};
 use crate::setting::Setting;
@@ -48,8 +47,7 @@ impl TestSettings {
 
 /// What candidates are judged with: the committee, whose first member is the best trade-off M*.
 struct Tests {
-    committee: Vec<Arc<Learnt>>,
-    frame: Arc<Frame>,
+    committee: Vec<OwnedModel>,
     setting: Arc<Setting>,
     task: Task,
     settings: TestSettings,
@@ -59,8 +57,7 @@ struct Tests {
 
 impl Tests {
     fn new(
-        committee: Vec<Arc<Learnt>>,
-        frame: Arc<Frame>,
+        committee: Vec<OwnedModel>,
         setting: Arc<Setting>,
         task: Task,
         settings: TestSettings,
@@ -68,10 +65,11 @@ impl Tests {
         iteration: u64,
     ) -> Result<Self> {
         let settings = settings.validated()?;
-        if committee.is_empty() {
-            return invalid("test search: expected a committee of one model or more, found none");
-        }
         let signals = setting.signals();
+        committee.iter().try_for_each(|model| model.check_for(signals))?;
+        if committee.is_empty() || committee.iter().any(|model| model.frame() != committee[0].frame()) {
+            return invalid("committee: expected one model or more, all of one form and one set of signals");
+        }
         if task.initial.len() != signals.states() {
             let (expected, found) = (signals.states(), task.initial.len());
             return invalid(format!("test search: expected a task of {expected} states, found {found}"));
@@ -83,7 +81,7 @@ impl Tests {
                 "test search: expected a target away from the initial state, at a finite distance, found one of {distance}"
             ));
         }
-        Ok(Self { committee, frame, setting, task, settings, seed, iteration })
+        Ok(Self { committee, setting, task, settings, seed, iteration })
     }
 
     /// The box of the candidates.
@@ -93,8 +91,7 @@ impl Tests {
 
     /// Final distances (models × candidates) on the first `models` members of the committee.
     fn distances(&self, models: usize, candidates: &[&[f64]], workers: &Workers) -> Vec<Vec<f64>> {
-        let members = self.committee[..models].iter();
-        let models: Vec<_> = members.map(|learnt| Model { code: &learnt.code, frame: &self.frame }).collect();
+        let models: Vec<_> = self.committee[..models].iter().map(OwnedModel::view).collect();
         final_distances(&models, &self.setting, candidates, &self.task, workers)
     }
 
@@ -179,8 +176,7 @@ impl TestSearch {
     /// A random population of tests over a committee whose first member is the best trade-off M*.
     #[allow(clippy::too_many_arguments)]
     pub fn start(
-        committee: Vec<Arc<Learnt>>,
-        frame: Arc<Frame>,
+        committee: Vec<OwnedModel>,
         setting: Arc<Setting>,
         task: Task,
         settings: TestSettings,
@@ -190,7 +186,7 @@ impl TestSearch {
         workers: &Workers,
     ) -> Result<Self> {
         let variation = variation.validated()?;
-        let tests = Tests::new(committee, frame, setting, task, settings, seed, iteration)?;
+        let tests = Tests::new(committee, setting, task, settings, seed, iteration)?;
         let search = Search::start(&tests, &variation, seed, iteration, workers);
         let candidates: Vec<&[f64]> = search.population().iter().map(|genome| &genome[..]).collect();
         let on_best = tests.distances(1, &candidates, workers).concat();
@@ -201,8 +197,7 @@ impl TestSearch {
     /// The search that a snapshot was taken of, over the same committee; `flat` as it was found at its start.
     #[allow(clippy::too_many_arguments)]
     pub fn restored(
-        committee: Vec<Arc<Learnt>>,
-        frame: Arc<Frame>,
+        committee: Vec<OwnedModel>,
         setting: Arc<Setting>,
         task: Task,
         settings: TestSettings,
@@ -213,7 +208,7 @@ impl TestSearch {
     ) -> Result<Self> {
         let variation = variation.validated()?;
         let (seed, iteration) = (snapshot.seed, snapshot.iteration);
-        let tests = Tests::new(committee, frame, setting, task, settings, seed, iteration)?;
+        let tests = Tests::new(committee, setting, task, settings, seed, iteration)?;
         let parameters = tests.parameters();
         if !snapshot.population.iter().chain(&snapshot.members).all(|genes| parameters.hold(genes)) {
             return invalid("test search: expected genes within the bounds of the family, found others");

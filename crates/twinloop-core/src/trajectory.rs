@@ -171,10 +171,9 @@ impl<'a> Runs<'a> {
             Source::Law { parameters, target, .. } => (parameters, target),
             Source::Record(commands) => (&[], commands),
         };
-        let (parameters, shared) = (pack::<V, _>(parameters), pack::<V, _>(&[shared]));
-        let rows = pack::<V, _>(self.influences.excitation);
-        let hold_back =
-            self.influences.hold_back.map_or_else(Vec::new, |found| pack::<V, _>(&[found.lines()]));
+        let (parameters, shared) = (pack::<V>(parameters), pack::<V>(&[shared]));
+        let rows = pack::<V>(self.influences.excitation);
+        let hold_back = self.influences.hold_back.map_or_else(Vec::new, |found| pack::<V>(&[found.lines()]));
         let excitation = Excitation { rows: &rows, hold_back: &hold_back };
         let commands = match self.source {
             Source::Law { family, .. } => {
@@ -184,11 +183,11 @@ impl<'a> Runs<'a> {
         };
         let start = Start {
             commands,
-            initial: &pack::<V, _>(&[self.initial]),
+            initial: &pack::<V>(&[self.initial]),
             steps: self.steps,
             limits: self.limits,
-            noise: &pack::<V, _>(self.influences.noise),
-            disturbance: &pack::<V, _>(self.influences.disturbance),
+            noise: &pack::<V>(self.influences.noise),
+            disturbance: &pack::<V>(self.influences.disturbance),
         };
         recorded(&start, self.initial, read, self.count, fly)
     }

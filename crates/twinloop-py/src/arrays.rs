@@ -1,6 +1,6 @@
 //! Arrays in both directions: whatever NumPy can read as float64 comes in, float64 in C order goes out.
 
-use numpy::ndarray::{Array1, Array2, Array3};
+use numpy::ndarray::{Array1, Array2, Array3, ArrayView, Dimension};
 use numpy::{
     AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLike1, PyArrayLike2, PyArrayLike3,
 };
@@ -15,9 +15,22 @@ pub type Matrix<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 /// An argument of three axes.
 pub type Cube<'py> = PyArrayLike3<'py, f64, AllowTypeChange>;
 
+/// All numbers of an array, in C order: at once where they lie so.
+pub fn numbers<D: Dimension>(array: ArrayView<'_, f64, D>) -> Vec<f64> {
+    array.as_slice().map_or_else(|| array.iter().copied().collect(), <[f64]>::to_vec)
+}
+
+/// Refuses NaN and infinite numbers.
+pub fn finite<'a>(name: &str, numbers: impl IntoIterator<Item = &'a f64>) -> Result<()> {
+    if numbers.into_iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(misuse(format!("{name}: expected finite numbers, found NaN or an infinite one")))
+}
+
 /// The numbers of a vector.
 pub fn vector(array: &Vector<'_>) -> Vec<f64> {
-    array.as_array().iter().copied().collect()
+    numbers(array.as_array())
 }
 
 /// The rows of a matrix that must have `columns` columns.
@@ -30,7 +43,7 @@ pub fn rows(name: &str, array: &Matrix<'_>, columns: usize) -> Result<Vec<Vec<f6
             array.ncols()
         )));
     }
-    Ok(array.rows().into_iter().map(|row| row.iter().copied().collect()).collect())
+    Ok(array.outer_iter().map(numbers).collect())
 }
 
 /// The rows of a matrix that may be left out; none then.
@@ -45,7 +58,7 @@ pub fn optional_blocks(name: &str, array: Option<Cube<'_>>, expected: [usize; 3]
     if array.shape() != expected {
         return Err(misuse(format!("{name}: expected shape {expected:?}, found {:?}", array.shape())));
     }
-    Ok(array.outer_iter().map(|block| block.iter().copied().collect()).collect())
+    Ok(array.outer_iter().map(numbers).collect())
 }
 
 /// A vector, or rows of vectors.
@@ -59,8 +72,8 @@ impl VectorOrRows<'_> {
     /// All numbers, row after row.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
-            Self::One(vector) => vector.as_array().iter().copied().collect(),
-            Self::Rows(rows) => rows.as_array().iter().copied().collect(),
+            Self::One(vector) => numbers(vector.as_array()),
+            Self::Rows(rows) => numbers(rows.as_array()),
         }
     }
 }
@@ -76,12 +89,8 @@ impl RowsOrBlocks<'_> {
     /// The numbers of each, row after row.
     pub fn each(&self) -> Vec<Vec<f64>> {
         match self {
-            Self::Rows(rows) => {
-                rows.as_array().outer_iter().map(|row| row.iter().copied().collect()).collect()
-            }
-            Self::Blocks(blocks) => {
-                blocks.as_array().outer_iter().map(|block| block.iter().copied().collect()).collect()
-            }
+            Self::Rows(rows) => rows.as_array().outer_iter().map(numbers).collect(),
+            Self::Blocks(blocks) => blocks.as_array().outer_iter().map(numbers).collect(),
         }
     }
 }

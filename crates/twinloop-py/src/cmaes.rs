@@ -2,14 +2,11 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::CmaEs;
+use twinloop_core::{CmaEs, Eigen};
 
-use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector};
-use crate::error::{Result, misuse};
+use crate::arrays::{Matrix, Vector, numbers, rows, to_matrix, to_vector, vector};
+use crate::error::Result;
 use crate::rng::Name;
-
-/// More points of a generation than this are refused.
-const MOST_POINTS: usize = 1_000_000;
 
 /// A search for the least value of a function as a value: ask for points, judge them, tell.
 #[pyclass(frozen, name = "CmaEs", module = "twinloop._core")]
@@ -19,11 +16,6 @@ pub struct PyCmaEs(CmaEs);
 impl PyCmaEs {
     #[new]
     fn new(mean: Vector<'_>, step: f64, population: usize, unit: Name) -> Result<Self> {
-        if population > MOST_POINTS {
-            return Err(misuse(format!(
-                "CMA-ES: expected at most {MOST_POINTS} points of a generation, found {population}"
-            )));
-        }
         Ok(Self(CmaEs::new(&vector(&mean), step, population, unit.unit()?)?))
     }
 
@@ -69,16 +61,7 @@ pub fn eigen<'py>(
     py: Python<'py>,
     matrix: Matrix<'py>,
 ) -> Result<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
-    let (order, columns) = matrix.as_array().dim();
-    if order != columns {
-        return Err(misuse(format!("eigen: expected a square matrix, found {order} × {columns}")));
-    }
-    let numbers = rows("eigen", &matrix, order)?.concat();
-    if numbers.is_empty() || !numbers.iter().all(|x| x.is_finite()) {
-        return Err(misuse(
-            "eigen: expected finite numbers, at least one, found NaN, an infinite one or none".into(),
-        ));
-    }
-    let found = twinloop_core::Eigen::new(&numbers, order);
-    Ok((to_vector(py, found.values), to_matrix(py, order, found.vectors)))
+    let (rows, columns) = matrix.as_array().dim();
+    let found = Eigen::checked(&numbers(matrix.as_array()), [rows, columns])?;
+    Ok((to_vector(py, found.values), to_matrix(py, columns, found.vectors)))
 }

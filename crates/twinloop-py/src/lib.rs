@@ -17,6 +17,7 @@ mod program;
 mod regression;
 mod rng;
 mod rollout;
+mod rows;
 mod search;
 mod selected;
 mod setting;

@@ -1,26 +1,21 @@
 //! Looking ahead in the midst of a flight.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard};
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
-use twinloop_core::{Ahead, Frame, Learnt, LookAhead, Model};
+use twinloop_core::{Ahead, LookAhead};
 
 use crate::arrays::{Matrix, Vector, VectorOrRows, optional_rows, rows, to_vector, vector};
 use crate::error::{Result, misuse};
 use crate::excitation::PyHoldBack;
-use crate::model::PyModel;
+use crate::model::{PyModel, owned};
 use crate::setting::PySetting;
 
 /// Where a flight is, and what a committee says of the periods to come.
 #[pyclass(frozen, name = "LookAhead", module = "twinloop._core")]
-pub struct PyLookAhead {
-    members: Vec<(Arc<Learnt>, Arc<Frame>)>,
-    states: usize,
-    commands: usize,
-    ahead: Mutex<LookAhead>,
-}
+pub struct PyLookAhead(Mutex<LookAhead>);
 
 #[pymethods]
 impl PyLookAhead {
@@ -30,7 +25,7 @@ impl PyLookAhead {
     ))]
     #[expect(clippy::too_many_arguments, reason = "what a flight is, named by keyword in Python")]
     fn new(
-        members: Vec<PyRef<'_, PyModel>>,
+        members: Vec<Bound<'_, PyModel>>,
         setting: &PySetting,
         parameters: Vector<'_>,
         target: VectorOrRows<'_>,
@@ -40,9 +35,6 @@ impl PyLookAhead {
         hold_back: Option<&PyHoldBack>,
     ) -> Result<Self> {
         let signals = setting.0.signals();
-        for member in &members {
-            member.fits(signals)?;
-        }
         let bounds = rows("envelope", &envelope, 2)?;
         let flight = Ahead {
             setting: setting.0.clone(),
@@ -53,14 +45,11 @@ impl PyLookAhead {
             steps,
             envelope: bounds.iter().map(|row| (row[0], row[1])).collect(),
         };
-        let members: Vec<_> =
-            members.iter().map(|member| (member.learnt.clone(), member.frame.clone())).collect();
-        let ahead = Mutex::new(LookAhead::new(&models(&members), flight)?);
-        Ok(Self { members, states: signals.states(), commands: signals.commands(), ahead })
+        Ok(Self(Mutex::new(LookAhead::new(owned(&members), flight)?)))
     }
 
     fn reset(&self, py: Python<'_>) -> Result<()> {
-        self.lock(py)?.reset(&models(&self.members));
+        self.lock(py)?.reset();
         Ok(())
     }
 
@@ -70,8 +59,7 @@ impl PyLookAhead {
         reading: Vector<'_>,
         horizon: usize,
     ) -> Result<Option<(usize, usize, usize)>> {
-        let reading = numbers("reading", &reading, self.states)?;
-        let found = self.lock(py)?.leaving(&models(&self.members), &reading, horizon);
+        let found = self.lock(py)?.leaving(&vector(&reading), horizon)?;
         Ok(found.map(|leaving| (leaving.periods, leaving.state, leaving.member)))
     }
 
@@ -82,11 +70,7 @@ impl PyLookAhead {
         target: Vector<'_>,
         command: Vector<'_>,
     ) -> Result<()> {
-        let reading = numbers("reading", &reading, self.states)?;
-        let target = numbers("target", &target, self.states)?;
-        let command = numbers("command", &command, self.commands)?;
-        self.lock(py)?.sent(&models(&self.members), &reading, &target, &command);
-        Ok(())
+        Ok(self.lock(py)?.sent(&vector(&reading), &vector(&target), &vector(&command))?)
     }
 
     fn following<'py>(
@@ -95,31 +79,14 @@ impl PyLookAhead {
         state: Vector<'_>,
         command: Vector<'_>,
     ) -> Result<Bound<'py, PyArray1<f64>>> {
-        let state = numbers("state", &state, self.states)?;
-        let command = numbers("command", &command, self.commands)?;
-        let following = self.lock(py)?.following(&models(&self.members), &state, &command);
-        Ok(to_vector(py, following))
+        Ok(to_vector(py, self.lock(py)?.following(&vector(&state), &vector(&command))?))
     }
 }
 
 impl PyLookAhead {
     fn lock(&self, py: Python<'_>) -> Result<MutexGuard<'_, LookAhead>> {
-        self.ahead
+        self.0
             .lock_py_attached(py)
             .map_err(|_| misuse("look-ahead: expected one that has not panicked; make a new one".into()))
     }
-}
-
-/// The engine's views of the members.
-fn models(members: &[(Arc<Learnt>, Arc<Frame>)]) -> Vec<Model<'_>> {
-    members.iter().map(|(learnt, frame)| Model { code: &learnt.code, frame }).collect()
-}
-
-/// So many finite numbers.
-fn numbers(what: &str, found: &Vector<'_>, expected: usize) -> Result<Vec<f64>> {
-    let found = vector(found);
-    if found.len() == expected && found.iter().all(|x| x.is_finite()) {
-        return Ok(found);
-    }
-    Err(misuse(format!("look-ahead: expected a {what} of {expected} finite numbers, found {found:?}")))
 }

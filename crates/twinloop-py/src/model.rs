@@ -5,13 +5,14 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, AnyDynamics, Form, Frame, Hidden, Learnt, Model, Periods, RigidBody, Sensors,
-    Signals, Width, effects, state_of, step_rows,
+    Actuation, Actuator, AnyDynamics, Form, Hidden, OwnedModel, Periods, RigidBody, Signals, checked_effects,
+    state_of,
 };
 
-use crate::arrays::{Cube, Matrix, Vector, optional_blocks, rows, to_matrix, to_vector, vector, views};
-use crate::error::{Result, misuse};
+use crate::arrays::{Cube, Matrix, Vector, rows, to_matrix, to_vector, vector};
+use crate::error::Result;
 use crate::program::PyProgram;
+use crate::rows::Rows;
 use crate::workers::{PyWorkers, or_default};
 
 /// Period, scales, bounds and derivatives of states and commands, as numbers.
@@ -52,52 +53,11 @@ impl PySignals {
 
 /// A program with the form that makes it dynamics.
 #[pyclass(frozen, name = "Model", module = "twinloop._core")]
-pub struct PyModel {
-    pub learnt: Arc<Learnt>,
-    pub frame: Arc<Frame>,
-    signals: Arc<Signals>,
-}
+pub struct PyModel(pub OwnedModel);
 
-impl PyModel {
-    /// A model that was learnt in a frame.
-    pub fn of(learnt: Arc<Learnt>, frame: Arc<Frame>, signals: Arc<Signals>) -> Self {
-        Self { learnt, frame, signals }
-    }
-
-    /// The same model without introns, with these constants, lags and times of hidden states.
-    pub fn varied(&self, constants: &[f64], lags: &[f64]) -> Result<PyModel> {
-        let program = self.learnt.program.effective().with_constants(constants)?;
-        let actuation = self.frame.actuation();
-        let other = actuation.with_times(lags)?;
-        let frame = if actuation.is_direct() {
-            self.frame.clone()
-        } else {
-            Arc::new((*self.frame).clone().with_actuation(other)?)
-        };
-        Ok(PyModel::of(Arc::new(Learnt::new(program)), frame, self.signals().clone()))
-    }
-
-    /// What it is a model of.
-    pub fn signals(&self) -> &Arc<Signals> {
-        &self.signals
-    }
-
-    /// Refuses signals of other states or commands, another period or other derivatives.
-    pub fn fits(&self, signals: &Signals) -> Result<()> {
-        if self.frame.fits(signals) {
-            return Ok(());
-        }
-        Err(misuse(
-            "model: expected one with the states, commands and period of the signals, found another; make or learn it \
-             for them"
-                .into(),
-        ))
-    }
-
-    /// The engine's view of it.
-    pub fn core(&self) -> Model<'_> {
-        Model { code: &self.learnt.code, frame: &self.frame }
-    }
+/// Models that a list of Python objects holds, as the engine keeps them.
+pub fn owned(models: &[Bound<'_, PyModel>]) -> Vec<OwnedModel> {
+    models.iter().map(|model| model.get().0.clone()).collect()
 }
 
 #[pymethods]
@@ -112,49 +72,42 @@ impl PyModel {
         hidden: Vec<HiddenParts>,
         offsets: Vec<f64>,
     ) -> Result<Self> {
-        let form: Form = form.parse()?;
-        Model::check(&program.0.program, form, &signals.0, hidden.len())?;
-        let mut frame = Frame::new(form, &signals.0);
-        if let Some(actuators) = actuators {
-            frame = frame.with_actuation(actuation(actuators, hidden))?;
-        } else if !hidden.is_empty() {
-            return Err(misuse("model: expected actuators with hidden states, found none".into()));
-        }
-        let model = Self::of(program.0.clone(), Arc::new(frame), signals.0.clone());
-        if offsets.is_empty() { Ok(model) } else { model.with_offsets(offsets) }
+        let acts = actuators.is_some() || !hidden.is_empty();
+        let actuation = acts.then(|| actuation(actuators.unwrap_or_default(), hidden));
+        let model = OwnedModel::new(program.0.clone(), form.parse()?, signals.0.clone(), actuation)?;
+        Ok(Self(if offsets.is_empty() { model } else { model.with_offsets(&offsets)? }))
     }
 
     /// The same model, of which each state is read so many s later (n_x).
-    fn with_offsets(&self, offsets: Vec<f64>) -> Result<PyModel> {
-        let frame = (*self.frame).clone().with_sensors(Sensors::new(&offsets, &self.signals)?);
-        Ok(Self::of(self.learnt.clone(), Arc::new(frame), self.signals.clone()))
+    fn with_offsets(&self, offsets: Vec<f64>) -> Result<Self> {
+        Ok(Self(self.0.with_offsets(&offsets)?))
     }
 
     /// By how much later than others each state is read, s; empty where all are read in time.
     #[getter]
     fn offsets(&self) -> Vec<f64> {
-        self.frame.sensors().offsets().to_vec()
+        self.0.frame().sensors().offsets().to_vec()
     }
 
     /// The states (rows, n_x) whose readings these are, each at the start of a run.
     fn states_of<'py>(&self, py: Python<'py>, readings: Matrix<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
-        let n_x = self.signals.states();
+        let n_x = self.0.signals().states();
         let readings = rows("readings", &readings, n_x)?;
-        let states = readings.iter().flat_map(|reading| state_of(&self.core(), reading)).collect();
+        let states = readings.iter().flat_map(|reading| state_of(&self.0.view(), reading)).collect();
         Ok(to_matrix(py, n_x, states))
     }
 
     /// (lag, delay, rest) of each command's actuator; empty where every command acts at once and nothing is hidden.
     #[getter]
     fn actuators(&self) -> Vec<ActuatorParts> {
-        self.frame.actuation().actuators.iter().map(|a| (a.lag, a.delay, a.rest)).collect()
+        self.0.frame().actuation().actuators.iter().map(|a| (a.lag, a.delay, a.rest)).collect()
     }
 
     /// (commands, squared, rest, time) of each hidden state.
     #[getter]
     fn hidden(&self) -> Vec<HiddenParts> {
         let parts = |h: &Hidden| (h.commands.clone(), h.squared, h.rest, h.time);
-        self.frame.actuation().hidden.iter().map(parts).collect()
+        self.0.frame().actuation().hidden.iter().map(parts).collect()
     }
 
     #[staticmethod]
@@ -164,23 +117,24 @@ impl PyModel {
 
     #[getter]
     fn program(&self) -> PyProgram {
-        PyProgram(self.learnt.clone())
+        PyProgram(self.0.learnt().clone())
     }
 
     /// Constants of the effective program, in its order.
     #[getter]
     fn constants<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        to_vector(py, self.learnt.code.constants().to_vec())
+        to_vector(py, self.0.learnt().code.constants().to_vec())
     }
 
     /// The same model without introns, with other constants, and other lags and times of hidden states (none: the same).
-    fn with_constants(&self, constants: Vec<f64>, lags: Option<Vec<f64>>) -> Result<PyModel> {
-        self.varied(&constants, &lags.unwrap_or_else(|| self.frame.actuation().times()))
+    fn with_constants(&self, constants: Vec<f64>, lags: Option<Vec<f64>>) -> Result<Self> {
+        let times = lags.unwrap_or_else(|| self.0.frame().actuation().times());
+        Ok(Self(self.0.varied(&constants, &times)?))
     }
 
     #[getter]
     fn form(&self) -> &'static str {
-        self.frame.form().name()
+        self.0.frame().form().name()
     }
 
     #[pyo3(signature = (states, commands, workers = None, past = None))]
@@ -192,10 +146,10 @@ impl PyModel {
         workers: Option<&PyWorkers>,
         past: Option<Cube<'py>>,
     ) -> Result<Bound<'py, PyArray2<f64>>> {
-        let (n_x, n_u) = (self.signals.states(), self.signals.commands());
+        let (n_x, n_u) = (self.0.signals().states(), self.0.signals().commands());
         let rows = Rows::new(&states, &commands, past, n_x, n_u)?;
         let width = or_default(workers)?.width();
-        let next = py.detach(|| rows.step(AnyDynamics::Model(self.core()), width));
+        let next = py.detach(|| rows.step(AnyDynamics::Model(self.0.view()), width));
         Ok(to_matrix(py, n_x, next))
     }
 }
@@ -225,53 +179,7 @@ pub fn command_effects<'py>(
     dt: f64,
     commands: Matrix<'py>,
 ) -> Result<[Bound<'py, PyArray2<f64>>; 3]> {
-    let n_u = actuators.len();
-    if n_u == 0 {
-        return Err(misuse("actuators: expected one for each command, found none".into()));
-    }
-    let commands = rows("commands", &commands, n_u)?.concat();
-    let scales = vector(&scales);
-    let positive = |x: f64| x.is_finite() && x > 0.0;
-    if scales.len() != n_u || !scales.iter().chain([&dt]).all(|&x| positive(x)) {
-        return Err(misuse(format!("expected {n_u} scales and a period above 0, found {scales:?} and {dt}")));
-    }
-    let factors: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
-    let asked = actuation(actuators, hidden);
-    let all = asked.actuators.clone();
-    // Actuators that all act at once are kept: here they only pass commands on.
-    let checked = Actuation { actuators: all, ..asked.validated(n_u)? };
-    let columns = n_u + checked.hidden.len();
-    Ok(effects(&checked, &factors, dt, &commands).map(|values| to_matrix(py, columns, values)))
-}
-
-/// States (rows, n_x), commands (rows, n_u), and what was commanded before (rows, p, n_u), if anything was.
-pub struct Rows {
-    states: Vec<Vec<f64>>,
-    commands: Vec<Vec<f64>>,
-    past: Vec<Vec<f64>>,
-}
-
-impl Rows {
-    /// Refuses different numbers of rows, and columns that are not those of the dynamics.
-    pub fn new(
-        states: &Matrix<'_>,
-        commands: &Matrix<'_>,
-        past: Option<Cube<'_>>,
-        n_x: usize,
-        n_u: usize,
-    ) -> Result<Self> {
-        let (states, commands) = (rows("states", states, n_x)?, rows("commands", commands, n_u)?);
-        if states.len() != commands.len() {
-            let (x, u) = (states.len(), commands.len());
-            return Err(misuse(format!("expected as many states as commands, found {x} and {u}")));
-        }
-        let periods = past.as_ref().map_or(0, |past| past.as_array().shape()[1]);
-        let past = optional_blocks("past", past, [states.len(), periods, n_u])?;
-        Ok(Self { states, commands, past })
-    }
-
-    /// The next states.
-    pub fn step(&self, dynamics: AnyDynamics<'_>, width: Width) -> Vec<f64> {
-        step_rows(dynamics, &views(&self.states), &views(&self.commands), &views(&self.past), width)
-    }
+    let commands = rows("commands", &commands, actuators.len())?.concat();
+    let (found, columns) = checked_effects(actuation(actuators, hidden), &vector(&scales), dt, &commands)?;
+    Ok(found.map(|values| to_matrix(py, columns, values)))
 }

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{Model, Signals};
 
-use crate::arrays::{Matrix, rows, to_rows, to_vector, views};
+use crate::arrays::{Matrix, finite, rows, to_rows, to_vector, views};
 use crate::error::{Result, misuse};
 use crate::law::flown;
 use crate::model::PyModel;
@@ -85,9 +85,7 @@ pub fn final_distances<'py>(
     let (setting, task) = (&*setting.0, rollout::fitting(task, &setting.0)?);
     let parameters = rows("parameters", &parameters, setting.family().parameters().len())?;
     let models = fitting(&models, setting.signals())?;
-    if !parameters.iter().flatten().all(|x| x.is_finite()) {
-        return Err(misuse("parameters: expected finite numbers, found NaN or an infinite one".into()));
-    }
+    finite("parameters", parameters.iter().flatten())?;
     let distances =
         flown(py, || twinloop_core::final_distances(&models, setting, &views(&parameters), task, &workers))?;
     Ok(to_rows(py, [models.len(), parameters.len()], distances.concat()))
@@ -95,7 +93,7 @@ pub fn final_distances<'py>(
 
 /// The engine's view of models that are for the signals.
 pub fn fitting<'a>(models: &'a [Bound<'_, PyModel>], signals: &Signals) -> Result<Vec<Model<'a>>> {
-    models.iter().map(|model| model.get().fits(signals).map(|()| model.get().core())).collect()
+    Ok(twinloop_core::views(models.iter().map(|model| &model.get().0), signals)?)
 }
 
 /// A column of distances for each test, none of them NaN, and at least one row.

@@ -4,15 +4,15 @@ use std::sync::Mutex;
 
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1};
 use pyo3::prelude::*;
-use twinloop_core::pareto::{self, Archive, Distance, Objectives};
+use twinloop_core::pareto::{self, Distance, NumberedArchive, Objectives};
 
-use crate::arrays::{Matrix, to_integers, to_matrix, to_vector};
+use crate::arrays::{Matrix, numbers, to_integers, to_matrix, to_vector};
 use crate::error::{Result, misuse};
 
 /// The one door at which numbers that are not finite are refused.
 pub fn matrix(array: &Matrix<'_>) -> Result<Objectives> {
     let array = array.as_array();
-    Ok(Objectives::new(array.ncols(), array.iter().copied().collect())?)
+    Ok(Objectives::new(array.ncols(), numbers(array))?)
 }
 
 /// Front of each row, 0 for the non-dominated.
@@ -74,69 +74,45 @@ pub fn distance(normalised: bool) -> Distance {
     if normalised { Distance::Normalised } else { Distance::Raw }
 }
 
-/// More objectives than this are refused.
-const MOST_COLUMNS: usize = 1_000_000;
-
 /// Non-dominated set of rows, each with the number under which it was offered.
 #[pyclass(frozen, name = "Archive", module = "twinloop._core")]
-pub struct PyArchive(Mutex<Numbered>);
-
-struct Numbered {
-    archive: Archive<usize>,
-    columns: usize,
-    offered: usize,
-}
+pub struct PyArchive(Mutex<NumberedArchive>);
 
 #[pymethods]
 impl PyArchive {
     #[new]
     #[pyo3(signature = (columns, width = "auto"))]
     fn new(columns: usize, width: &str) -> Result<Self> {
-        if !(1..=MOST_COLUMNS).contains(&columns) {
-            return Err(misuse(format!("archive: expected 1 to {MOST_COLUMNS} columns, found {columns}")));
-        }
-        let archive = Archive::new(columns, width.parse()?);
-        Ok(Self(Mutex::new(Numbered { archive, columns, offered: 0 })))
+        Ok(Self(Mutex::new(NumberedArchive::new(columns, width.parse()?)?)))
     }
 
     fn offer<'py>(&self, py: Python<'py>, objectives: Matrix<'py>) -> Result<Bound<'py, PyArray1<i64>>> {
-        let objectives = matrix(&objectives)?;
-        let mut numbered = self.lock()?;
-        if objectives.columns() != numbered.columns {
-            let (expected, found) = (numbered.columns, objectives.columns());
-            return Err(misuse(format!("archive: expected {expected} objectives, found {found}")));
-        }
-        for row in objectives.rows() {
-            let number = numbered.offered;
-            numbered.archive.offer(row, || number);
-            numbered.offered += 1;
-        }
-        Ok(to_integers(py, numbered.archive.members().iter().copied()))
+        self.lock()?.offer(&matrix(&objectives)?)?;
+        self.members(py)
     }
 
     fn prune(&self, cap: usize) -> Result<bool> {
-        Ok(self.lock()?.archive.prune(cap))
+        Ok(self.lock()?.prune(cap))
     }
 
     #[getter]
     fn objectives<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
-        let numbered = self.lock()?;
-        let objectives = numbered.archive.objectives();
-        Ok(to_matrix(py, numbered.columns, objectives.rows().flatten().copied().collect()))
+        let objectives = self.lock()?.archive().objectives();
+        Ok(to_matrix(py, objectives.columns(), objectives.rows().flatten().copied().collect()))
     }
 
     #[getter]
     fn members<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<i64>>> {
-        Ok(to_integers(py, self.lock()?.archive.members().iter().copied()))
+        Ok(to_integers(py, self.lock()?.archive().members().iter().copied()))
     }
 
     fn __len__(&self) -> Result<usize> {
-        Ok(self.lock()?.archive.len())
+        Ok(self.lock()?.archive().len())
     }
 }
 
 impl PyArchive {
-    fn lock(&self) -> Result<std::sync::MutexGuard<'_, Numbered>> {
+    fn lock(&self) -> Result<std::sync::MutexGuard<'_, NumberedArchive>> {
         self.0
             .lock()
             .map_err(|_| misuse("archive: expected one that has not panicked; make a new one".into()))

@@ -2,11 +2,11 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{AnyDynamics, Quadrotor, Scalar, Vector as _};
+use twinloop_core::{AnyDynamics, Quadrotor};
 
 use crate::arrays::{Cube, Matrix, Vector, to_matrix, to_vector, vector};
-use crate::error::{Result, misuse};
-use crate::model::Rows;
+use crate::error::Result;
+use crate::rows::Rows;
 use crate::workers::{PyWorkers, or_default};
 
 /// Attitude dynamics of a quadrotor under four rotor speeds, one Runge–Kutta step a period.
@@ -21,7 +21,7 @@ impl PyQuadrotor {
     fn new(
         dt: f64,
         arm: f64,
-        inertia: Vector<'_>,
+        inertia: [f64; 3],
         rotor_inertia: f64,
         thrust_factor: f64,
         drag_factor: f64,
@@ -30,10 +30,6 @@ impl PyQuadrotor {
         motor_lag: f64,
         hover_speed: f64,
     ) -> Result<Self> {
-        let inertia = vector(&inertia);
-        let inertia = inertia.try_into().map_err(|found: Vec<f64>| {
-            misuse(format!("inertia: expected the three numbers I_x, I_y, I_z, found {}", found.len()))
-        })?;
         let gyroscopic = gyroscopic.parse()?;
         let plant = Quadrotor {
             dt,
@@ -56,15 +52,7 @@ impl PyQuadrotor {
         state: Vector<'py>,
         command: Vector<'py>,
     ) -> Result<Bound<'py, PyArray1<f64>>> {
-        let (state, command) = (vector(&state), vector(&command));
-        if state.len() != 6 || command.len() != 4 {
-            let (n_x, n_u) = (state.len(), command.len());
-            return Err(misuse(format!("expected 6 states and 4 commands, found {n_x} and {n_u}")));
-        }
-        let lanes = |values: &[f64]| values.iter().map(|&value| Scalar::splat(value)).collect::<Vec<_>>();
-        let mut slope = [Scalar::splat(0.0); 6];
-        self.0.derivative(&lanes(&state), &lanes(&command), &mut slope);
-        Ok(to_vector(py, slope.iter().map(|lane| lane.lane(0)).collect()))
+        Ok(to_vector(py, self.0.slope(&vector(&state), &vector(&command))?))
     }
 
     #[pyo3(signature = (states, commands, workers = None, past = None))]

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Annealing, Chain, Choices, Gram, Noise, Record, likelihood, most_likely_noise, search};
+use twinloop_core::{
+    Annealing, Chain, Found, Gram, Leftover, Noise, Record, Regression, Solution, search_all,
+};
 
-use crate::arrays::{Matrix, Vector, rows, to_matrix, to_vector, vector};
+use crate::arrays::{Matrix, Vector, finite, rows, to_matrix, to_vector, vector};
 use crate::error::{Result, misuse};
 use crate::rng::Name;
 use crate::workers::{PyWorkers, or_default};
@@ -21,46 +23,26 @@ type Walked = Vec<(Vec<usize>, f64)>;
 
 /// Records of one chain of states with the features that may drive it.
 #[pyclass(frozen, name = "Regression", module = "twinloop._core")]
-pub struct PyRegression {
-    chain: Chain,
-    records: Vec<Record>,
-    features: usize,
-}
+pub struct PyRegression(Regression);
 
 #[pymethods]
 impl PyRegression {
     #[new]
     fn new(states: usize, dt: f64, integrated: bool, records: Vec<RecordArrays<'_>>) -> Result<Self> {
         let chain = Chain { states, dt, integrated }.validated()?;
-        let mut features = None;
-        let mut built = Vec::with_capacity(records.len());
-        for (measured, weights, start, middle, end) in &records {
-            let p = *features.get_or_insert(start.as_array().ncols());
-            let steps = start.as_array().nrows();
-            let shapes = [middle, end].iter().all(|m| m.as_array().dim() == (steps, p))
-                && start.as_array().dim() == (steps, p)
-                && [measured, weights].iter().all(|m| m.as_array().dim() == (steps + 1, states));
-            if !shapes {
-                return Err(misuse(format!(
-                    "record: expected n rows of {p} features three times and n + 1 rows of {states} readings and weights"
-                )));
-            }
-            let flat = |m: &Matrix<'_>, columns| rows("record", m, columns).map(|rows| rows.concat());
-            let record = Record::new(
-                &chain,
-                flat(measured, states)?,
-                flat(weights, states)?,
-                &flat(start, p)?,
-                &flat(middle, p)?,
-                &flat(end, p)?,
-            );
-            let numbers = record.increments.iter().chain(&record.measured).chain(&record.weights);
-            if !numbers.copied().all(f64::is_finite) {
-                return Err(misuse("record: expected finite numbers, found NaN or an infinite one".into()));
-            }
-            built.push(record);
-        }
-        Ok(Self { chain, records: built, features: features.unwrap_or(0) })
+        let features = records.first().map_or(0, |(_, _, start, _, _)| start.as_array().ncols());
+        let record = |(measured, weights, start, middle, end): &RecordArrays<'_>| {
+            let flat = |matrix: &Matrix<'_>, columns| -> Result<Vec<f64>> {
+                let found = rows("record", matrix, columns)?.concat();
+                finite("record", &found)?;
+                Ok(found)
+            };
+            let [start, middle, end] = [start, middle, end].map(|values| flat(values, features));
+            let (measured, weights) = (flat(measured, states)?, flat(weights, states)?);
+            Ok(Record::new(&chain, measured, weights, &start?, &middle?, &end?)?)
+        };
+        let records = records.iter().map(record).collect::<Result<_>>()?;
+        Ok(Self(Regression::new(chain, features, records)?))
     }
 
     /// Readings less what the coefficients explain, a matrix for each record.
@@ -69,17 +51,12 @@ impl PyRegression {
         py: Python<'py>,
         coefficients: Vector<'py>,
     ) -> Result<Vec<Bound<'py, PyArray2<f64>>>> {
-        let coefficients = self.coefficients(&coefficients)?;
-        Ok(self
-            .records
-            .iter()
-            .map(|record| to_matrix(py, self.chain.states, record.residual(&self.chain, &coefficients)))
-            .collect())
+        let residuals = self.0.residuals(&vector(&coefficients))?;
+        Ok(residuals.into_iter().map(|residual| to_matrix(py, self.0.chain().states, residual)).collect())
     }
 
     fn likelihood(&self, coefficients: Vector<'_>, sensors: Vector<'_>, motion: Motion) -> Result<f64> {
-        let residuals = self.leftovers(&coefficients)?;
-        Ok(likelihood(&self.chain, &self.records, &residuals, &self.noise(&sensors, motion)?))
+        Ok(self.0.likelihood(&vector(&coefficients), &self.noise(&sensors, motion)?)?)
     }
 
     #[pyo3(signature = (sensors, motion, workers = None))]
@@ -92,30 +69,13 @@ impl PyRegression {
     ) -> Result<PyGram> {
         let workers = or_default(workers)?;
         let noise = self.noise(&sensors, motion)?;
-        let gram = py.detach(|| Gram::new(&self.chain, &self.records, self.features, &noise, &workers));
-        Ok(PyGram(Arc::new(gram)))
+        Ok(PyGram(Arc::new(py.detach(|| self.0.gram(&noise, &workers)))))
     }
 }
 
 impl PyRegression {
-    fn coefficients(&self, coefficients: &Vector<'_>) -> Result<Vec<f64>> {
-        let coefficients = vector(coefficients);
-        if coefficients.len() != self.features || !coefficients.iter().all(|c| c.is_finite()) {
-            return Err(misuse(format!(
-                "expected {} finite coefficients, found {coefficients:?}",
-                self.features
-            )));
-        }
-        Ok(coefficients)
-    }
-
-    fn leftovers(&self, coefficients: &Vector<'_>) -> Result<Vec<Vec<f64>>> {
-        let coefficients = self.coefficients(coefficients)?;
-        Ok(self.records.iter().map(|record| record.residual(&self.chain, &coefficients)).collect())
-    }
-
     fn noise(&self, sensors: &Vector<'_>, (process, gust, memory): Motion) -> Result<Noise> {
-        Ok(Noise { sensors: vector(sensors), process, gust, memory }.validated(self.chain.states)?)
+        Ok(Noise { sensors: vector(sensors), process, gust, memory }.validated(self.0.chain().states)?)
     }
 }
 
@@ -132,19 +92,17 @@ pub fn most_likely_noises<'py>(
     workers: Option<&PyWorkers>,
 ) -> Result<Vec<(Bound<'py, PyArray1<f64>>, Motion, f64)>> {
     let workers = or_default(workers)?;
-    let mut posed = Vec::with_capacity(problems.len());
-    for (regression, coefficients, sensors, motion, smallest_sensors, smallest_motion) in &problems {
-        let regression = regression.get();
-        let residuals = regression.leftovers(coefficients)?;
-        let start = regression.noise(sensors, *motion)?;
-        posed.push((regression, residuals, start, regression.noise(smallest_sensors, *smallest_motion)?));
+    let mut leftovers = Vec::with_capacity(problems.len());
+    for (regression, coefficients, sensors, motion, least_sensors, least_motion) in &problems {
+        let own = regression.get();
+        leftovers.push(Leftover {
+            regression: &own.0,
+            coefficients: vector(coefficients),
+            start: own.noise(sensors, *motion)?,
+            smallest: own.noise(least_sensors, *least_motion)?,
+        });
     }
-    let found = py.detach(|| {
-        workers.map(posed.len(), |i| {
-            let (regression, residuals, start, smallest) = &posed[i];
-            most_likely_noise(&regression.chain, &regression.records, residuals, start, smallest)
-        })
-    });
+    let found = py.detach(|| twinloop_core::most_likely_noises(&leftovers, &workers))?;
     let told = |(noise, score): (Noise, f64)| {
         (to_vector(py, noise.sensors), (noise.process, noise.gust, noise.memory), score)
     };
@@ -175,9 +133,7 @@ impl PyGram {
     /// With more rows: features, and a reading at the end.
     fn with_rows(&self, rows: Matrix<'_>) -> Result<Self> {
         let flat = crate::arrays::rows("rows", &rows, self.0.features + 1)?.concat();
-        if !flat.iter().all(|x| x.is_finite()) {
-            return Err(misuse("rows: expected finite numbers, found NaN or an infinite one".into()));
-        }
+        finite("rows", &flat)?;
         Ok(Self(Arc::new(Gram::clone(&self.0).with_rows(&flat))))
     }
 
@@ -190,21 +146,13 @@ impl PyGram {
         subset: Vec<usize>,
         ridge: f64,
     ) -> Result<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64)>> {
-        if subset.iter().any(|&j| j >= self.0.features) || !(ridge.is_finite() && ridge >= 0.0) {
-            return Err(misuse(format!(
-                "subset: expected features below {} and a ridge of at least 0, found {subset:?} and {ridge}",
-                self.0.features
-            )));
-        }
-        let k = subset.len();
-        Ok(self.0.solve(&subset, ridge).map(|solution| {
-            (to_vector(py, solution.coefficients), to_matrix(py, k, solution.covariance), solution.left)
-        }))
+        let solved = |found: Solution| {
+            let covariance = to_matrix(py, subset.len(), found.covariance);
+            (to_vector(py, found.coefficients), covariance, found.left)
+        };
+        Ok(self.0.checked_solve(&subset, ridge)?.map(solved))
     }
 }
-
-/// More walks of a problem than this are refused.
-const MOST_STARTS: usize = 1_000_000;
 
 /// For each of the problems, subsets with their energies, best first: annealed `starts` times from different streams.
 #[pyfunction]
@@ -223,37 +171,16 @@ pub fn search_subsets(
 ) -> Result<Vec<Walked>> {
     let workers = or_default(workers)?;
     let grams: Vec<_> = grams.iter().map(|gram| gram.get().0.clone()).collect();
-    if prices.len() != grams.len() || !(1..=MOST_STARTS).contains(&starts) {
+    if prices.len() != grams.len() {
+        let (expected, found) = (grams.len(), prices.len());
         return Err(misuse(format!(
-            "search_subsets: expected prices for each problem and 1 to {MOST_STARTS} starts, found {} for {} and {starts}",
-            prices.len(),
-            grams.len()
+            "search_subsets: expected prices for {expected} problems, found {found}"
         )));
     }
-    let prices: Vec<_> = prices.iter().map(vector).collect();
-    let fits = |(prices, gram): (&Vec<f64>, &Arc<Gram>)| {
-        prices.len() == gram.features && !prices.iter().any(|price| price.is_nan())
-    };
-    if !prices.iter().zip(&grams).all(fits) {
-        return Err(misuse(
-            "search_subsets: expected a price for each feature, infinite if it may not be used".into(),
-        ));
-    }
+    let problems: Vec<_> = grams.into_iter().zip(prices.iter().map(vector)).collect();
     let annealing = Annealing { moves, largest, coldest }.validated()?;
     let unit = unit.unit()?;
-    let walks = py.detach(|| {
-        let choices = workers.map(grams.len(), |i| Choices::new(&grams[i], &prices[i]));
-        workers.map(grams.len() * starts, |walk| {
-            let problem = walk / starts;
-            let mut stream = unit.stream(walk as u64);
-            search(&choices[problem], &annealing, &mut stream, workers.width())
-        })
-    });
-    let merged = walks.chunks(starts).map(|walks| {
-        let mut all: Vec<_> = walks.concat();
-        all.sort_by(|a, b| a.energy.total_cmp(&b.energy).then_with(|| a.subset.cmp(&b.subset)));
-        all.dedup_by(|a, b| a.subset == b.subset);
-        all.into_iter().map(|found| (found.subset, found.energy)).collect()
-    });
-    Ok(merged.collect())
+    let found = py.detach(|| search_all(&problems, &annealing, starts, &unit, &workers))?;
+    let walked = |found: Vec<Found>| found.into_iter().map(|one| (one.subset, one.energy)).collect();
+    Ok(found.into_iter().map(walked).collect())
 }

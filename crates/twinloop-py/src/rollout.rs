@@ -10,7 +10,8 @@ use twinloop_core::{
 };
 
 use crate::arrays::{
-    Cube, Matrix, Vector, VectorOrRows, optional_blocks, rows, to_cube, to_integers, to_vector, vector, views,
+    Cube, Matrix, Vector, VectorOrRows, finite, optional_blocks, rows, to_cube, to_integers, to_vector,
+    vector, views,
 };
 use crate::error::{Result, misuse};
 use crate::excitation::PyHoldBack;
@@ -115,10 +116,7 @@ pub fn rollout(
     let noise = optional_blocks("noise", noise, [count, steps + 1, states])?;
     let excitation = optional_blocks("excitation", excitation, [count, steps, commands])?;
     let disturbance = optional_blocks("disturbance", disturbance, [count, steps, states])?;
-    let numbers = [&parameters, &noise, &excitation, &disturbance];
-    if !numbers.into_iter().flatten().flatten().all(|x| x.is_finite()) {
-        return Err(misuse("rollout: expected finite numbers, found NaN or an infinite one".into()).into());
-    }
+    finite("rollout", [&parameters, &noise, &excitation, &disturbance].into_iter().flatten().flatten())?;
     let (parameters, noise) = (views(&parameters), views(&noise));
     let (excitation, disturbance) = (views(&excitation), views(&disturbance));
     let hold_back = hold_back.map(|found| &found.0);
@@ -189,8 +187,8 @@ pub fn replay(
 /// Dynamics that the engine has, for these signals; none for a function.
 fn known<'a>(dynamics: &'a Bound<'_, PyAny>, signals: &Signals) -> Result<Option<AnyDynamics<'a>>> {
     if let Ok(model) = dynamics.cast::<PyModel>() {
-        model.get().fits(signals)?;
-        return Ok(Some(AnyDynamics::Model(model.get().core())));
+        model.get().0.check_for(signals)?;
+        return Ok(Some(AnyDynamics::Model(model.get().0.view())));
     }
     let Ok(plant) = dynamics.cast::<PyQuadrotor>() else { return Ok(None) };
     plant.get().0.check(signals)?;

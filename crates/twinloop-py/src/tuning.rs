@@ -4,7 +4,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use twinloop_core::{Chain, Learnt, Noise, Observed, Recorded, Signals, Tuning};
 
-use crate::arrays::{Matrix, rows, to_matrix};
+use crate::arrays::{Matrix, finite, rows, to_matrix};
 use crate::error::{Result, misuse};
 use crate::model::PyModel;
 use crate::rng::Name;
@@ -19,7 +19,7 @@ type Records<'py> = Vec<(Matrix<'py>, Matrix<'py>, Matrix<'py>)>;
 
 /// The signals of the limits, unless the model is for others.
 fn fitting<'a>(model: &PyModel, limits: &'a PyLimits) -> Result<&'a Signals> {
-    model.fits(limits.0.signals())?;
+    model.0.check_for(limits.0.signals())?;
     Ok(limits.0.signals())
 }
 
@@ -44,16 +44,11 @@ fn recorded(records: &Records<'_>, n_x: usize, n_u: usize) -> Result<Vec<Recorde
             let states = rows("states", states, n_x)?.concat();
             let weights = rows("weights", weights, n_x)?.concat();
             let commands = rows("commands", commands, n_u)?.concat();
-            if ![&states, &weights, &commands].into_iter().flatten().all(|x| x.is_finite()) {
-                return Err(misuse("record: expected finite numbers, found NaN or an infinite one".into()));
-            }
+            finite("record", [&states, &weights, &commands].into_iter().flatten())?;
             Ok(Recorded { states, weights, commands })
         })
         .collect()
 }
-
-/// More members than this are refused.
-const MOST_DRAWS: usize = 1_000_000;
 
 /// The model with constants, and lags of its actuators, that leave the least; what is left, readings, covariance of the
 /// free values, and members drawn from it.
@@ -78,12 +73,12 @@ pub fn tune<'py>(
 ) -> Result<(PyModel, f64, usize, Bound<'py, PyArray2<f64>>, Vec<PyModel>)> {
     let workers = or_default(workers)?;
     let signals = fitting(model, limits)?;
-    let effective = Learnt::new(model.learnt.program.effective());
+    let effective = Learnt::new(model.0.learnt().program.effective());
     let observer = observer(chains, signals.dt)?;
     let records = recorded(&records, signals.states(), signals.commands())?;
     let tuning = Tuning {
         code: &effective.code,
-        frame: &model.frame,
+        frame: model.0.frame(),
         observer: &observer,
         records: &records,
         limits: &limits.0,
@@ -91,28 +86,22 @@ pub fn tune<'py>(
         lags: &lags,
     };
     tuning.check()?;
-    if draws > MOST_DRAWS {
-        return Err(misuse(format!("tune: expected at most {MOST_DRAWS} draws, found {draws}")));
-    }
     let tuned = py.detach(|| tuning.tune(iterations, &workers));
-    let size = free.len() + lags.len();
-    let covariance = to_matrix(py, size, tuned.covariance.clone());
-    let (left, readings) = (tuned.left, tuned.readings);
-    let finished = model.varied(&tuned.constants, &tuned.lags)?;
-    let streams: Vec<_> = match unit {
-        Some(name) => {
-            let unit = name.unit()?;
-            (0..draws).map(|draw| unit.stream(draw as u64)).collect()
-        }
+    let drawn = match unit {
         None if draws == 0 => vec![],
         None => {
             return Err(misuse(format!("tune: expected the unit that draws {draws} members, found none")));
         }
+        Some(name) => {
+            let unit = name.unit()?;
+            py.detach(|| tuning.drawn(&tuned, &unit, draws, &workers))?
+        }
     };
-    let drawn = py.detach(|| tuning.drawn(&tuned, streams, &workers));
-    let members: Vec<PyModel> =
-        drawn.iter().map(|(constants, lags)| model.varied(constants, lags)).collect::<Result<_>>()?;
-    Ok((finished, left, readings, covariance, members))
+    let varied = |(constants, lags): &(Vec<f64>, Vec<f64>)| model.0.varied(constants, lags).map(PyModel);
+    let members: Vec<_> = drawn.iter().map(varied).collect::<twinloop_core::Result<_>>()?;
+    let finished = PyModel(model.0.varied(&tuned.constants, &tuned.lags)?);
+    let covariance = to_matrix(py, free.len() + lags.len(), tuned.covariance);
+    Ok((finished, tuned.left, tuned.readings, covariance, members))
 }
 
 /// Whitened prediction errors (n + 1, n_x) and states once each reading was used (n + 1, n_x) of each run; none where
@@ -133,7 +122,7 @@ pub fn predictions<'py>(
     let observer = observer(chains, signals.dt)?;
     let n_x = signals.states();
     let records = recorded(&records, n_x, signals.commands())?;
-    let core = model.core();
+    let core = model.0.view();
     let tuning = Tuning {
         code: core.code,
         frame: core.frame,
@@ -144,18 +133,7 @@ pub fn predictions<'py>(
         lags: &[],
     };
     tuning.check()?;
-    let order: Vec<usize> = observer.iter().flat_map(|observed| observed.states.clone()).collect();
     let runs = py.detach(|| tuning.predictions(&workers));
-    Ok(runs.map(|runs| {
-        runs.into_iter()
-            .map(|(errors, states)| {
-                // From the order of the chains to that of the states.
-                let mut sorted = vec![0.0; errors.len()];
-                for (at, error) in errors.iter().enumerate() {
-                    sorted[at / n_x * n_x + order[at % n_x]] = *error;
-                }
-                (to_matrix(py, n_x, sorted), to_matrix(py, n_x, states))
-            })
-            .collect()
-    }))
+    let of_run = |(errors, states)| (to_matrix(py, n_x, errors), to_matrix(py, n_x, states));
+    Ok(runs.map(|runs| runs.into_iter().map(of_run).collect()))
 }

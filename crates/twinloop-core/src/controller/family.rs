@@ -7,7 +7,7 @@ use super::parameters::{Gain, Parameters};
 use super::{AnyLaw, Law};
 use crate::difference::Periods;
 use crate::error::{Result, invalid};
-use crate::lanes::Vector;
+use crate::lanes::{Vector, zeros};
 use crate::signals::Signals;
 
 /// A law, the box of its parameters, and the states and commands that it is for.
@@ -150,7 +150,7 @@ impl Family {
             });
         }
         let (memory, foreign) = match &self.law {
-            Source::Engine(law) => (vec![V::splat(0.0); law.memory()], vec![]),
+            Source::Engine(law) => (zeros(law.memory()), vec![]),
             Source::Foreign(law) => (vec![], foreign::start(&**law, &gains)),
         };
         Controllers { gains, memory, foreign }

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use crate::lanes::{Vector, numbers, vectors_once};
+use crate::lanes::{Vector, numbers, vectors};
 
 /// A law whose controllers the engine only calls.
 pub trait ForeignLaw: Debug + Send + Sync {
@@ -38,7 +38,7 @@ pub(super) fn ask<V: Vector>(
     target: &[V],
     command: &mut [V],
 ) {
-    command.copy_from_slice(&vectors_once(&asked(controllers, bounds, &numbers(state), &numbers(target))));
+    command.copy_from_slice(&vectors(&asked(controllers, bounds, &numbers(state), &numbers(target))));
 }
 
 /// The same of interleaved numbers: of code that is only called there is one copy.

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use crate::error::{Result, invalid};
 use crate::excitation::{Excitation, HoldBack};
-use crate::lanes::{Vector, flight_lanes, groups, interleave, vectors};
+use crate::lanes::{Vector, flight_lanes, groups, interleave, splats, vectors};
 use crate::rollout::{Commands, Start};
 use crate::setting::Setting;
 use crate::signals::Signals;
@@ -162,7 +162,7 @@ impl Group {
     #[inline(always)]
     fn lanes<V: Vector>(&self) -> GroupLanes<V> {
         GroupLanes {
-            hold_back: self.hold_back.iter().map(|&number| V::splat(number)).collect(),
+            hold_back: splats(&self.hold_back),
             parameters: vectors(&self.parameters),
             initial: vectors(&self.initial),
             target: vectors(&self.target),

@@ -5,7 +5,7 @@ use super::quality::{Quality, Tally};
 use super::{Flights, Group};
 use crate::any_dynamics::AnyDynamics;
 use crate::error::{Result, invalid};
-use crate::lanes::{Isa, Kernel, Vector, dispatch, with_flight_lanes};
+use crate::lanes::{Isa, Kernel, Vector, dispatch, splats, with_flight_lanes};
 use crate::rollout::{Seen, Watch, rollout};
 use crate::workers::Workers;
 
@@ -113,10 +113,7 @@ impl OfGroup<'_> {
         for (initial, &offset) in lanes.initial.iter_mut().zip(self.offset) {
             *initial = *initial + V::splat(offset);
         }
-        let mut noise = vec![V::splat(0.0); self.noise.len()];
-        for (lanes, &noise) in noise.iter_mut().zip(self.noise) {
-            *lanes = V::splat(noise);
-        }
+        let noise = splats::<V>(self.noise);
         let mut judge = Judge {
             tally: self.quality.tally(self.flights.signals(), &lanes.target),
             reach: self.envelope.reach(&self.flights.signals().periods, &lanes.initial),

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::piece::Apart;
 use super::vector::{Scalar, Vector};
 
 /// Splits `count` tests into groups that fill lanes well: 32 as long as there are as many, then 8, then what is left.
@@ -89,29 +90,67 @@ pub(crate) fn interleave<R: AsRef<[f64]>>(rows: &[R], lanes: usize) -> Vec<f64> 
     (0..last.as_ref().len()).flat_map(|j| (0..lanes).map(move |l| row(l)[j])).collect()
 }
 
-/// Interleaved numbers as vectors.
-#[inline(always)]
+/// Interleaved numbers as vectors. By a call, as what follows: a copy for each vector, and not for each place.
 pub(crate) fn vectors<V: Vector>(interleaved: &[f64]) -> Vec<V> {
-    let mut vectors = vec![V::splat(0.0); interleaved.len() / V::LANES];
-    for (vector, values) in vectors.iter_mut().zip(interleaved.chunks_exact(V::LANES)) {
-        *vector = V::load(values);
+    let mut vectors = vec![];
+    if !interleaved.is_empty() {
+        V::apart(Loads { interleaved, vectors: &mut vectors });
     }
     vectors
 }
 
-/// The same by a call, for what is done once a run: one short copy for each vector.
-#[inline(never)]
-pub(crate) fn vectors_once<V: Vector>(interleaved: &[f64]) -> Vec<V> {
-    vectors(interleaved)
+struct Loads<'a, V> {
+    interleaved: &'a [f64],
+    vectors: &'a mut Vec<V>,
 }
 
-/// So many zeros, by a call as well.
-#[inline(never)]
+impl<V: Vector> Apart for Loads<'_, V> {
+    #[inline(always)]
+    fn run(self) {
+        self.vectors.reserve_exact(self.interleaved.len() / V::LANES);
+        for values in self.interleaved.chunks_exact(V::LANES) {
+            self.vectors.push(V::load(values));
+        }
+    }
+}
+
+/// So many zeros, and behind them numbers, each the same in all lanes.
+pub(crate) fn filled<V: Vector>(zeros: usize, values: &[f64]) -> Vec<V> {
+    let mut vectors = vec![];
+    if zeros + values.len() > 0 {
+        V::apart(Fill { zeros, values, vectors: &mut vectors });
+    }
+    vectors
+}
+
+struct Fill<'a, V> {
+    zeros: usize,
+    values: &'a [f64],
+    vectors: &'a mut Vec<V>,
+}
+
+impl<V: Vector> Apart for Fill<'_, V> {
+    #[inline(always)]
+    fn run(self) {
+        self.vectors.reserve_exact(self.zeros + self.values.len());
+        self.vectors.resize(self.zeros, V::splat(0.0));
+        for &value in self.values {
+            self.vectors.push(V::splat(value));
+        }
+    }
+}
+
+/// Numbers, each the same in all lanes.
+pub(crate) fn splats<V: Vector>(values: &[f64]) -> Vec<V> {
+    filled(0, values)
+}
+
+/// So many zeros.
 pub(crate) fn zeros<V: Vector>(count: usize) -> Vec<V> {
-    vec![V::splat(0.0); count]
+    filled(count, &[])
 }
 
-/// Vectors as interleaved numbers, by a call as well.
+/// Vectors as interleaved numbers.
 #[inline(never)]
 pub(crate) fn numbers<V: Vector>(vectors: &[V]) -> Vec<f64> {
     let mut numbers = vec![0.0; vectors.len() * V::LANES];
@@ -123,12 +162,11 @@ pub(crate) fn numbers<V: Vector>(vectors: &[V]) -> Vec<f64> {
 
 /// Numbers, each in a vector of one lane.
 pub(crate) fn scalars(values: &[f64]) -> Vec<Scalar> {
-    values.iter().map(|&value| Scalar::splat(value)).collect()
+    splats(values)
 }
 
 /// Rows of equal length, one a lane.
-#[inline(always)]
-pub(crate) fn pack<V: Vector, R: AsRef<[f64]>>(rows: &[R]) -> Vec<V> {
+pub(crate) fn pack<V: Vector>(rows: &[&[f64]]) -> Vec<V> {
     vectors(&interleave(rows, V::LANES))
 }
 

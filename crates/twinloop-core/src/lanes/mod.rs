@@ -19,7 +19,7 @@ mod vector;
 mod width;
 
 pub(crate) use groups::{
-    flight_lanes, groups, interleave, lanes_for, numbers, pack, scalars, vectors, vectors_once,
+    filled, flight_lanes, groups, interleave, lanes_for, numbers, pack, scalars, splats, vectors,
     with_flight_lanes, with_lanes, with_test_lanes, zeros,
 };
 pub use piece::Apart;

@@ -93,6 +93,60 @@ impl Piece for f64 {
     }
 }
 
+/// Several numbers without vector instructions that are named. Each operation is a call: processors that lack the wider
+/// pieces are old, and code for them that is written out is a tenth of the module.
+impl<const N: usize> Piece for [f64; N] {
+    const LANES: usize = N;
+    #[inline(never)]
+    fn splat(value: f64) -> Self {
+        [value; N]
+    }
+    #[inline(never)]
+    fn load(values: &[f64]) -> Self {
+        std::array::from_fn(|i| values[..N][i])
+    }
+    #[inline(never)]
+    fn store(self, values: &mut [f64]) {
+        values[..N].copy_from_slice(&self);
+    }
+    #[inline(never)]
+    fn add(self, other: Self) -> Self {
+        std::array::from_fn(|i| self[i] + other[i])
+    }
+    #[inline(never)]
+    fn sub(self, other: Self) -> Self {
+        std::array::from_fn(|i| self[i] - other[i])
+    }
+    #[inline(never)]
+    fn mul(self, other: Self) -> Self {
+        std::array::from_fn(|i| self[i] * other[i])
+    }
+    #[inline(never)]
+    fn div(self, other: Self) -> Self {
+        std::array::from_fn(|i| self[i] / other[i])
+    }
+    #[inline(never)]
+    fn sqrt(self) -> Self {
+        self.map(f64::sqrt)
+    }
+    #[inline(never)]
+    fn abs(self) -> Self {
+        self.map(f64::abs)
+    }
+    #[inline(never)]
+    fn select_less(self, other: Self, yes: Self, no: Self) -> Self {
+        std::array::from_fn(|i| if self[i] < other[i] { yes[i] } else { no[i] })
+    }
+    #[inline(never)]
+    fn any_less(self, other: Self) -> bool {
+        self.iter().zip(&other).any(|(a, b)| a < b)
+    }
+    #[inline(never)]
+    fn apart(work: impl Apart) {
+        work.run();
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod x86 {
@@ -170,25 +224,6 @@ mod x86 {
         };
     }
 
-    piece!(
-        __m128d,
-        "sse2",
-        2,
-        _mm_set1_pd,
-        _mm_loadu_pd,
-        _mm_storeu_pd,
-        _mm_add_pd,
-        _mm_sub_pd,
-        _mm_mul_pd,
-        _mm_div_pd,
-        _mm_sqrt_pd,
-        abs(a) = _mm_andnot_pd(_mm_set1_pd(-0.0), a),
-        select_less(a, b, yes, no) = {
-            let mask = _mm_cmplt_pd(a, b);
-            _mm_or_pd(_mm_and_pd(mask, yes), _mm_andnot_pd(mask, no))
-        },
-        any_less(a, b) = _mm_movemask_pd(_mm_cmplt_pd(a, b)) != 0
-    );
     piece!(
         __m256d,
         "avx2",

@@ -89,14 +89,14 @@ struct Avx512;
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::*;
-    use std::arch::x86_64::{__m128d, __m256d, __m512d};
+    use std::arch::x86_64::{__m256d, __m512d};
 
     impl Isa for Baseline {
         type Of1 = Scalar;
-        type Of4 = Wide<__m128d, 2>;
-        type Of8 = Wide<__m128d, 4>;
-        type Of32 = Wide<__m128d, 16>;
-        type Of64 = Wide<__m128d, 32>;
+        type Of4 = Wide<[f64; 4], 1>;
+        type Of8 = Wide<[f64; 8], 1>;
+        type Of32 = Wide<[f64; 32], 1>;
+        type Of64 = Wide<[f64; 64], 1>;
     }
 
     impl Isa for Avx2 {

@@ -3,7 +3,7 @@
 use super::instruction::Operand;
 use super::interpreter::{Step, interpret};
 use super::program::Program;
-use crate::lanes::{Vector, zeros};
+use crate::lanes::{Vector, filled};
 
 /// The effective part of a program. Two programs with equal code are the same function, bit for bit.
 #[derive(Clone, Debug)]
@@ -93,11 +93,7 @@ impl Code {
 
     /// Registers for the rows of a vector, to be used with this code only.
     pub fn bank<V: Vector>(&self) -> Bank<V> {
-        let mut registers = zeros::<V>(self.registers + self.constants.len());
-        for (register, &constant) in registers[self.registers..].iter_mut().zip(&self.constants) {
-            *register = V::splat(constant);
-        }
-        Bank(registers)
+        Bank(filled(self.registers, &self.constants))
     }
 
     /// The same with constants of each lane's own, in the order of [`Code::constants`].

@@ -1,5 +1,7 @@
 //! Eigenvalues and eigenvectors of a small symmetric matrix, by Jacobi's rotations in a fixed order.
 
+use crate::error::{Result, invalid};
+
 /// Rounds over all pairs at most; each one squares what is left, so that ten are many.
 const ROUNDS: usize = 64;
 /// A correlation whose square is no more than this is rounding.
@@ -38,6 +40,18 @@ impl Eigen {
             values: places.iter().map(|&i| a[i * order + i]).collect(),
             vectors: places.iter().flat_map(|&i| v[i * order..][..order].to_vec()).collect(),
         }
+    }
+
+    /// The same of what may be no such matrix (rows × columns), which is refused.
+    pub fn checked(matrix: &[f64], [rows, columns]: [usize; 2]) -> Result<Self> {
+        let fits = rows == columns && rows > 0 && matrix.len() == rows * columns;
+        if !fits || !matrix.iter().all(|x| x.is_finite()) {
+            return invalid(format!(
+                "eigen: expected a square matrix of finite numbers, at least one, found {rows} × {columns}, or NaN or \
+                 an infinite one in it"
+            ));
+        }
+        Ok(Self::new(matrix, rows))
     }
 
     /// v_i.

@@ -22,11 +22,13 @@ impl<V: Vector> Field<V> for Held<'_, V> {
     fn slope(&mut self, states: &[V], slope: &mut [V]) {
         let outputs = self.model.outputs(self.bank, states, self.effects[STAGES[self.stage]]);
         self.stage += 1;
+        let still = V::splat(0.0);
         for (slope, source) in slope.iter_mut().zip(&self.model.frame.slopes) {
-            *slope = match *source {
-                Slope::State(rate) => states[rate],
-                Slope::Output(output) => outputs[output],
-                Slope::Turn => V::splat(0.0),
+            // A place and not a value, which would go by way of the stack.
+            *slope = *match *source {
+                Slope::State(rate) => &states[rate],
+                Slope::Output(output) => &outputs[output],
+                Slope::Turn => &still,
             };
         }
     }

@@ -4,10 +4,12 @@ mod form;
 mod frame;
 mod held;
 mod inputs;
+mod owned;
 mod turning;
 
 pub use form::Form;
 pub use frame::Frame;
+pub use owned::{OwnedModel, views};
 
 use std::borrow::Cow;
 
@@ -84,8 +86,12 @@ impl<'a> Model<'a> {
         match self.frame.form {
             form @ (Form::Absolute | Form::Increment) => {
                 let outputs = self.outputs(bank, state, effects[1]);
-                for (state, output) in state.iter_mut().zip(outputs) {
-                    *state = if form == Form::Absolute { *output } else { *state + *output };
+                if form == Form::Absolute {
+                    state.copy_from_slice(outputs);
+                } else {
+                    for (state, &output) in state.iter_mut().zip(outputs) {
+                        *state = *state + output;
+                    }
                 }
             }
             Form::Acceleration => {

@@ -7,7 +7,7 @@ use crate::dynamics::Dynamics;
 use crate::excitation::Excitation;
 use crate::lanes::{Isa, Kernel, Vector, vectors, with_test_lanes};
 use crate::model::Model;
-use crate::rollout::{Commands, Seen, Start, Watch, own_rollout};
+use crate::rollout::{Commands, Seen, Start, Watch, rollout};
 use crate::selected::{Loops, SelectedTests};
 
 /// Outcome of each test's run beside its record (N).
@@ -54,7 +54,7 @@ impl ClosedLoop<'_> {
         let steps = V::load(&steps.collect::<Vec<_>>());
         let periods = &self.selected.signals().periods;
         let mut error = SquaredError { periods, recorded: &loops.recorded, steps, sum: V::splat(0.0) };
-        let lasted = own_rollout(self.model.into(), &start, &mut error);
+        let lasted = rollout(self.model.into(), &start, &mut error);
         for (l, (&lasted, &steps)) in lasted.iter().zip(&loops.steps).enumerate() {
             outcomes.push(if lasted < steps {
                 Outcome::Diverged { lasted, of: steps }

@@ -50,11 +50,11 @@ impl OfGroup<'_> {
         let start = Start {
             commands: Commands::Law {
                 family: self.setting.family(),
-                parameters: &pack::<V, _>(self.parameters),
+                parameters: &pack::<V>(self.parameters),
                 target: &target,
                 excitation: Excitation::NONE,
             },
-            initial: &pack::<V, _>(&[initial]),
+            initial: &pack::<V>(&[initial]),
             steps: *steps,
             limits: self.setting.limits(),
             noise: &[],

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use crate::dynamics::Dynamics;
 use crate::error::{Error, Result, invalid};
 use crate::integrator::{Field, Stages, rk4};
-use crate::lanes::Vector;
+use crate::lanes::{Scalar, Vector, scalars, zeros};
 use crate::signals::Signals;
 
 /// The signs of the two gyroscopic terms.
@@ -80,6 +80,17 @@ impl Quadrotor {
             ));
         }
         Ok(())
+    }
+
+    /// Accelerations and rates at one state (6) under one command (4).
+    pub fn slope(&self, state: &[f64], command: &[f64]) -> Result<Vec<f64>> {
+        if (state.len(), command.len()) != (6, 4) {
+            let found = (state.len(), command.len());
+            return invalid(format!("quadrotor: expected 6 states and 4 commands, found {found:?}"));
+        }
+        let mut slope = zeros::<Scalar>(6);
+        self.derivative(&scalars(state), &scalars(command), &mut slope);
+        Ok(slope.iter().map(|lane| lane.lane(0)).collect())
     }
 
     /// Accelerations and rates at a state, with the rotors at given speeds.

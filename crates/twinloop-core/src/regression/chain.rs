@@ -48,37 +48,16 @@ impl Chain {
         out
     }
 
-    /// Moves states by a period in which nothing drives them but the lasting disturbance behind them, if there is one,
-    /// of which a share is `kept`.
-    #[inline(always)]
-    pub fn coast(&self, states: &mut [f64], kept: f64) {
-        let hidden = states.get(self.states).copied();
-        if self.integrated {
-            for i in (1..self.states).rev() {
-                let mut power = 1.0;
-                for m in 1..=i {
-                    power *= self.dt / m as f64;
-                    states[i] += power * states[i - m];
-                }
-            }
-        }
-        if let Some(gust) = hidden {
-            for (state, reach) in states[..self.states].iter_mut().zip(self.reach()) {
-                *state += reach * gust;
-            }
-            states[self.states] = kept * gust;
-        }
-    }
-
-    /// How far each state is moved in a period by a disturbance of 1 that is held.
-    pub(crate) fn reach(&self) -> [f64; LONGEST] {
-        let mut reach = [0.0; LONGEST];
+    /// How its states move on by themselves.
+    pub(crate) fn motion(&self) -> Motion {
+        let mut powers = [0.0; LONGEST];
         let mut power = 1.0;
-        for (i, reach) in reach.iter_mut().enumerate() {
+        for (i, entry) in powers.iter_mut().enumerate() {
             power *= self.dt / (i + 1) as f64;
-            *reach = if self.integrated { power } else { f64::from(u8::from(i == 0)) };
+            *entry = power;
         }
-        reach
+        let reach = if self.integrated { powers } else { [1.0, 0.0, 0.0, 0.0] };
+        Motion { states: self.states, integrated: self.integrated, powers, reach }
     }
 
     /// Covariance that a period of the disturbance adds (states × states).
@@ -99,5 +78,38 @@ impl Chain {
             }
         }
         q
+    }
+}
+
+/// How the states of a chain move in a period in which no feature drives them. The divisions are done beforehand.
+#[derive(Clone, Copy)]
+pub(crate) struct Motion {
+    /// Number of states.
+    pub states: usize,
+    pub(super) integrated: bool,
+    /// dt^m / m! from m = 1 on.
+    pub(super) powers: [f64; LONGEST],
+    /// How far each state is moved by a disturbance of 1 that is held.
+    pub reach: [f64; LONGEST],
+}
+
+impl Motion {
+    /// Moves states by a period. Behind them may be a lasting disturbance that drives them, of which a share is `kept`.
+    #[inline(always)]
+    pub fn coast(&self, states: &mut [f64], kept: f64) {
+        let (states, hidden) = states.split_at_mut(self.states);
+        if self.integrated {
+            for i in (1..self.states).rev() {
+                for m in 1..=i {
+                    states[i] += self.powers[m - 1] * states[i - m];
+                }
+            }
+        }
+        if let [gust] = hidden {
+            for (state, reach) in states.iter_mut().zip(self.reach) {
+                *state += reach * *gust;
+            }
+            *gust *= kept;
+        }
     }
 }

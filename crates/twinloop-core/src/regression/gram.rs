@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use super::chain::{Chain, LONGEST};
+use super::chain::{Chain, LONGEST, Motion};
 use super::noise::Noise;
 use super::whitening::Whitening;
+use crate::error::{Result, invalid};
 use crate::linear_algebra::Cholesky;
 use crate::workers::Workers;
 
@@ -28,12 +29,17 @@ impl Record {
         start: &[f64],
         middle: &[f64],
         end: &[f64],
-    ) -> Self {
+    ) -> Result<Self> {
+        if middle.len() != start.len() || end.len() != start.len() {
+            return invalid(
+                "record: expected as many rows of features at the start, the middle and the end of periods",
+            );
+        }
         let mut increments = Vec::with_capacity(start.len() * chain.states);
         for ((&start, &middle), &end) in start.iter().zip(middle).zip(end) {
             increments.extend_from_slice(&chain.increments(start, middle, end)[..chain.states]);
         }
-        Self { measured, weights, increments }
+        Ok(Self { measured, weights, increments })
     }
 
     /// Periods.
@@ -68,19 +74,26 @@ impl Record {
 
     /// Readings less what given coefficients (features) explain of them, (n + 1) × states.
     pub fn residual(&self, chain: &Chain, coefficients: &[f64]) -> Vec<f64> {
-        let (d, p) = (chain.states, coefficients.len());
+        // Loops of a known length are faster.
+        match chain.states {
+            1 => self.residual_of::<1>(chain, coefficients),
+            2 => self.residual_of::<2>(chain, coefficients),
+            3 => self.residual_of::<3>(chain, coefficients),
+            _ => self.residual_of::<LONGEST>(chain, coefficients),
+        }
+    }
+
+    fn residual_of<const D: usize>(&self, chain: &Chain, coefficients: &[f64]) -> Vec<f64> {
+        let motion = Motion { states: D, ..chain.motion() };
+        let (increments, _) = self.increments.as_chunks::<D>();
         let mut residual = self.measured.clone();
-        let mut state = vec![0.0; d];
-        for k in 0..self.steps(chain) {
-            chain.coast(&mut state, 1.0);
-            for (i, state) in state.iter_mut().enumerate() {
-                for (j, c) in coefficients.iter().enumerate() {
-                    *state += c * self.increments[(k * p + j) * d + i];
-                }
+        let mut state = [0.0; D];
+        for (k, reading) in residual.as_chunks_mut::<D>().0.iter_mut().skip(1).enumerate() {
+            motion.coast(&mut state, 1.0);
+            for (c, increment) in coefficients.iter().zip(&increments[k * coefficients.len()..]) {
+                state.iter_mut().zip(increment).for_each(|(state, by)| *state += c * by);
             }
-            for i in 0..d {
-                residual[(k + 1) * d + i] -= state[i];
-            }
+            reading.iter_mut().zip(state).for_each(|(reading, state)| *reading -= state);
         }
         residual
     }
@@ -139,6 +152,7 @@ impl Gram {
         whitening: &Whitening,
     ) -> Self {
         let (d, p) = (D, features);
+        let motion = Motion { states: D, ..chain.motion() };
         let width = p + 1;
         let mut products = vec![0.0; width * width];
         let inner = whitening.inner;
@@ -164,7 +178,7 @@ impl Gram {
                     rows[first + i * width + j] = white[i];
                 }
                 column.iter_mut().zip(&correction).for_each(|(state, by)| *state += sign * by);
-                chain.coast(column, whitening.kept);
+                motion.coast(column, whitening.kept);
                 if j < p && k < steps {
                     let increments = &record.increments[(k * p + j) * d..][..d];
                     column.iter_mut().zip(increments).for_each(|(a, b)| *a += b);
@@ -244,6 +258,17 @@ impl Gram {
             covariance: (0..k * k).map(|ab| inverse[ab] / (lengths[ab / k] * lengths[ab % k])).collect(),
             left: (self.total() - explained).max(0.0),
         })
+    }
+
+    /// The same of a subset, with a ridge, that may be none; those are refused.
+    pub fn checked_solve(&self, subset: &[usize], ridge: f64) -> Result<Option<Solution>> {
+        if subset.iter().any(|&j| j >= self.features) || !(ridge.is_finite() && ridge >= 0.0) {
+            return invalid(format!(
+                "subset: expected features below {} and a ridge of at least 0, found {subset:?} and {ridge}",
+                self.features
+            ));
+        }
+        Ok(self.solve(subset, ridge))
     }
 }
 

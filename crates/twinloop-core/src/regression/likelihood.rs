@@ -1,6 +1,6 @@
 //! How likely residuals are under given noise, and the noise under which they are most likely.
 
-use super::chain::{Chain, LONGEST};
+use super::chain::{Chain, LONGEST, Motion};
 use super::gram::Record;
 use super::noise::Noise;
 use super::whitening::Whitening;
@@ -24,6 +24,7 @@ pub fn likelihood(chain: &Chain, records: &[Record], residuals: &[Vec<f64>], noi
 /// A sum and the squares of a record's whitened residuals.
 fn squares<const D: usize>(chain: &Chain, whitening: &Whitening, residual: &[f64], start: f64) -> f64 {
     let mut total = start;
+    let motion = Motion { states: D, ..chain.motion() };
     let mut state = vec![0.0; whitening.inner];
     for (k, residual) in residual.as_chunks::<D>().0.iter().enumerate() {
         let mut innovation = [0.0; D];
@@ -36,7 +37,7 @@ fn squares<const D: usize>(chain: &Chain, whitening: &Whitening, residual: &[f64
             total += white * white;
         }
         state.iter_mut().zip(correction).for_each(|(state, by)| *state += by);
-        chain.coast(&mut state, whitening.kept);
+        motion.coast(&mut state, whitening.kept);
     }
     total
 }

@@ -4,6 +4,7 @@ mod chain;
 mod gram;
 mod likelihood;
 mod noise;
+mod problem;
 mod subset;
 mod whitening;
 
@@ -11,7 +12,8 @@ pub use chain::Chain;
 pub use gram::{Gram, Record, Solution};
 pub use likelihood::{likelihood, most_likely_noise};
 pub use noise::Noise;
-pub use subset::{Annealing, Choices, Found, search};
+pub use problem::{Leftover, Regression, most_likely_noises};
+pub use subset::{Annealing, Choices, Found, search, search_all};
 
 pub(crate) use chain::LONGEST;
 pub(crate) use whitening::Whitening;

@@ -3,11 +3,14 @@
 //! Features of one smooth run are close to collinear, and then greedy selection ends at an alias of the law that fits
 //! as well and predicts nothing. Annealing crosses between them (Kirkpatrick, Gelatt, Vecchi 1983).
 
+use std::sync::Arc;
+
 use super::gram::Gram;
 use crate::error::{Result, invalid};
 use crate::lanes::{Isa, Kernel, Vector, Width, dispatch};
 use crate::linear_algebra::{Inverse, Products};
-use crate::rng::Stream;
+use crate::rng::{Stream, Unit};
+use crate::workers::Workers;
 
 /// How long and how hot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -277,6 +280,42 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Walks from hot to cold; the best subset first, then others that are nearly as good, best first.
 pub fn search(choices: &Choices, annealing: &Annealing, stream: &mut Stream, width: Width) -> Vec<Found> {
     dispatch(width, Walked { choices, annealing, stream })
+}
+
+/// More walks of a problem than this are refused.
+const MOST_STARTS: usize = 1_000_000;
+
+/// Walks `starts` times in each of some problems: a Gram matrix and the price of each of its features, infinite if it may
+/// not be used. For each problem the distinct subsets of all its walks, best first.
+pub fn search_all(
+    problems: &[(Arc<Gram>, Vec<f64>)],
+    annealing: &Annealing,
+    starts: usize,
+    unit: &Unit,
+    workers: &Workers,
+) -> Result<Vec<Vec<Found>>> {
+    if !(1..=MOST_STARTS).contains(&starts) {
+        return invalid(format!("search_subsets: expected 1 to {MOST_STARTS} starts, found {starts}"));
+    }
+    let priced = |(gram, prices): &(Arc<Gram>, Vec<f64>)| {
+        prices.len() == gram.features && !prices.iter().any(|price| price.is_nan())
+    };
+    if !problems.iter().all(priced) {
+        return invalid("search_subsets: expected a price for each feature, infinite if it may not be used");
+    }
+    let choices = workers.map(problems.len(), |i| Choices::new(&problems[i].0, &problems[i].1));
+    let walks = workers.map(problems.len() * starts, |walk| {
+        search(&choices[walk / starts], annealing, &mut unit.stream(walk as u64), workers.width())
+    });
+    Ok(walks.chunks(starts).map(merged).collect())
+}
+
+/// Distinct subsets of several walks, best first.
+fn merged(walks: &[Vec<Found>]) -> Vec<Found> {
+    let mut all = walks.concat();
+    all.sort_by(|a, b| a.energy.total_cmp(&b.energy).then_with(|| a.subset.cmp(&b.subset)));
+    all.dedup_by(|a, b| a.subset == b.subset);
+    all
 }
 
 struct Walked<'a> {

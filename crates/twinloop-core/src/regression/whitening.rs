@@ -57,11 +57,12 @@ impl Whitening {
     ) -> Self {
         let kept = noise.kept(chain.dt);
         let disturbance = chain.disturbance(noise.process);
+        let motion = chain.motion();
         let mut transition: Small<I> = [[0.0; I]; I];
         for j in 0..I {
             let mut column = [0.0; I];
             column[j] = 1.0;
-            chain.coast(&mut column, kept);
+            motion.coast(&mut column, kept);
             (0..I).for_each(|i| transition[i][j] = column[i]);
         }
         let mut covariance: Small<I> = [[0.0; I]; I];
@@ -183,15 +184,22 @@ fn unknown<const D: usize, const I: usize>(
     gain: &Small<I, D>,
     noise: &[f64; D],
 ) -> Small<I> {
-    let mut left: Small<I> = [[0.0; I]; I];
-    for (i, row) in left.iter_mut().enumerate() {
-        row[i] = 1.0;
-        row.iter_mut().zip(&gain[i]).for_each(|(left, gain)| *left -= gain);
+    // K H has the columns of the readings alone, so beyond those 1 − K H is the unit matrix.
+    let mut left: Small<I, D> = [[0.0; D]; I];
+    let mut half = *covariance;
+    for i in 0..I {
+        left[i] = std::array::from_fn(|k| if i == k { 1.0 - gain[i][k] } else { 0.0 - gain[i][k] });
+        for j in 0..I {
+            let read: f64 = (0..D).map(|k| left[i][k] * covariance[k][j]).sum();
+            half[i][j] = if i < D { read } else { read + covariance[i][j] };
+        }
     }
-    let mut next = congruent(covariance, &left);
+    let mut next: Small<I> = [[0.0; I]; I];
     for i in 0..I {
         for j in 0..=i {
-            next[i][j] += (0..D).map(|k| gain[i][k] * noise[k] * gain[j][k]).sum::<f64>();
+            let read: f64 = (0..D).map(|k| half[i][k] * left[j][k]).sum();
+            let told: f64 = (0..D).map(|k| gain[i][k] * noise[k] * gain[j][k]).sum();
+            next[i][j] = if j < D { read } else { read + half[i][j] } + told;
             next[j][i] = next[i][j];
         }
     }

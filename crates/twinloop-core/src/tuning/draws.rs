@@ -2,31 +2,42 @@
 
 use super::variant::Variant;
 use super::{Tuned, Tuning};
+use crate::error::{Result, invalid};
 use crate::linear_algebra::Cholesky;
-use crate::rng::Stream;
+use crate::rng::Unit;
 use crate::workers::Workers;
 
+/// More models at once than this are refused.
+const MOST_DRAWS: usize = 1_000_000;
 /// How often a draw is taken back by half, and one more.
 const HALVES: usize = 16;
 
 impl Tuning<'_> {
-    /// Tuned models with their free values drawn from what the runs leave open, one for each stream of random numbers.
+    /// Tuned models with their free values drawn from what the runs leave open, each from a stream of its own.
     ///
     /// What is left is known where χ² is a parabola; a draw that leaves the place where it is one is taken back by
     /// halves until the runs bear it.
     pub fn drawn(
         &self,
         tuned: &Tuned,
-        streams: impl IntoIterator<Item = Stream>,
+        unit: &Unit,
+        draws: usize,
         workers: &Workers,
-    ) -> Vec<(Vec<f64>, Vec<f64>)> {
+    ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
+        if draws > MOST_DRAWS {
+            return invalid(format!("tune: expected at most {MOST_DRAWS} draws, found {draws}"));
+        }
+        if draws == 0 {
+            // Most tunings draw nothing: no filter has to be run for them.
+            return Ok(vec![]);
+        }
         let start = Variant { constants: tuned.constants.clone(), lags: tuned.lags.clone() };
         let size = self.size();
         let factor =
             (!tuned.covariance.is_empty()).then(|| Cholesky::new(&tuned.covariance, size, 0.0)).flatten();
-        let tries: Vec<Variant> = streams
-            .into_iter()
-            .flat_map(|mut stream| {
+        let tries: Vec<Variant> = (0..draws)
+            .flat_map(|draw| {
+                let mut stream = unit.stream(draw as u64);
                 let normal: Vec<f64> = (0..size).map(|_| stream.gaussian()).collect();
                 let step = factor.as_ref().map_or_else(|| vec![0.0; size], |factor| factor.times(&normal));
                 let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVES);
@@ -37,10 +48,6 @@ impl Tuning<'_> {
                 shares.map(taken).collect::<Vec<_>>()
             })
             .collect();
-        if tries.is_empty() {
-            // Most tunings draw nothing: no filter has to be run for them.
-            return vec![];
-        }
         let costs = self.costs(&self.whitenings(), &tries, workers);
         let bearable = tuned.left + size as f64 + 3.0 * (2.0 * size as f64).sqrt();
         let borne = |(tries, costs): (&[Variant], &[f64])| {
@@ -48,6 +55,6 @@ impl Tuning<'_> {
             let one = found.map_or(&start, |(one, _)| one);
             (one.constants.clone(), one.lags.clone())
         };
-        tries.chunks_exact(HALVES).zip(costs.chunks_exact(HALVES)).map(borne).collect()
+        Ok(tries.chunks_exact(HALVES).zip(costs.chunks_exact(HALVES)).map(borne).collect())
     }
 }

@@ -28,7 +28,18 @@ impl Tuning<'_> {
             dispatch(workers.width(), part)
         });
         let finite = runs.iter().all(|run| !run.diverged[0]);
-        finite.then(|| runs.into_iter().map(|run| (run.errors.concat(), run.states)).collect())
+        let of_states = |run: Run| (self.by_state(&run.errors[0]), run.states);
+        finite.then(|| runs.into_iter().map(of_states).collect())
+    }
+
+    /// Rows of n_x numbers from the order of the chains to that of the states.
+    fn by_state(&self, by_chain: &[f64]) -> Vec<f64> {
+        let order: Vec<usize> = self.observer.iter().flat_map(|observed| observed.states.clone()).collect();
+        let mut sorted = vec![0.0; by_chain.len()];
+        for (sorted, row) in sorted.chunks_exact_mut(order.len()).zip(by_chain.chunks_exact(order.len())) {
+            order.iter().zip(row).for_each(|(&state, &number)| sorted[state] = number);
+        }
+        sorted
     }
 
     /// The filters of each record, one a chain.
@@ -166,7 +177,7 @@ impl Part<'_> {
             step_apart(&model, &mut workspace, &mut state, &command);
             for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
                 if whitening.inner > observed.states.len() {
-                    for (&at, reach) in observed.states.iter().zip(observed.chain.reach()) {
+                    for (&at, reach) in observed.states.iter().zip(observed.chain.motion().reach) {
                         state[at] = state[at] + *gust * reach;
                     }
                     *gust = *gust * whitening.kept;

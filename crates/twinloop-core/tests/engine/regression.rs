@@ -27,7 +27,7 @@ struct Case {
 impl Case {
     fn record(&self) -> Record {
         let [start, middle, end] = &self.features;
-        Record::new(&self.chain, self.measured.clone(), self.weights.clone(), start, middle, end)
+        Record::new(&self.chain, self.measured.clone(), self.weights.clone(), start, middle, end).unwrap()
     }
 
     fn steps(&self) -> usize {

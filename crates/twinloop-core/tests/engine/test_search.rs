@@ -5,7 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use twinloop_core::pareto::{Distance, dominates};
 use twinloop_core::{
-    Form, Frame, Learnt, Model, Search, Task, TestSearch, TestSettings, Variation, Width, Workers,
+    Form, Learnt, OwnedModel, Search, Task, TestSearch, TestSettings, Variation, Width, Workers,
     final_distances,
 };
 
@@ -40,6 +40,7 @@ fn variation() -> Variation {
         population: 30,
         mutation_share: 0.6,
         crossover_share: 0.3,
+        reproduction_share: 0.1,
         elite_share: 0.1,
         ranking_pressure: 1.8,
         archive_cap: 10_000,
@@ -65,14 +66,17 @@ impl Setup {
         Self { world: World::new(), committee, settings, variation, task }
     }
 
-    fn frame(&self) -> Frame {
-        Frame::new(Form::Increment, &self.world.signals)
+    fn models(&self) -> Vec<OwnedModel> {
+        let model = |learnt: &Arc<Learnt>| {
+            OwnedModel::new(learnt.clone(), Form::Increment, self.world.signals.clone(), None).unwrap()
+        };
+        self.committee.iter().map(model).collect()
     }
 
     fn try_start(self, seed: u64, workers: &Workers) -> twinloop_core::Result<TestSearch> {
-        let (frame, setting) = (Arc::new(self.frame()), self.world.setting(10.0));
-        let Self { committee, settings, variation, task, .. } = self;
-        TestSearch::start(committee, frame, setting, task, settings, variation, seed, 1, workers)
+        let (committee, setting) = (self.models(), self.world.setting(10.0));
+        let Self { settings, variation, task, .. } = self;
+        TestSearch::start(committee, setting, task, settings, variation, seed, 1, workers)
     }
 
     fn start(self, seed: u64, workers: &Workers) -> TestSearch {
@@ -85,9 +89,8 @@ impl Setup {
 
     /// Final distances (models × candidates) of a population.
     fn distances(&self, population: &[Arc<Vec<f64>>]) -> Vec<Vec<f64>> {
-        let frame = self.frame();
-        let models: Vec<Model<'_>> =
-            self.committee.iter().map(|learnt| Model { code: &learnt.code, frame: &frame }).collect();
+        let owned = self.models();
+        let models: Vec<_> = owned.iter().map(OwnedModel::view).collect();
         let candidates: Vec<&[f64]> = population.iter().map(|genome| &genome[..]).collect();
         final_distances(&models, &self.world.setting(10.0), &candidates, &self.task, &one_worker())
     }
@@ -190,7 +193,7 @@ proptest! {
     fn equal_candidates_of_a_generation_meet_equal_mutants(seed in any::<u64>()) {
         // Copies only: after a few generations many are equal.
         let mut setup = Setup::of(disagreeing());
-        setup.variation = Variation { mutation_share: 0.0, crossover_share: 0.0, ..variation() };
+        setup.variation = Variation { mutation_share: 0.0, crossover_share: 0.0, reproduction_share: 1.0, ..variation() };
         let search = setup.start(seed, &one_worker()).advance(3, &one_worker());
         let (population, rows) = (search.search().population(), rows(search.search()));
         let mut pairs = 0;
@@ -208,8 +211,13 @@ proptest! {
 fn another_generation_has_other_mutants_but_the_same_discrimination() {
     // Copies only, so the elite is judged again and again as it is.
     let mut setup = Setup::of(disagreeing());
-    setup.variation =
-        Variation { mutation_share: 0.0, crossover_share: 0.0, elite_share: 0.5, ..variation() };
+    setup.variation = Variation {
+        mutation_share: 0.0,
+        crossover_share: 0.0,
+        reproduction_share: 1.0,
+        elite_share: 0.5,
+        ..variation()
+    };
     let before = setup.start(4, &one_worker());
     let after = before.clone().advance(1, &one_worker());
     let row_of = |search: &TestSearch, genome: &Arc<Vec<f64>>| {
@@ -244,7 +252,7 @@ fn a_best_model_that_ignores_the_commands_is_called_flat() {
 
 #[test]
 fn misuse_is_refused_with_a_reason() {
-    assert!(Setup::of(vec![]).refusal().contains("committee of one model or more"));
+    assert!(Setup::of(vec![]).refusal().contains("committee: expected one model or more"));
     let at_target =
         Setup { task: Task::new(vec![0.5; 3], vec![0.5; 3], 5).unwrap(), ..Setup::of(disagreeing()) };
     assert!(at_target.refusal().contains("target away from the initial state"));

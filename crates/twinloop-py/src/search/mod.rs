@@ -14,7 +14,7 @@ use twinloop_core::pareto::Objectives;
 use twinloop_core::{Search, Snapshot, Variation};
 
 use crate::arrays::{Matrix, to_matrix};
-use crate::error::{Result, misuse};
+use crate::error::Result;
 use crate::pareto::{distance, matrix as objectives_of};
 
 /// How a generation is made out of the last.
@@ -39,16 +39,11 @@ impl PyVariation {
         archive_cap: usize,
         normalised_tradeoff: bool,
     ) -> Result<Self> {
-        let sum = mutation_share + crossover_share + reproduction_share;
-        if sum.is_nan() || (sum - 1.0).abs() > 1e-9 {
-            return Err(misuse(format!(
-                "variation: expected shares of the operators that sum to 1, found {sum}"
-            )));
-        }
         let variation = Variation {
             population,
             mutation_share,
             crossover_share,
+            reproduction_share,
             elite_share,
             ranking_pressure,
             archive_cap,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Learnt, ModelSearch, Signals};
+use twinloop_core::{Learnt, ModelSearch};
 
 use super::{Counters, PyVariation, array, counters, snapshot};
 use crate::arrays::{Matrix, to_vector};
@@ -17,17 +17,7 @@ use crate::workers::PyWorkers;
 
 /// The model loop as a value: every method that moves it returns a new one.
 #[pyclass(frozen, name = "ModelSearch", module = "twinloop._core")]
-pub struct PyModelSearch {
-    search: ModelSearch,
-    signals: Arc<Signals>,
-}
-
-impl PyModelSearch {
-    fn model(&self, member: usize) -> PyModel {
-        let learnt = self.search.search().archive().members()[member].clone();
-        PyModel::of(learnt, self.search.frame().clone(), self.signals.clone())
-    }
-}
+pub struct PyModelSearch(ModelSearch);
 
 #[pymethods]
 impl PyModelSearch {
@@ -44,7 +34,7 @@ impl PyModelSearch {
         let (grammar, form, variation) = (grammar.0.clone(), form.parse()?, variation.0.clone());
         let search =
             flown(py, || ModelSearch::start(grammar, form, variation, seed, &selected.0, &workers.0))??;
-        Ok(Self { search, signals: selected.0.signals().clone() })
+        Ok(Self(search))
     }
 
     #[staticmethod]
@@ -67,13 +57,13 @@ impl PyModelSearch {
         let (population, members) = (learnt(population), learnt(archive));
         let parts = snapshot(counters, population, &population_objectives, members, &archive_objectives)?;
         let (grammar, form, variation) = (grammar.0.clone(), form.parse()?, variation.0.clone());
-        let search = ModelSearch::restored(grammar, form, variation, &signals.0, parts, &workers.0)?;
-        Ok(Self { search, signals: signals.0.clone() })
+        let search = ModelSearch::restored(grammar, form, variation, signals.0.clone(), parts, &workers.0)?;
+        Ok(Self(search))
     }
 
     fn learn(&self, py: Python<'_>, selected: &PySelectedTests, workers: &PyWorkers) -> Result<Self> {
-        let search = flown(py, || self.search.clone().learn(&selected.0, &workers.0))??;
-        Ok(Self { search, signals: self.signals.clone() })
+        let search = flown(py, || self.0.clone().learn(&selected.0, &workers.0))??;
+        Ok(Self(search))
     }
 
     fn advance(
@@ -83,86 +73,86 @@ impl PyModelSearch {
         generations: u64,
         workers: &PyWorkers,
     ) -> Result<Self> {
-        let search = flown(py, || self.search.clone().advance(&selected.0, generations, &workers.0))??;
-        Ok(Self { search, signals: self.signals.clone() })
+        let search = flown(py, || self.0.clone().advance(&selected.0, generations, &workers.0))??;
+        Ok(Self(search))
     }
 
     #[getter]
     fn counters(&self) -> Counters {
-        counters(self.search.search())
+        counters(self.0.search())
     }
 
     #[getter]
     fn iteration(&self) -> u64 {
-        self.search.search().iteration()
+        self.0.search().iteration()
     }
 
     #[getter]
     fn generation(&self) -> u64 {
-        self.search.search().generation()
+        self.0.search().generation()
     }
 
     #[getter]
     fn evaluations(&self) -> u64 {
-        self.search.search().evaluations()
+        self.0.search().evaluations()
     }
 
     #[getter]
     fn spared(&self) -> u64 {
-        self.search.search().spared()
+        self.0.search().spared()
     }
 
     #[getter]
     fn capped_generations(&self) -> u64 {
-        self.search.search().capped_generations()
+        self.0.search().capped_generations()
     }
 
     #[getter]
     fn intron_share(&self) -> f64 {
-        self.search.intron_share()
+        self.0.intron_share()
     }
 
     #[getter]
     fn population(&self) -> Vec<PyProgram> {
-        self.search.search().population().iter().map(|learnt| PyProgram(learnt.clone())).collect()
+        self.0.search().population().iter().map(|learnt| PyProgram(learnt.clone())).collect()
     }
 
     #[getter]
     fn population_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        array(py, self.search.search().objectives())
+        array(py, self.0.search().objectives())
     }
 
     #[getter]
     fn archive_size(&self) -> usize {
-        self.search.search().archive().len()
+        self.0.search().archive().len()
     }
 
     #[getter]
     fn archive(&self) -> Vec<PyModel> {
-        (0..self.archive_size()).map(|member| self.model(member)).collect()
+        (0..self.archive_size()).map(|member| PyModel(self.0.model(member))).collect()
     }
 
     #[getter]
     fn archive_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        array(py, &self.search.search().archive().objectives())
+        array(py, &self.0.search().archive().objectives())
     }
 
     #[getter]
     fn best(&self) -> usize {
-        self.search.best()
+        self.0.best()
     }
 
     #[getter]
     fn best_model(&self) -> PyModel {
-        self.model(self.search.best())
+        PyModel(self.0.model(self.0.best()))
     }
 
     #[getter]
     fn best_objectives<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        to_vector(py, self.search.search().archive().objectives_of(self.search.best()))
+        to_vector(py, self.0.search().archive().objectives_of(self.0.best()))
     }
 
     fn committee(&self, size: usize) -> Vec<usize> {
-        self.search.committee(size)
+        self.0.committee(size)
     }
 }

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use twinloop_core::{Frame, Learnt, Signals, TestSearch, TestSettings};
+use twinloop_core::{TestSearch, TestSettings};
 
 use super::{Counters, PyVariation, array, counters, snapshot};
 use crate::arrays::{Matrix, rows, to_matrix, to_vector};
-use crate::error::{Result, misuse};
+use crate::error::Result;
 use crate::law::flown;
-use crate::model::PyModel;
+use crate::model::{PyModel, owned};
 use crate::rollout::PyTask;
 use crate::setting::PySetting;
 use crate::workers::PyWorkers;
@@ -56,13 +56,11 @@ impl PyTestSearch {
         iteration: u64,
         workers: &PyWorkers,
     ) -> Result<Self> {
-        let (committee, frame) = judges(&committee, setting.0.signals())?;
+        let committee = owned(&committee);
         let (setting, task, settings, variation) =
             (setting.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
         let search = flown(py, || {
-            TestSearch::start(
-                committee, frame, setting, task, settings, variation, seed, iteration, &workers.0,
-            )
+            TestSearch::start(committee, setting, task, settings, variation, seed, iteration, &workers.0)
         })??;
         Ok(Self(search))
     }
@@ -83,7 +81,7 @@ impl PyTestSearch {
         archive_objectives: Matrix<'_>,
         workers: &PyWorkers,
     ) -> Result<Self> {
-        let (committee, frame) = judges(&committee, setting.0.signals())?;
+        let committee = owned(&committee);
         let (setting, task, settings, variation) =
             (setting.0.clone(), task.0.clone(), settings.0.clone(), variation.0.clone());
         let genes = |genes: &Matrix<'_>| -> Result<Vec<Arc<Vec<f64>>>> {
@@ -91,9 +89,8 @@ impl PyTestSearch {
         };
         let (population, members) = (genes(&population)?, genes(&archive)?);
         let parts = snapshot(counters, population, &population_objectives, members, &archive_objectives)?;
-        let search = TestSearch::restored(
-            committee, frame, setting, task, settings, variation, parts, flat, &workers.0,
-        )?;
+        let search =
+            TestSearch::restored(committee, setting, task, settings, variation, parts, flat, &workers.0)?;
         Ok(Self(search))
     }
 
@@ -170,23 +167,4 @@ impl PyTestSearch {
 /// Genes of at least one test as an array, a row each.
 fn to_genes<'py>(py: Python<'py>, tests: &[Arc<Vec<f64>>]) -> Bound<'py, PyArray2<f64>> {
     to_matrix(py, tests[0].len(), tests.iter().flat_map(|genes| genes.iter().copied()).collect())
-}
-
-/// The committee of a test search, with the frame that its models share.
-fn judges(committee: &[Bound<'_, PyModel>], signals: &Signals) -> Result<(Vec<Arc<Learnt>>, Arc<Frame>)> {
-    let frame = one_frame(committee)?;
-    committee.iter().try_for_each(|model| model.get().fits(signals))?;
-    Ok((committee.iter().map(|model| model.get().learnt.clone()).collect(), frame))
-}
-
-/// The frame that all models share.
-fn one_frame(models: &[Bound<'_, PyModel>]) -> Result<Arc<Frame>> {
-    match models.split_first() {
-        Some((first, others)) if others.iter().all(|model| model.get().frame == first.get().frame) => {
-            Ok(first.get().frame.clone())
-        }
-        _ => Err(misuse(
-            "committee: expected one model or more, all of one form and one set of signals".into(),
-        )),
-    }
 }
