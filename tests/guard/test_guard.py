@@ -13,7 +13,7 @@ from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, pend
 from lives import THOROUGH
 from oracles import same_bits
 from twinloop import _core
-from twinloop.guard import Guard, Guarded
+from twinloop.guard import Guard, Guarded, band
 from twinloop.guard.band import DRAWS, BandWatch
 from twinloop.guard.guarded import led_by
 from twinloop.hold_back import HoldBack
@@ -221,7 +221,21 @@ def test_a_command_or_other_gains_may_be_the_fallback(campaign):
 # Band
 
 
-def test_the_band_ends_as_many_flights_of_the_committee_as_is_said_and_no_more(campaign):
+def test_what_is_off_by_less_than_a_tenth_of_the_envelope_is_no_alarm_and_what_is_off_by_more_is(campaign):
+    twin, test = campaign.twin, campaign.tests[0]
+    watch, alarmed = BandWatch(twin, test, 0.01), {}
+    i, state = next((i, s) for i, s in enumerate(twin.signals.states) if s.envelope is not None)
+    half = 0.5 * (state.envelope[1] - state.envelope[0])
+    for share in (0.09, 0.3):
+        watch.reset()
+        readings = watch.mean.copy()
+        readings[1:, i] += share * half
+        alarmed[share] = [watch.alarms(reading) for reading in readings]
+    assert not any(alarmed[0.09]) and alarmed[0.3].index(True) <= 4
+
+
+def test_the_band_ends_as_many_flights_of_the_committee_as_is_said_and_no_more(campaign, monkeypatch):
+    monkeypatch.setattr(band, "HARMLESS", 0.0)  # where the committee's own band decides
     twin, test = campaign.twin, campaign.tests[0]
     watch = BandWatch(twin, test, 0.05)
     other = tl.Twin(

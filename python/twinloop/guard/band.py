@@ -10,6 +10,7 @@ from twinloop.arrays import Floats
 from twinloop.law.twin import Twin
 from twinloop.law.uncertainty import NINE_OF_TEN
 from twinloop.replay import Replay
+from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -17,6 +18,10 @@ DRAWS = 32
 """Flights of each member of the committee that the threshold is a quantile of."""
 FEWEST = 3
 """Periods in a row that must be outside: one bad reading ends no flight."""
+HARMLESS = 0.1
+"""Share of half an envelope's width that the band's half width is at least: what is off by less does no harm by itself,
+and where it leads to is looked for ahead, from the reading. A committee learnt from two flights may be that wrong far
+from them, and so sure of itself that no level of alarm would hold."""
 START = 5.0
 """Standard deviations of a sensor by which a first reading may be off the start that was asked for."""
 
@@ -25,10 +30,11 @@ class BandWatch:
     """Page's cumulative sum (Biometrika 41, 1954) of how far readings are outside the calibrated band.
 
     Each period adds w − 1, at most 1, where w is the distance of the reading from the mean in half widths of the band,
-    the largest over states; the sum never falls below 0. It alarms above the level that a given share of the
-    committee's own flights exceed somewhere: members, noise and disturbances drawn, with the calibrated spread. So the
-    share is one of flights, and the test knows that errors of a flight last. The level is no lower than what flights
-    that the twin learnt from reach against their own bands: what it cannot follow there is no surprise.
+    none below a tenth of half the envelope's, the largest over states; the sum never falls below 0. It alarms above the
+    level that a given share of the committee's own flights exceed somewhere: members, noise and disturbances drawn,
+    with the calibrated spread. So the share is one of flights, and the test knows that errors of a flight last. The
+    level is no lower than what flights that the twin learnt from reach against their own bands: what it cannot follow
+    there is no surprise.
 
     Args:
         twin: with a committee and its noise.
@@ -61,7 +67,8 @@ class BandWatch:
         middle = off.mean(axis=0)
         spread = twin.inflation * (off - middle)
         self.mean = origin + middle
-        self.half = NINE_OF_TEN * np.sqrt(np.square(spread).mean(axis=0) + np.square(self.sensors))
+        known = np.sqrt(np.square(spread).mean(axis=0) + np.square(self.sensors))
+        self.half = np.maximum(NINE_OF_TEN * known, HARMLESS * _rooms(self.signals))
         worst = (np.abs(spread + noise[lasts]) / self.half).max(axis=2)
         total, highest = np.zeros(len(worst)), np.zeros(len(worst))
         for k in range(worst.shape[1]):
@@ -101,3 +108,13 @@ class BandWatch:
 def _added(total: Floats, worst: Floats) -> Floats:
     """The sum after another period."""
     return np.maximum(0.0, total + np.minimum(worst, 2.0) - 1.0)
+
+
+def _rooms(signals: Signals) -> Floats:
+    """Half the width of each state's envelope, or its scale where it has none (n_x,)."""
+    return np.array(
+        [
+            state.scale if state.envelope is None else 0.5 * (state.envelope[1] - state.envelope[0])
+            for state in signals.states
+        ]
+    )
