@@ -11,6 +11,7 @@ from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed
+from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
 from twinloop.planning.planner import Planner
@@ -152,14 +153,13 @@ def test_a_full_state_feedback_is_tuned_from_the_gains_of_lqr_on_the_twin_too(mo
     plant = tl.systems.Simulated(SIGNALS, pendulum_step)
     first = campaign.test(dict.fromkeys((gain.name for gain in campaign.family.gains), 0.5))
     campaign.tell(first, plant.run(first))
-    method = campaign._method
     _ = campaign.best_test
     committee, starts = seen[-1]
     assert committee.trusted
     gains = campaign.family.genes(lqr_gains(committee.members[0], campaign.family, [1.0, 0.0]))
     assert any(start.tobytes() == gains.tobytes() for start in starts)
     doubted = Committee(committee.members, committee.sds, trusted)
-    assert len(method._linear_gains(doubted)) == trusted
+    assert len(linear_gains(campaign.setup, doubted)) == trusted
 
 
 def test_no_other_family_has_starts_by_lqr():
@@ -167,4 +167,4 @@ def test_no_other_family_has_starts_by_lqr():
         SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0, threads=1,
         options=SMALL,
     )  # fmt: skip
-    assert campaign._method._linear_gains(Committee([None], np.zeros(2), True)) == []
+    assert linear_gains(campaign.setup, Committee([None], np.zeros(2), True)) == []

@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign import standing
@@ -17,18 +15,17 @@ from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import (
     calibrated,
 )
-from twinloop.campaign.identify_and_plan.choice import UNKNOWN, Choice
+from twinloop.campaign.identify_and_plan.choice import Choice
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
+from twinloop.campaign.identify_and_plan.starts import first_genes, known_gains, starts_of
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
 from twinloop.campaign.twin_errors import errors_of
-from twinloop.controllers import lqr_gains
-from twinloop.controllers.state_feedback import FeedbackFamily
 from twinloop.elementary import log
-from twinloop.errors import InvalidInput, NotAvailable
+from twinloop.errors import NotAvailable
 from twinloop.hold_back import HoldBack
 from twinloop.identification.identify import UnderWay
 from twinloop.law.twin import Twin
@@ -145,7 +142,7 @@ class IdentifyAndPlan:
 
     def _asked_of_nobody(self, book: Logbook) -> Test:
         """A test that no committee chose."""
-        genes, excitation = self.planner.baseline(len(book.tests), self._first_genes(book))
+        genes, excitation = self.planner.baseline(len(book.tests), first_genes(self.setup, book))
         test = book.new_test(genes, excitation=excitation, reason="No committee was asked.")
         plan = Planned(
             test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
@@ -176,7 +173,7 @@ class IdentifyAndPlan:
         best = best_alone(self.planner, committee, book, self.options.draws)
         choice = Choice(self.planner, committee, book, self.options.draws, self.options.confidence)
         if at_once:
-            tuned, note = self._known_gains(best)
+            tuned, note = known_gains(self.memory, best)
             found = choice.between(tuned, best)
             return replace(found, reason=f"{found.reason}{note}")
         answer = choice.between(self._gains(book), best)
@@ -238,26 +235,13 @@ class IdentifyAndPlan:
             test.genes.tobytes() == tuned.tobytes() and test.excitation is None for test in book.waiting()
         )
 
-    def _first_genes(self, book: Logbook) -> Floats:
-        """Of the first test that was flown; the middle of the box where none was."""
-        first = standing.first_flown(book)
-        if first is not None:
-            return first.genes
-        return self.setup.family.from_unit(np.full(self.setup.family.size, 0.5))
-
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
         told = len(book.experiments)
         if self.memory.gains is not None and self.memory.gains[0] == book.outcomes:
             return self.memory.gains[1]
         committee, asked = self._committee(), self.memory.asked
-        best, first = standing.best_flown(book), self._first_genes(book)
-        starts = [first if best is None else best.genes]
-        if asked is not None and asked.gains is not None:
-            starts.append(asked.gains)
-        if first.tobytes() != starts[0].tobytes():
-            starts.append(first)
-        starts += self._linear_gains(committee)
+        starts = starts_of(self.setup, book, committee, None if asked is None else asked.gains)
         genes = starts[0]
         if committee.trusted:
             genes = self.planner.tune(committee, starts, told, self._scored(book))
@@ -276,38 +260,6 @@ class IdentifyAndPlan:
             self.memory = replace(self.memory, scores=(outcomes, scores))
 
         return Scored(before[1] if before is not None and before[0] == outcomes else (), keep)
-
-    def _known_gains(self, best: Test | None) -> tuple[Floats, str]:
-        """Gains as they were tuned last, or the best flown where none were, and what to say of it; nothing is tuned.
-
-        Raises:
-            NotAvailable: there are neither.
-        """
-        if self.memory.gains is not None:
-            return self.memory.gains[1], ""
-        asked = self.memory.asked
-        known = [] if asked is None or asked.gains is None else [asked.gains]
-        known += [] if best is None else [best.genes]
-        if not known:
-            raise NotAvailable(f"{UNKNOWN}none has flown, and none was tuned yet. Let it learn to its end.")
-        return known[0], " Nothing was tuned on this twin yet."
-
-    def _linear_gains(self, committee: Committee) -> list[Floats]:
-        """Gains of a full state feedback by LQR on the linearised twin; none for other families, or where it fails."""
-        family = self.setup.family
-        if not isinstance(family, FeedbackFamily) or not committee.trusted:
-            return []
-        try:
-            return [family.genes(lqr_gains(committee.members[0], family, self.setup.final_target))]
-        except (NotAvailable, InvalidInput):
-            return []
-
-    def _good(self, book: Logbook, best: Test | None) -> float:
-        """Quality of the best test flown for the campaign's own task inside the envelope; infinite where none was."""
-        if best is None or not (standing.flies(book, best.number) and standing.on_task(book, best)):
-            return float("inf")
-        measured = standing.measured(book, best.number)
-        return float("inf") if measured is None else measured
 
     def _watch(self, step: Step) -> None:
         latest = self.memory.latest
