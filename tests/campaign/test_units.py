@@ -222,18 +222,21 @@ def test_vessels_are_learnt_and_flown_alike_in_any_units(in_si, units, law):
     same(decisions(Tanks, units, options=LAWS[law]), in_si[law])
 
 
-# The root of 2 is no power of 2: what a unit of a state does to its root is exact for powers of 4.
+# A root is of a state in units of its scale, and what is divided by is too: no power of two is too odd or too far.
 OUTFLOWS = {
-    "pressure in fine units": Units([2.0**18, 1.0]),
-    "pressure in coarse units": Units([2.0**-14, 1.0]),
-    "heat in fine units": Units([1.0, 2.0**12]),
-    "all at once": Units([2.0**-10, 2.0**14], command=2.0**7, time=2.0**-9),
+    "pressure in fine units": Units([2.0**17, 1.0]),
+    "pressure in coarse units": Units([2.0**-15, 1.0]),
+    "heat in fine units": Units([1.0, 2.0**13]),
+    "very fine units": Units([2.0**41, 2.0**40]),
+    "very coarse units": Units([2.0**-41, 2.0**-39]),
+    "time in fine units": Units([1.0, 1.0], time=2.0**30),
+    "all at once": Units([2.0**-11, 2.0**15], command=2.0**7, time=2.0**-9),
 }
 
 
 @pytest.mark.parametrize("generations", [0, 2])
 @pytest.mark.parametrize("units", OUTFLOWS.values(), ids=OUTFLOWS)
-def test_roots_and_quotients_are_learnt_alike_in_units_that_are_powers_of_four(units, generations):
+def test_roots_and_quotients_are_learnt_alike_in_any_units(units, generations):
     options = {"generations": generations}
     expected = decisions(Outflow, Units([1.0, 1.0]), flights=2, options=options)
     assert {"sqrt", "/"} <= {name for name, *_ in expected["structure"][0]}
@@ -247,6 +250,18 @@ def test_evolved_terms_change_nothing_where_the_law_needs_none(plant, units):
         decisions(plant, units, flights=2, **evolved),
         decisions(plant, Units([1.0, 1.0]), flights=2, **evolved),
     )
+
+
+# No library: what is learnt is grown, with constants, roots, waves and quotients of everything.
+GROWN = {"libraries": (), "generations": 4, "population": 60, "form": "increment"}
+
+
+@pytest.mark.parametrize("units", [OUTFLOWS["very coarse units"], OUTFLOWS["all at once"]])
+def test_a_law_that_is_grown_is_the_same_in_any_units(units):
+    expected = decisions(Outflow, Units([1.0, 1.0]), flights=2, options=GROWN)
+    grown = {name for member in expected["structure"] for name, *_ in member}
+    assert grown - {"+", "*"}, "nothing was grown but products"
+    same(decisions(Outflow, units, flights=2, options=GROWN), expected)
 
 
 @pytest.mark.parametrize("quality", ["ise", "final_distance"])

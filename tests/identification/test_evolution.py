@@ -81,7 +81,7 @@ def test_a_law_that_no_library_holds_is_grown_and_nothing_gets_worse(monkeypatch
 @pytest.mark.parametrize("seed", range(5))
 def test_new_nodes_use_the_operators_that_are_allowed(seed):
     pool, stream = Pool(3), Unit(seed, (0,)).stream("terms")
-    drawn = {_drawn(pool, [0, 1, 2, pool.one], ("min",), stream) for _ in range(300)} - {None}
+    drawn = {_drawn(pool, [0, 1, 2, pool.one], ("min",), stream, SIGNALS) for _ in range(300)} - {None}
     texts = {pool.text(node, NAMES) for node in drawn}
     assert texts and not any(word in text for text in texts for word in ("/", "sin", "Max", "exp"))
     assert any("Min(" in text for text in texts)

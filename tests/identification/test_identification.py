@@ -165,12 +165,18 @@ def test_each_rung_has_the_terms_of_those_below_and_a_stranger_stands_above_all(
     assert len(rungs(Pool(INPUTS), pendulum_like(), ("linear", "cubic"), 4)) == 1
 
 
+LEVEL = 0.5
+"""Scale of a level, m."""
+
+
 def tanks_like(*more):
-    levels = [tl.State(name, "m", 0.5) for name in ("upper", "lower")]
+    levels = [tl.State(name, "m", LEVEL) for name in ("upper", "lower")]
     return tl.Signals([*levels, *more], [tl.Command("pump", "V", (0.0, 10.0), scale=10.0)], 2.0)
 
 
 def signed_root(pool, node):
+    """Of levels in units of their scale."""
+    node = pool.share(node, LEVEL)
     return pool.add("/", node, pool.add("sqrt", node))
 
 
@@ -225,8 +231,10 @@ def test_the_law_of_two_tanks_is_found(joined):
     found = identified(runs, tanks_like(), moves=8000)
     pool = found.pool
     between, leak = signed_root(pool, pool.add("-", 0, 1) if joined else 0), signed_root(pool, 1)
+    # √x is √scale times the root of x in units of it.
+    out, leaking = 0.016 * LEVEL**0.5, 0.012 * LEVEL**0.5
     for sum_, expected in zip(
-        found.sums, ({2: 0.02, between: -0.016}, {between: 0.016, leak: -0.012}), strict=True
+        found.sums, ({2: 0.02, between: -out}, {between: out, leak: -leaking}), strict=True
     ):
         assert set(sum_.weights) == set(expected)
         for term, weight in expected.items():
@@ -244,7 +252,7 @@ def magnet_like():
 def test_quotients_are_of_what_may_be_a_distance():
     pool = Pool(INPUTS)
     found = rungs(pool, magnet_like(), ("quotients",), 450)[0]
-    share = pool.add("*", 0, 1.0)  # of its scale: what is too small to divide by must not depend on the unit
+    share = pool.share(0, 1.0)  # of its scale: what is too small to divide by must not depend on the unit
     above = (pool.one, 2, pool.product(2, 2))
     assert set(found) == {
         pool.add("/", a, below) for below in (share, pool.product(share, share)) for a in above
@@ -263,7 +271,7 @@ def test_the_law_of_a_magnet_is_found():
         runs.append(Run.of(run.states, run.commands + 2.0))
     found = identified(runs, magnet_like(), moves=8000)
     pool, weights = found.pool, found.sums[0].weights
-    share = pool.add("*", 0, 1.0)
+    share = pool.share(0, 1.0)
     pull = pool.add("/", pool.product(2, 2), pool.product(share, share))
     expected = {pool.one: -9.81, pull: 3.0, 1: -0.8}
     assert set(weights) == set(expected)

@@ -10,6 +10,7 @@ from twinloop.law.expressions import (
     CONSTANT,
     INPUT,
     POWER,
+    SHARE,
     SMALLEST_DIVISOR,
     Expressions,
     Node,
@@ -70,6 +71,8 @@ class Expansion:
         if operation == CONSTANT:
             return {(): value} if value else {}
         parts = [self._known[operand] for operand in operands]
+        if operation == SHARE:
+            operation, parts = "*", [*parts, {(): value}]
         if operation in ("+", "-"):
             found = _sum(parts[0], parts[1], 1.0 if operation == "+" else -1.0)
         elif operation == "*":

@@ -16,8 +16,9 @@ UNARY = ("abs", "sqrt", "sin", "cos", "tanh", "exp")
 BINARY = ("+", "-", "*", "/", "min", "max")
 """Operations on two operands that a program computes; a / b is protected, see `SMALLEST_DIVISOR`."""
 COMMUTING = ("+", "*")
-INPUT, CONSTANT, POWER, UPRIGHT = "input", "constant", "**", "upright"
-"""Leaves, whole powers, and a cosine kept away from 0 (see `GIMBAL`), which programs do not have."""
+INPUT, CONSTANT, POWER, UPRIGHT, SHARE = "input", "constant", "**", "upright", "share"
+"""What programs do not have: leaves, whole powers, a cosine kept away from 0 (see `GIMBAL`), a node in units of a
+scale."""
 
 Instruction = tuple[str, int, int, "int | float | None"]
 """(operation, destination, first operand, second operand): a register an int, a constant a float."""
@@ -27,9 +28,9 @@ class Node(NamedTuple):
     """One expression.
 
     Args:
-        operation: "input", "constant", "**", "upright", or an operation of programs.
+        operation: "input", "constant", "**", "upright", "share", or an operation of programs.
         operands: numbers of the nodes that it is computed from.
-        value: place of an input, value of a constant, or exponent of a power; 0 for anything else.
+        value: place of an input, value of a constant, exponent of a power, 1 / scale of a share; 0 for anything else.
     """
 
     operation: str
@@ -79,6 +80,10 @@ class Expressions:
     def power(self, base: int, exponent: int) -> int:
         """The node of a whole power of a node, the exponent at least 1."""
         return base if exponent == 1 else self.enter(Node(POWER, (base,), exponent))
+
+    def share(self, number: int, scale: float) -> int:
+        """The node of a node in units of a scale, above 0: a number that no unit changes."""
+        return self.enter(Node(SHARE, (number,), 1.0 / scale))
 
     def add(self, operation: str, *operands: int) -> int:
         """The node of an operation as it is written; sums and products do not depend on the order of operands."""
@@ -250,6 +255,10 @@ class Compiler:
             for _ in range(int(value) - 1):
                 first = self._written("*", first, base, self._new())
             self._registers[number] = first
+        elif operation == SHARE:
+            self.held.append(number)
+            first = self._register(operands[0])
+            self._registers[number] = self._written("*", first, value, self._place(number, places))
         elif operation in UNARY:
             first = self._register(operands[0])
             self._registers[number] = self._written(operation, first, None, self._place(number, places))

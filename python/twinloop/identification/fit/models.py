@@ -10,6 +10,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.bounds import Limits
+from twinloop.law.expressions import SHARE
 from twinloop.signals import Bounds
 
 
@@ -39,7 +40,8 @@ def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:
     used = [term for found in hypothesis.sums for term in found.weights if term != pool.one]
     held = pool.held([*used, *known])
     kept = {pool.one, *pool.needed(known)}
-    free = [place for place, node in enumerate(held) if node not in kept]
+    # The scale of a share says what the same expression times a weight says: to tune both would be one too many.
+    free = [place for place, node in enumerate(held) if node not in kept and pool[node].operation != SHARE]
     place, weights = len(held), []
     for output, found in enumerate(hypothesis.sums):
         place += len(_fixed(hypothesis, found))

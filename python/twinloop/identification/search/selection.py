@@ -126,7 +126,7 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
                 problem, climber.sums, seeds,
                 operators=options.operators, generations=options.generations,
                 population=options.population, longest=options.longest, moves=options.moves // 4,
-                largest=options.largest, unit=_next_unit(context, climber),
+                largest=options.largest, unit=_next_unit(context, climber), signals=context.signals,
             )  # fmt: skip
             climber = climber.searched(sums)
     return _with_implicit_laws(context, climber, inputs, brief)

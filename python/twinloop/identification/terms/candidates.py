@@ -54,6 +54,10 @@ class Candidates(Recorded, kind="candidates"):
         priors = priors_of(replace(options, form=form), pool, signals)
         # A bounded term that no rung has stands on the first one.
         bounded = dict.fromkeys(node for limits in priors.bounds.values() for node in limits)
+        # The same in units of its scale would evade the bounds.
+        ladder = [
+            [node for node in terms if node in bounded or pool.bare(node) not in bounded] for terms in ladder
+        ]
         strangers = [node for node in bounded if node not in ladder[-1]]
         pool.rungs.update(dict.fromkeys(strangers, 0))
         return Candidates(pool, tuple((*terms, *strangers) for terms in ladder), priors)

@@ -14,7 +14,9 @@ from twinloop.elementary import log
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.terms.pool import Pool
+from twinloop.identification.terms.sizes import in_shares, size
 from twinloop.law.expressions import UNARY
+from twinloop.signals import Signals
 from twinloop.streams import Unit
 
 PRODUCTS = 0.5
@@ -35,6 +37,7 @@ def evolve(
     moves: int,
     largest: int,
     unit: Unit,
+    signals: Signals,
 ) -> list[Sum]:
     """Grows terms for a number of generations.
 
@@ -49,6 +52,7 @@ def evolve(
         moves: of each search over subsets.
         largest: number of terms of a sum at most.
         unit: of work, for its random numbers.
+        signals: of the system, whose scales new nodes are made in.
 
     Returns:
         The best sum of each chain, never worse than the known one.
@@ -64,7 +68,7 @@ def evolve(
         tries = 0
         while len(candidates) < population and tries < 20 * population:
             tries += 1
-            node = _drawn(pool, parents, operators, draw)
+            node = _drawn(pool, parents, operators, draw, signals)
             if node is not None and pool.length(node) <= longest:
                 candidates.setdefault(node)
         wholes = [_whole(pool, found, taken) for found in best]
@@ -94,8 +98,14 @@ def evolve(
     return best
 
 
-def _drawn(pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _core.Stream) -> int | None:
-    """A new node of inputs and parents; None where it makes no sense."""
+def _drawn(
+    pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _core.Stream, signals: Signals
+) -> int | None:
+    """A new node of inputs and parents; None where it makes no sense.
+
+    Products and sizes are what they are in any unit. For all else, and for constants, parents are in units of their
+    sizes, two inputs of one unit in those of the first.
+    """
 
     def pick() -> int:
         if draw.uniform() < 0.5:
@@ -107,15 +117,23 @@ def _drawn(pool: Pool, parents: Sequence[int], operators: Sequence[str], draw: _
         return None if pool.one in (a, b) else pool.product(a, b)
     operation = operators[draw.below(len(operators))]
     if draw.uniform() < CONSTANTS:
-        size = draw.log_uniform(0.1, 10.0)
-        a = pool.add("+" if draw.uniform() < 0.5 else "*", a, size if draw.uniform() < 0.5 else -size)
+        constant = draw.log_uniform(0.1, 10.0)
+        kind = "+" if draw.uniform() < 0.5 else "*"
+        a = pool.add(kind, in_shares(pool, a, signals), constant if draw.uniform() < 0.5 else -constant)
     if a == pool.one:
         return None
     if operation in UNARY:
-        return pool.add(operation, a)
+        return pool.add(operation, a if operation == "abs" else in_shares(pool, a, signals))
     if b == pool.one or (operation in ("-", "/", "min", "max") and a == b):
         return None
-    return pool.add(operation, a, b)
+    if operation == "*":
+        return pool.add(operation, a, b)
+    if operation == "/":
+        return pool.add(operation, a, in_shares(pool, b, signals))
+    if max(a, b) < signals.n_x and signals.states[a].unit == signals.states[b].unit:
+        scale = size(pool, a, signals)
+        return pool.add(operation, *((a, b) if scale is None else (pool.share(i, scale) for i in (a, b))))
+    return pool.add(operation, in_shares(pool, a, signals), in_shares(pool, b, signals))
 
 
 def _whole(pool: Pool, found: Sum, taken: set[int]) -> dict[int, float]:

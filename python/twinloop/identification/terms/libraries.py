@@ -42,11 +42,11 @@ def roots(pool: Pool, signals: Signals) -> Terms:
     """
     terms: Terms = []
     for i in levels(signals):
-        root = _signed_root(pool, i)
+        root = _signed_root(pool, pool.share(i, signals.states[i].scale))
         terms += [root, *(pool.product(j, root) for j in range(signals.n_x, pool.inputs))]
     for i, j in combinations(levels(signals), 2):
         if signals.states[i].unit == signals.states[j].unit:
-            terms.append(_signed_root(pool, pool.add("-", i, j)))
+            terms.append(_signed_root(pool, pool.share(pool.add("-", i, j), signals.states[i].scale)))
     return terms
 
 
@@ -91,7 +91,7 @@ def quotients(pool: Pool, signals: Signals) -> Terms:
     below: Terms = []
     for i in distances(signals):
         # In shares of its scale: what is too small to divide by must not depend on the unit.
-        share = pool.add("*", i, 1.0 / signals.states[i].scale)
+        share = pool.share(i, signals.states[i].scale)
         below += [share, pool.product(share, share)]
     return [pool.add("/", a, size) for size in below for a in above]
 

@@ -17,6 +17,7 @@ from twinloop.law.expressions import (
     BINARY,
     CONSTANT,
     INPUT,
+    SHARE,
     UNARY,
     Compiler,
     Expressions,
@@ -137,6 +138,14 @@ class Pool(Expressions, Recorded, kind="pool"):
             result = self.add("*", result, factor)
         return result
 
+    def bare(self, number: int) -> int:
+        """The node of the same expression without shares."""
+        operation, operands, _ = self[number]
+        if operation == SHARE:
+            return self.bare(operands[0])
+        parts = tuple(self.bare(operand) for operand in operands)
+        return number if parts == operands else super().add(operation, *parts)
+
     def wave(self, function: str, number: int, period: float | None) -> int:
         """The node of the sine or cosine of a node, over a period of it; None: over 2π."""
         if period is not None and period != 2.0 * math.pi:
@@ -150,6 +159,7 @@ class Pool(Expressions, Recorded, kind="pool"):
             return [number]
         if operation == CONSTANT:
             return [None]
+        # The scale of a share is that of a unit, and no choice.
         return [leaf for operand in operands for leaf in self.leaves(operand)]
 
     def length(self, number: int) -> float:
@@ -223,7 +233,10 @@ class Pool(Expressions, Recorded, kind="pool"):
         )
 
     def held(self, numbers: Iterable[int]) -> list[int]:
-        """For each constant inside nodes of a program of sums, the node in whose instruction it stands."""
+        """For each constant inside nodes of a program of sums, the node in whose instruction it stands.
+
+        The scale of a share is one of them.
+        """
         compiler = Compiler(self, len(self), 0)
         compiler.compute(self._inside(numbers))
         return compiler.held
@@ -235,14 +248,14 @@ class Pool(Expressions, Recorded, kind="pool"):
 def _node(value: object, pool: Pool, where: str) -> Node:
     """A node from its plain form; operands come before it."""
     operation, operands, number = read(tuple[str, list[int], float], value, where)
-    sizes = {**dict.fromkeys(UNARY, 1), **dict.fromkeys(BINARY, 2), INPUT: 0, CONSTANT: 0}
+    sizes = {**dict.fromkeys(UNARY, 1), **dict.fromkeys(BINARY, 2), INPUT: 0, CONSTANT: 0, SHARE: 1}
     if operation not in sizes:
         raise unknown(f"operation in the record {where}", operation, sizes)
-    fits = len(operands) == sizes[operation] and (number == 0.0 or operation in (INPUT, CONSTANT))
+    fits = len(operands) == sizes[operation] and (number == 0.0 or operation in (INPUT, CONSTANT, SHARE))
     if not fits or (operation == INPUT and not (number.is_integer() and pool.inputs <= number < 2**31)):
         raise InvalidInput(
-            f"Record {where}: expected an operation with its operands and no value, a constant, or a further input,"
-            f" found {operation!r} with {len(operands)} operands and the value {number:g}."
+            f"Record {where}: expected an operation with its operands and no value, a constant, a share, or a further"
+            f" input, found {operation!r} with {len(operands)} operands and the value {number:g}."
         )
     places = tuple(_below(len(pool), operand, where) for operand in operands)
     return Node(operation, places, int(number) if operation == INPUT else number)
