@@ -38,16 +38,33 @@ COMMANDS = (
     "run quadrotor --noise 0.001 --experiments 4 --store hover.db --name hover",
     "report hover.db -o hover.html",
     "certify hover.db -o hover --mapping px4.toml",
+    "run quadrotor --noise 0.001 --experiments 2 --seed 1 --store second.db --name second",
+    "compare hover.db second.db -o both.html",
+    "ask hover.db",
     "dashboard hover.db",
 )
 """What is typed; `report.md`, `export.md` and `dashboard.md` say the same."""
+NOTEBOOK = """
+import sys, twinloop as tl
+campaign = tl.Campaign.load("hover.db", read_only=True)
+cells = [campaign._repr_html_(), campaign.plot.step()._repr_html_()]
+open("notebook.html", "w", encoding="utf-8").write("<!doctype html><meta charset=utf-8>" + "<hr>".join(cells))
+"""
+"""What two cells of a notebook give: the campaign, and one of its figures."""
 PAGES = {
     "report-good": ("hover.html", 1280, 900),
+    "report-twin": ("hover.html#unseen", 1280, 1000),
+    "report-controller": ("hover.html#controller", 1280, 1250),
+    "report-campaign": ("hover.html#campaign", 1280, 1250),
+    "report-phone": ("hover.html", 390, 844),
     "report-bad": ("end_stop.html", 1280, 900),
+    "compare": ("both.html", 1280, 1000),
+    "notebook": ("notebook.html", 1000, 800),
     "certificate": ("hover/certificate.html", 900, 1250),
     "dashboard": ("", 1280, 900),
+    "dashboard-phone": ("", 390, 844),
 }
-"""The page of each picture, and the size of its window; no page: the address of the dashboard."""
+"""The page of each picture with its place, and the size of its window; no page: the address of the dashboard."""
 
 
 def main() -> int:
@@ -64,8 +81,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         room = Path(folder)
         (room / "px4.toml").write_text(MAPPING)
-        for command in COMMANDS[:3]:
+        for command in COMMANDS[:-2]:
             twinloop(room, command)
+        subprocess.run([sys.executable, "-c", NOTEBOOK], cwd=room, check=True)
+        twinloop(room, COMMANDS[-2])
         example = ROOT / "examples" / "end_stop.py"
         subprocess.run([sys.executable, example, "end_stop.html"], cwd=room, check=True)
         take(room)
@@ -105,7 +124,8 @@ def take(room: Path) -> None:
             browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
             for name, (file, width, height) in PAGES.items():
                 page = browser.new_page(viewport={"width": width, "height": height})
-                page.goto((room / file).as_uri() if file else address)
+                file, _, place = file.partition("#")
+                page.goto((room / file).as_uri() + (place and f"#{place}") if file else address)
                 page.wait_for_timeout(1500)
                 page.screenshot(path=PICTURES / f"{name}.png")
             browser.close()

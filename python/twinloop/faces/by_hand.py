@@ -14,12 +14,13 @@ from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.from_file import file_beside
-from twinloop.faces.result import quality_unit, to_json
+from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, sheet
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import numbered, tell_failed
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import write_columns
+from twinloop.planning.quality import quality_unit
 from twinloop.store import shown_name
 from twinloop.test import Test
 

@@ -19,7 +19,8 @@ from twinloop.faces.figures.figure import Band, Line, Mark, Panel
 from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
 from twinloop.faces.figures.svg import panel_svg
 from twinloop.faces.figures.units import labelled, shown_unit, words
-from twinloop.faces.result import plain_dict, quality_unit
+from twinloop.faces.result import plain_dict
+from twinloop.planning.quality import quality_unit
 
 
 def facts(

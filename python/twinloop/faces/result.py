@@ -17,7 +17,7 @@ from twinloop.controllers import Gain
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
-from twinloop.planning.quality import Quality
+from twinloop.planning.quality import Quality, quality_unit
 from twinloop.test import Test
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
@@ -142,29 +142,6 @@ def _first_controller(campaign: Campaign, twin: Twin, identified: bool) -> dict[
                 {"predicted": expected_quality(twin, campaign.setup, run.test.quiet())} if identified else {}
             )
     return None
-
-
-def quality_unit(quality: Quality) -> str:
-    """Unit of a quality, where it has one: "" where states of several units, or commands, are weighed together.
-
-    Args:
-        quality: of a campaign.
-    """
-    counted = [
-        (state, weight)
-        for state, weight in zip(quality.signals.states, quality.weights.tolist(), strict=True)
-        if weight != 0.0
-    ]
-    units = {state.unit for state, _ in counted}
-    if (
-        len(units) != 1
-        or any(weight != 1.0 for _, weight in counted)
-        or quality.effort
-        or quality.effort_rate
-    ):
-        return ""
-    unit = units.pop()
-    return {"iae": f"{unit} s", "ise": f"{unit}² s"}.get(quality.kind, unit)
 
 
 def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str, object]:

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from twinloop.faces.result import quality_unit
 from twinloop.faces.text import quality_words, table
 from twinloop.logs import TIME
-from twinloop.planning.quality import Quality
+from twinloop.planning.quality import Quality, quality_unit
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 

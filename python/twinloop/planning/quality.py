@@ -119,3 +119,26 @@ def _numbers(weights: object) -> dict[str, float]:
         if not (is_number and 0.0 <= value <= sys.float_info.max):
             raise InvalidInput(f"{expected}, found {name!r}: {value!r}; change it.")
     return {name: float(value) for name, value in weights.items()}
+
+
+def quality_unit(quality: Quality) -> str:
+    """Unit of a quality, where it has one: "" where states of several units, or commands, are weighed together.
+
+    Args:
+        quality: of a campaign.
+    """
+    counted = [
+        (state, weight)
+        for state, weight in zip(quality.signals.states, quality.weights.tolist(), strict=True)
+        if weight != 0.0
+    ]
+    units = {state.unit for state, _ in counted}
+    if (
+        len(units) != 1
+        or any(weight != 1.0 for _, weight in counted)
+        or quality.effort
+        or quality.effort_rate
+    ):
+        return ""
+    unit = units.pop()
+    return {"iae": f"{unit} s", "ise": f"{unit}² s"}.get(quality.kind, unit)

@@ -47,7 +47,7 @@ def _of_twin(found: Examination) -> Iterator[Check]:
     follows = twin.follows
     yield Check(
         "follows", "twin", worst, None, follows, True,
-        f"Flown by itself the twin {'follows' if follows else 'does not follow'} the"
+        f"Flown by itself the twin {_follows(follows, worst)} the"
         f" {runs} experiment{'s' * (runs != 1)} that it was learnt from: {_error(worst)} (0 is perfect, 1 a"
         " model that never moves).",
     )  # fmt: skip
@@ -65,6 +65,12 @@ def _of_twin(found: Examination) -> Iterator[Check]:
         )  # fmt: skip
     yield from _of_unseen(found)
     yield from _of_innovations(found)
+
+
+def _follows(follows: bool, worst: float) -> str:
+    if not follows:
+        return "does not follow"
+    return "follows" if worst <= 1.0 else "follows at least half of"
 
 
 def _error(worst: float) -> str:

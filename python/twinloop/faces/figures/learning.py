@@ -9,7 +9,7 @@ import numpy as np
 from twinloop.campaign.assessment import predicted_quality
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Cells, Figure, Level, Line, Mark, Panel, Spans
-from twinloop.faces.figures.units import said, words
+from twinloop.faces.figures.units import quality_label, said, words
 
 LIGHTEST, DARKEST = -5.0, 0.0
 """Decades of the normalised error from which a cell is lightest, and at which it is darkest."""
@@ -90,7 +90,7 @@ def qualities(found: Examination) -> Figure | None:
         "Quality of each flight (less is better)",
         marks,
         "test",
-        "quality",
+        quality_label(found),
         y_range=(0.0, 1.1 * most or 1.0),
         whole=True,
     )

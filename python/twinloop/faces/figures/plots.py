@@ -8,6 +8,7 @@ from pathlib import Path
 from twinloop.campaign import Campaign
 from twinloop.faces.figures.catalogue import FIGURES, asked
 from twinloop.faces.figures.figure import Figure
+from twinloop.planning.quality import quality_unit
 
 
 class Plots:
@@ -30,11 +31,11 @@ class Plots:
             InvalidInput: another suffix, or a file that cannot be written.
             NotAvailable: matplotlib is missing, or nothing was told.
         """
-        from twinloop.faces import files, plots, result, text
+        from twinloop.faces import files, plots, text
 
         files.check_picture(Path(path))
         quality = self._campaign.setup.quality
-        words = text.quality_words(quality.kind, result.quality_unit(quality))
+        words = text.quality_words(quality.kind, quality_unit(quality))
         plots.campaign_picture(self._campaign, Path(path), words)
 
     def __getattr__(self, name: str) -> Callable[[], Figure]:

@@ -51,7 +51,8 @@ def crosscorrelation(found: Examination) -> Figure | None:
             Line(both.lags, both.values[i, j], ROLES[j % len(ROLES)], words(command.name), dots=True)
             for j, command in enumerate(found.signals.commands)
         )
-        limits = (Level(both.limit, "limit", "99 % limit"), Level(-both.limit, "limit"))
+        # Grey: a command may have the colour of a limit.
+        limits = (Level(both.limit, "target", "99 % limit"), Level(-both.limit, "target"))
         ends = _ends(both.values[i], both.limit)
         panels.append(
             Panel(

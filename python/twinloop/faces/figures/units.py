@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
+
+from twinloop.planning.quality import quality_unit
+
+if TYPE_CHECKING:
+    from twinloop.campaign.examination.examination import Examination
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
@@ -28,6 +34,12 @@ def labelled(name: str, unit: str) -> tuple[float, str]:
     """What to multiply with, and a name with its shown unit."""
     factor, shown = shown_unit(unit)
     return factor, f"{words(name)} ({shown})"
+
+
+def quality_label(found: Examination) -> str:
+    """The quality with its unit, where it has one."""
+    unit = quality_unit(found.setup.quality)
+    return f"quality ({unit})" if unit else "quality"
 
 
 def said(number: int | None) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Figure, Level, Line, Mark, Panel
-from twinloop.faces.figures.units import labelled, words
+from twinloop.faces.figures.units import labelled, quality_label, words
 
 DOTS = 500
 """Of one panel at most."""
@@ -105,7 +105,7 @@ def gains(found: Examination) -> Figure | None:
                     )
                 ],
                 "change of the gain (%)",
-                "quality",
+                quality_label(found),
                 x_range=(-22.0, 22.0),
                 y_range=(low - room, high + room),
             )

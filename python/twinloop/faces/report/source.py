@@ -108,7 +108,7 @@ def _elapsed(held: Kept) -> float | None:
 def _session(found: Mapping[str, Any]) -> dict[str, str]:
     versions = found.get("versions")
     return {
-        "begun": str(found.get("started", "")),
+        "begun": str(found.get("started", ""))[:16].replace("T", " "),
         "command": shlex.join(as_typed([str(word) for word in found.get("command") or ()])),
         "versions": ", ".join(f"{k} {v}" for k, v in versions.items())
         if isinstance(versions, Mapping)

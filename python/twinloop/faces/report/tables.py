@@ -139,10 +139,14 @@ def _poles(name: str, title: str, found: Sequence[Pole], note: str) -> Table | N
     if not found:
         return None
     rows = [
-        [f"{pole.real:.3g} ± {pole.imaginary:.3g} j".replace("-", "−") if pole.imaginary else pole.real,
+        [f"{pole.real:.3g} ± {pole.imaginary:.3g} j".replace("-", "−") if pole.imaginary else shown_value(pole.real),
          pole.frequency, pole.damping, pole.time]
         for pole in found
     ]  # fmt: skip
+    # Six integrators are one row.
+    count = {str(row): rows.count(row) for row in rows}
+    rows = [[f"{row[0]}, {count[str(row)]} times", *row[1:]] if count[str(row)] > 1 else row
+            for row in {str(row): row for row in rows}.values()]  # fmt: skip
     return _table(
         name, title, ["pole (1/s)", "frequency (rad/s)", "damping", "time constant (s)"], rows, note
     )
@@ -364,8 +368,10 @@ def flights(result: Mapping[str, Any]) -> Table:
         ]
         for run in result["experiments"]
     ]  # fmt: skip
-    head = ["flight", "predicted", "± spread", "flown", "predicted − flown", "risk", "why"]
     measure = result["quality"]
+    unit = f" ({measure['unit']})" if measure["unit"] else ""
+    head = ["flight", f"predicted{unit}", f"± spread{unit}", f"flown{unit}", f"predicted − flown{unit}",
+            "risk (probability)", "why"]  # fmt: skip
     note = (
         f"Quality: {quality_words(measure['kind'], measure['unit'])}; less is better. What counts: {counted(measure)}."
         " Predicted and its spread are what was said before the flight."

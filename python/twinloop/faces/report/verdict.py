@@ -69,7 +69,7 @@ def verdict(
 PLAIN = {
     "follows": "flown by itself it does not follow the experiments that it was learnt from",
     "remarks": "its remarks are serious",
-    "unseen-flight": "it has foretold no flight yet that it had not learnt",
+    "unseen-flight": "it did not foretell the last flight that it had not learnt",
     "band": "readings of that flight were outside of its band",
     "quality": "the last quality that it predicted was far off",
     "whiteness": "what it misses now tells what it will miss next",
@@ -83,7 +83,12 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
     unseen = _unseen(found)
     if failed:
         lacks = [check for check in failed if check.name in ("whiteness", "commands")]
-        text = "; ".join(PLAIN[check.name] for check in failed)
+        text = "; ".join(
+            "it has foretold no flight yet that it had not learnt"
+            if check.name == "unseen-flight" and not found.unseen
+            else PLAIN[check.name]
+            for check in failed
+        )
         if lacks:
             share = max(check.value or 0.0 for check in lacks)
             text += f" (up to {100.0 * share:.0f} % of the correlations are beyond their 99 % limits): something acts"
@@ -204,6 +209,14 @@ def _of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> S
         return Sentence(
             "Next", "Find out what the twin lacks", False, text, (("checks", "all checks"), *links)
         )
+    failed = [check for check in checks.failed if check.subject == "controller"]
+    if failed and found.best is not None and (advice["stop"] or advice["gain"] == 0.0):
+        text = (
+            "The twin knows enough: another flight would hardly improve the quality. What fails is the controller:"
+            f" {failed[0].name}. Begin again from these flights with narrower bounds of its gains, or with effort in"
+            " the quality."
+        )
+        return Sentence("Next", "Ask for a calmer controller", None, text, (*_links(failed), *links))
     if advice["gain"] is None:
         return Sentence(
             "Next", "Ask", None, "No flight was planned yet; ask for one to hear what it would bring.", links
