@@ -47,7 +47,7 @@ COMMANDS = (
 NOTEBOOK = """
 import sys, twinloop as tl
 campaign = tl.Campaign.load("hover.db", read_only=True)
-cells = [campaign._repr_html_(), campaign.plot.step()._repr_html_()]
+cells = [campaign._repr_html_(), campaign.plot.step()._repr_svg_()]
 open("notebook.html", "w", encoding="utf-8").write("<!doctype html><meta charset=utf-8>" + "<hr>".join(cells))
 """
 """What two cells of a notebook give: the campaign, and one of its figures."""
