@@ -13,6 +13,7 @@ from click.testing import CliRunner
 import lives
 import twinloop as tl
 from conftest import pendulum_step
+from twinloop.campaign.examination.check import Check, Checks
 from twinloop.faces.certificate import facts
 from twinloop.faces.cli import main
 from twinloop.faces.figures.axis import axis
@@ -23,6 +24,7 @@ from twinloop.faces.report.moot import moot
 from twinloop.faces.report.page import report_page
 from twinloop.faces.report.source import OWN
 from twinloop.faces.report.tables import margins as margins_table
+from twinloop.faces.report.verdict import of_next
 from twinloop.faces.result import summary
 from twinloop.records import to_text
 
@@ -305,3 +307,12 @@ def test_bands_that_are_forgotten_are_said_to_be(good):
     assert len(found.unseen) == 3 and len(bare) == 2 and found.unseen[-1].inside is not None
     caption = FIGURES["unseen"](found).caption
     assert "Of 2 earlier such flights the band is not known any more." in caption
+
+
+@pytest.mark.parametrize(("fails", "answer"), [(True, "Ask for a calmer controller"), (False, "Stop")])
+def test_where_the_twin_is_good_and_its_controller_is_not_another_flight_is_no_answer(fails, answer):
+    delay = Check("delay", "controller", 0.6, 1.0, not fails, True, "It bears 0.6 periods more.")
+    result = {"quality": {"unit": "rad s"}, "advice": {"gain": 1e-5, "scatter": 1e-3, "stop": True}}
+    said = of_next(SimpleNamespace(best=object()), Checks([delay]), result)
+    assert said.answer == answer and said.good is (None if fails else True)
+    assert ("delay" in said.text) is fails

@@ -63,7 +63,7 @@ def verdict(
         checks: of it.
         result: its `twinloop.faces.result.summary`.
     """
-    return _of_twin(found, checks), _of_controller(found, checks, result), _of_next(found, checks, result)
+    return _of_twin(found, checks), _of_controller(found, checks, result), of_next(found, checks, result)
 
 
 PLAIN = {
@@ -193,7 +193,14 @@ def _margins(found: Examination) -> str:
     )
 
 
-def _of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:
+def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:
+    """What to do now.
+
+    Args:
+        found: the examination of the campaign.
+        checks: of it.
+        result: its `twinloop.faces.result.summary`.
+    """
     advice = result.get("advice")
     unit = result["quality"]["unit"]
     links = (("next", "next experiment"),)
