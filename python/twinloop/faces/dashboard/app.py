@@ -24,6 +24,7 @@ from twinloop.faces.report.source import source
 from twinloop.faces.sheet import columns, sheet
 from twinloop.faces.telling import numbered
 from twinloop.logs import MOST_BYTES, write_columns
+from twinloop.planning.quality import quality_unit
 
 MOST_WORDS = 10_000
 """Bytes of what a form says."""
@@ -181,15 +182,20 @@ class Pages:
     def _waiting(self, name: str) -> dict[str, object]:
         campaign, may = self.desk.look(name), self.desk.approved(name)
         first = not campaign.experiments
+        units = {gain.name: gain.unit for gain in campaign.family.law_gains}
         tests = [test for test in campaign.tests if test in campaign.waiting or (first and test.number == 0)]
         return {
             "experiments": len(campaign.experiments),
             "tests": [
                 {
                     "number": test.number,
-                    "gains": {gain: f"{value:.6g}" for gain, value in test.parameters.items()},
+                    "gains": {
+                        name: f"{value:.6g} {units.get(name, '')}".rstrip()
+                        for name, value in test.parameters.items()
+                    },
                     "predicted": None if test.predicted is None else f"{test.predicted:.4g}",
                     "spread": None if test.spread is None else f"{test.spread:.2g}",
+                    "unit": quality_unit(campaign.setup.quality),
                     "risk": None if test.risk is None else f"{100 * test.risk:.2g} %",
                     "reason": test.reason,
                     "approved": may.get(test.number) if test.number is not None else None,

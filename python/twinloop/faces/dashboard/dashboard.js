@@ -47,7 +47,7 @@
     one("h3").textContent = "Test " + test.number;
     one(".reason").textContent = test.reason || "";
     const rows = Object.entries(test.gains);
-    if (test.predicted !== null) rows.push(["quality predicted", test.predicted + (test.spread === null ? "" : " ± " + test.spread)]);
+    if (test.predicted !== null) rows.push(["quality predicted", (test.predicted + (test.spread === null ? "" : " ± " + test.spread) + " " + test.unit).trim()]);
     if (test.risk !== null) rows.push(["risk of leaving the envelope", test.risk]);
     for (const [name, value] of rows) {
       const row = one("tbody").insertRow(), head = document.createElement("th");

@@ -12,6 +12,7 @@ from twinloop.faces.figures.units import words
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
 from twinloop.faces.report.tables import Table, shown_value
+from twinloop.planning.quality import quality_unit
 
 Row = tuple[str, object]
 
@@ -60,6 +61,8 @@ def _answers(source: Source) -> list[Row]:
     found = campaign.examine()
     judged = checks(found)
     best, first = found.best, found.first_flown
+    unit = quality_unit(campaign.setup.quality)
+    unit = f" ({unit})" if unit else ""
     rows: list[Row] = [
         ("system", source.system),
         ("preset, seed", f"{campaign.setup.preset}, {campaign.setup.seed}"),
@@ -69,7 +72,7 @@ def _answers(source: Source) -> list[Row]:
     ]
     if found.unseen:
         last = found.unseen[-1]
-        rows.append(("error on the last unseen flight", last.error))
+        rows.append(("error on the last unseen flight (0 perfect, 1 useless)", last.error))
         rows += [
             (f"FIT of it, {words(state.name)} (%)", float(last.fit[i]))
             for i, state in enumerate(found.signals.states)
@@ -83,12 +86,12 @@ def _answers(source: Source) -> list[Row]:
     if best is not None:
         predicted, spread = predicted_quality(best, found.experiments)
         rows += [
-            ("quality predicted (less is better)", predicted),
-            ("± spread", spread),
-            ("quality flown", best.measured),
-            ("risk", best.risk),
+            (f"quality predicted{unit}, less is better", predicted),
+            (f"± spread{unit}", spread),
+            (f"quality flown{unit}", best.measured),
+            ("risk of leaving the envelope (probability)", best.risk),
         ]
-    rows.append(("quality of the first gains, flown", None if first is None else first.quality))
+    rows.append((f"quality of the first gains, flown{unit}", None if first is None else first.quality))
     if found.margins is not None and found.twin.follows:
         worst = found.margins.worst
         gain = min(loop.gain for loop in worst)
@@ -102,5 +105,6 @@ def _answers(source: Source) -> list[Row]:
         else:
             rows.append(("margins", "none: a loop is unstable"))
     if best is not None:
-        rows += [(f"gain {name}", value) for name, value in best.parameters.items()]
+        units = {gain.name: f" ({gain.unit})" for gain in campaign.family.law_gains if gain.unit}
+        rows += [(f"gain {name}{units.get(name, '')}", value) for name, value in best.parameters.items()]
     return rows
