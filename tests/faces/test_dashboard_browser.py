@@ -119,3 +119,16 @@ def test_a_campaign_that_another_process_runs_is_seen_to_work_and_grow(chromium,
             assert other.wait(60) == 0
         assert page.get_by_role("button", name="Plan the next test").is_enabled()
         assert said == []
+
+
+def test_html_in_the_columns_of_a_log_stays_text(chromium, tmp_path):
+    store, bad = begun(tmp_path / "hover.db"), tmp_path / "bad.csv"
+    with served(store) as address, shown(chromium, address) as (page, said):
+        asked = []
+        page.on("dialog", lambda dialog: (asked.append(dialog.message), dialog.dismiss()))
+        page.get_by_role("heading", name="Test 1").wait_for()
+        bad.write_text("t,<img src=x onerror=alert(1)>angle,rate,torque\n0,0,0,0\n0.05,0,0,0\n")
+        dropped(page, ".test .drop", bad)
+        page.get_by_role("alert").get_by_text("<img src=x onerror=alert(1)>angle").wait_for()
+        assert page.locator("#said img").count() == 0 and asked == []
+        assert [text for text in said if "422" not in text] == []
