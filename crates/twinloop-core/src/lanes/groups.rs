@@ -91,6 +91,7 @@ pub(crate) fn interleave<R: AsRef<[f64]>>(rows: &[R], lanes: usize) -> Vec<f64> 
 }
 
 /// Interleaved numbers as vectors. By a call, as what follows: a copy for each vector, and not for each place.
+#[inline(never)]
 pub(crate) fn vectors<V: Vector>(interleaved: &[f64]) -> Vec<V> {
     let mut vectors = vec![];
     if !interleaved.is_empty() {
@@ -115,6 +116,7 @@ impl<V: Vector> Apart for Loads<'_, V> {
 }
 
 /// So many zeros, and behind them numbers, each the same in all lanes.
+#[inline(never)]
 pub(crate) fn filled<V: Vector>(zeros: usize, values: &[f64]) -> Vec<V> {
     let mut vectors = vec![];
     if zeros + values.len() > 0 {
@@ -141,11 +143,13 @@ impl<V: Vector> Apart for Fill<'_, V> {
 }
 
 /// Numbers, each the same in all lanes.
+#[inline(never)]
 pub(crate) fn splats<V: Vector>(values: &[f64]) -> Vec<V> {
     filled(0, values)
 }
 
 /// So many zeros.
+#[inline(never)]
 pub(crate) fn zeros<V: Vector>(count: usize) -> Vec<V> {
     filled(count, &[])
 }
@@ -166,6 +170,7 @@ pub(crate) fn scalars(values: &[f64]) -> Vec<Scalar> {
 }
 
 /// Rows of equal length, one a lane.
+#[inline(never)]
 pub(crate) fn pack<V: Vector>(rows: &[&[f64]]) -> Vec<V> {
     vectors(&interleave(rows, V::LANES))
 }
