@@ -613,7 +613,7 @@ def test_an_outlier_is_not_learnt_from():
     spoilt = run.states.copy()
     spoilt[40, 1] += 4.0
     clean, found = (identified([Run.of(s, run.commands)], pendulum_like()) for s in (run.states, spoilt))
-    assert clean.ignored <= 1 and 1 <= found.outliers <= 2
+    assert clean.outliers <= 1 and 1 <= found.outliers <= 2
     assert any("ignored" in str(remark) for remark in found.remarks)
     for x in ([0.3, 0.5], [1.0, -1.0]):
         one, other = (f.model.step([x], [[0.4]])[0] for f in (clean, found))
