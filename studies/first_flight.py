@@ -1,6 +1,6 @@
 """The first flight does no harm: ten plants of different authority, each under a controller that is made for it.
 
-    python studies/first_flight.py [--smoke] [--seeds 1] [--flights 10]
+    python studies/first_flight.py [--smoke] [--seeds 3] [--flights 10]
 
 Three more answer more than their controller says: a damping of 0.15, and a load that swings lightly damped, of which
 the controller knows nothing. Each plant is flown under the controller alone, with chirps of the preset's amplitude
@@ -249,7 +249,7 @@ def main() -> None:
     parser.add_argument(
         "--smoke", action="store_true", help="two plants, one seed, two flights, a quick search"
     )
-    parser.add_argument("--seeds", type=int, default=1, help="campaigns of each plant that learn; 0: none")
+    parser.add_argument("--seeds", type=int, default=3, help="campaigns of each plant that learn; 0: none")
     parser.add_argument("--flights", type=int, default=10, help="first flights of each plant")
     chosen = parser.parse_args()
     plants = (PLANTS[2], PLANTS[-2]) if chosen.smoke else PLANTS
