@@ -29,7 +29,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
-    experiments=(), unfit=(), best=FLOWN,
+    experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -55,7 +55,7 @@ def chosen(
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
         unfit=lambda book: list(unfit), on_task=lambda book, test: True,
-        measured=lambda book, test: measured if test == 0 else None,
+        measured=lambda book, test: measured if test == 0 else None, best_flown=lambda book: best_measured,
     ):  # fmt: skip
         found = choice.between(TUNED, best)
     return ("tuned" if (found.genes == TUNED).all() else "flown"), found.reason
@@ -73,6 +73,12 @@ def chosen(
 )
 def test_gains_are_preferred_where_so_large_a_share_of_the_predictions_prefers_them(new, confidence, answer):
     assert chosen(new, confidence=confidence)[0] == answer
+
+
+def test_a_flight_that_was_measured_better_by_its_excitation_is_named():
+    assert "measured better" not in chosen(1.1)[1]
+    answer, reason = chosen(1.1, best_measured=SimpleNamespace(number=3))
+    assert answer == "flown" and "Test 3 was measured better, with the help of its excitation." in reason
 
 
 def test_a_twin_that_expects_worse_of_its_own_gains_and_of_those_measured_is_not_believed():

@@ -85,9 +85,17 @@ class Choice:
         reason = f"The best gains flown: {refused}."
         if not flies:
             reason += " They left the envelope when they flew."
+        reason += self._helped(flown)
         return self._flown(flown, judged, recorded, reason)
 
     # Inside
+
+    def _helped(self, flown: Test) -> str:
+        """Which flight was measured better than that of the best gains, if its excitation did that."""
+        better = standing.best_flown(self.book)
+        if better is None or better.number == flown.number:
+            return ""
+        return f" Test {better.number} was measured better, with the help of its excitation."
 
     def _refused(self, members: Sequence[_core.Model], judged: Judged, tuned: Floats) -> str:
         """Why tuned gains cannot be answered for; nothing if they can."""
