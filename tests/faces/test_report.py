@@ -301,11 +301,24 @@ def test_a_campaign_of_the_preset_paper_has_a_report():
     assert "preset paper" in page and "You decide" in page
 
 
-def test_bands_that_are_forgotten_are_said_to_be(good):
+def test_every_flight_that_had_not_been_learnt_has_the_band_of_its_time(good):
     found = good.examine()
-    bare = [each for each in found.unseen if each.inside is None]
-    assert len(found.unseen) == 3 and len(bare) == 2 and found.unseen[-1].inside is not None
+    assert len(found.unseen) == 3 and all(0.75 < each.inside <= 1.0 for each in found.unseen)
     caption = FIGURES["unseen"](found).caption
+    assert re.search(
+        r"Of those before it, each against the twin of its time: test 1 \d+ %, test 2 \d+ %\.", caption
+    )
+    # The band of the first planned flight is that of the twin that planned it.
+    planned = tl.Campaign.from_record(good.to_record())
+    again = planned.examine().unseen[0]
+    np.testing.assert_array_equal(again.predicted.band, found.unseen[0].predicted.band)
+
+
+def test_bands_that_an_older_version_has_not_kept_are_said_to_be_unknown(good):
+    record = good.to_record()
+    for name in ("asked", "latest"):
+        del record["memory"][name]["ensembles"]
+    caption = FIGURES["unseen"](tl.Campaign.from_record(record).examine()).caption
     assert "Of 2 earlier such flights the band is not known any more." in caption
 
 

@@ -14,7 +14,7 @@ from twinloop.campaign.identify_and_plan.calibration import (
     needed_factor,
     residuals_of_flights,
 )
-from twinloop.campaign.identify_and_plan.memory import Learnt
+from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -47,6 +47,26 @@ class Knowledge:
             learnt: from the first experiments.
             errors: of the twin on all of them.
         """
+        ensemble = self.ensemble(learnt)
+        return Twin(
+            learnt.identified.model,
+            self.setup.signals,
+            errors,
+            self.options.divergence_factor,
+            members=ensemble.members,
+            noise=ensemble.noise,
+            seed=self.setup.seed,
+            inflation=ensemble.inflation,
+            remarks=learnt.lessons[-1].remarks,
+            flights=[run.trajectory for run in self.book.experiments],
+        )
+
+    def ensemble(self, learnt: Learnt) -> Ensemble:
+        """What the band of the twin is made of.
+
+        Args:
+            learnt: from the first experiments.
+        """
         found = learnt.identified
         noise = found.noise(self.setup.signals)
         inflation = OF_PARTS if found.of_parts else factor(learnt.needed)
@@ -56,18 +76,7 @@ class Knowledge:
                 found.model, self.book.experiments[: learnt.told], self.setup.limits
             )
             noise, inflation = replace(noise, sensors=residuals), 1.0
-        return Twin(
-            found.model,
-            self.setup.signals,
-            errors,
-            self.options.divergence_factor,
-            members=learnt.believed,
-            noise=noise,
-            seed=self.setup.seed,
-            inflation=inflation,
-            remarks=learnt.lessons[-1].remarks,
-            flights=[run.trajectory for run in self.book.experiments],
-        )
+        return Ensemble(tuple(learnt.believed), noise, inflation)
 
     def needed_factors(self, learnt: Learnt) -> tuple[float, ...]:
         """Factors that the flights told since would have needed, after those before them.
@@ -85,18 +94,24 @@ class Knowledge:
         return (*learnt.needed, *(found for found in needed if found is not None))
 
     def twins_before(self, latest: Learnt, asked: Learnt | None) -> tuple[tuple[int, Twin], ...]:
-        """Twins that have not learnt all: with bands those of the last question and of today, else models alone.
+        """Twins that have not learnt all, with bands; models alone where an older version has not kept what bands need.
 
         Args:
             latest: what was learnt last.
             asked: what was known when the last test was asked for.
         """
-        divergence = self.options.divergence_factor
+        divergence, seed = self.options.divergence_factor, self.setup.seed
         told = [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
         found = {
             learnt: Twin(model, self.setup.signals, (), divergence)
             for learnt, model in zip(told, latest.models, strict=True)
         }
+        # Both end with what was learnt last.
+        for learnt, ensemble in zip(reversed(told), reversed(latest.ensembles), strict=False):
+            found[learnt] = Twin(
+                found[learnt].model, self.setup.signals, (), divergence,
+                members=ensemble.members, noise=ensemble.noise, seed=seed, inflation=ensemble.inflation,
+            )  # fmt: skip
         if asked is not None:
             found[asked.told] = self.twin(asked, [])
         # Of today it is where flights were told that nobody has learnt yet.

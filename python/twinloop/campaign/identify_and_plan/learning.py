@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,17 +63,20 @@ class Learner:
             under_way: the identification of the same experiments, as far as it had come; None: it begins.
             keep: called with the identification wherever it may go on from later.
         """
-        told = len(book.experiments)
-        needed = () if asked is None else Knowledge(self.setup, self.options, book).needed_factors(asked)
+        told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
+        needed = () if asked is None else knowledge.needed_factors(asked)
         identified = self._identified(book, None if asked is None else asked.identified, under_way, keep)
         followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
         believed = [identified.members[i] for i in believed_members(followed)]
         follows = self._can_follow(identified, followed)
         lesson = self._lesson(identified, follows, book, followed)
-        before, models = ((), ()) if asked is None else (asked.lessons, asked.models)
-        return Learnt(
+        before, models, ensembles = (
+            ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
+        )
+        learnt = Learnt(
             told, identified, believed, follows, needed, (*before, lesson), models=(*models, identified.model)
         )
+        return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
 
     def _identified(
         self,

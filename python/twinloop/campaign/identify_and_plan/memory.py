@@ -10,8 +10,24 @@ from twinloop.arrays import Floats
 from twinloop.campaign.history import Lesson
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay
+from twinloop.law.noise import Noise
 from twinloop.records import Recorded
 from twinloop.test import Test
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble(Recorded, kind="ensemble"):
+    """What the band of a twin is made of.
+
+    Args:
+        members: of the committee that follow the flights, the best first.
+        noise: of the sensors, and what disturbs.
+        inflation: factor on the spread of the members.
+    """
+
+    members: tuple[_core.Model, ...]
+    noise: Noise
+    inflation: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +44,7 @@ class Learnt(Recorded, kind="learnt"):
         lessons: records of this identification and of those that it began with.
         gains: that were tuned on the committee when a test was asked for; None: none were.
         models: the best model of each identification, as `lessons`; what an older version wrote has none.
+        ensembles: what the bands of those twins are made of; what an older version wrote has none.
     """
 
     told: int
@@ -38,6 +55,7 @@ class Learnt(Recorded, kind="learnt"):
     lessons: tuple[Lesson, ...]
     gains: Floats | None = None
     models: tuple[_core.Model, ...] = ()
+    ensembles: tuple[Ensemble, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -196,7 +196,7 @@ class IdentifyAndPlan:
         return None if self.memory.asked is None else self.memory.asked.identified.model
 
     def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
-        """Twins that have not learnt all: with bands those of the last question and of today, else models alone."""
+        """Twins that have not learnt all, with bands; without where an older version has not kept what they need."""
         return Knowledge(self.setup, self.options, book).twins_before(self._latest(), self.memory.asked)
 
     def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:

@@ -17,6 +17,18 @@ MOST = 6
 """Flights of one figure: the last ones."""
 
 
+def _earlier(found: Examination) -> str:
+    """How many readings of earlier flights that had not been learnt are inside the bands of their time."""
+    before = found.unseen[:-1]
+    known = [f"{said(each.number)} {100.0 * each.inside:.0f} %" for each in before if each.inside is not None]
+    bare = len(before) - len(known)
+    text = f" Of those before it, each against the twin of its time: {', '.join(known)}." if known else ""
+    # What an older version has learnt has no band.
+    if bare:
+        text += f" Of {bare} earlier such flight{'s' * (bare != 1)} the band is not known any more."
+    return text
+
+
 def unseen(found: Examination) -> Figure | None:
     """The last flight that had not been learnt beside what had been predicted of it."""
     if not found.unseen:
@@ -35,11 +47,7 @@ def unseen(found: Examination) -> Figure | None:
         if last.inside is None
         else f" {100.0 * last.inside:.0f} % of the readings are inside the 90 % band."
     )
-    # Of the questions before the last one the models are remembered, their committees are not.
-    bare = 0 if last.inside is None else sum(each.inside is None for each in found.unseen[:-1])
-    others = (
-        f" Of {bare} earlier such flight{'s' * (bare != 1)} the band is not known any more." if bare else ""
-    )
+    others = _earlier(found)
     how = "its recorded commands" if last.number is None else "the test's own controller"
     return Figure(
         "unseen",
