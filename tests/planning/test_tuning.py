@@ -171,7 +171,7 @@ def test_hidden_states_that_there_are_none_of_are_refused(rig, hidden):
     program = _core.Program.parse(program_text(5, 2, 7, [["r5 = r2 + 0.0"]]))
     with pytest.raises(ValueError, match="expected"):
         _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2, [hidden])
-    with pytest.raises(ValueError, match="expected actuators"):
+    with pytest.raises(ValueError, match="actuators: expected one for each of 2 commands, found 0"):
         _core.Model(program, "absolute", rig, None, [([0], True, None, 1.0)])
     with pytest.raises(ValueError, match="expected a program of 4 inputs"):
         _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2)
