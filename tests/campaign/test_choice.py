@@ -75,10 +75,10 @@ def test_gains_are_preferred_where_so_large_a_share_of_the_predictions_prefers_t
     assert chosen(new, confidence=confidence)[0] == answer
 
 
-def test_a_flight_that_was_measured_better_by_its_excitation_is_named():
+def test_a_flight_that_was_measured_better_for_an_excitation_is_named():
     assert "measured better" not in chosen(1.1)[1]
     answer, reason = chosen(1.1, best_measured=SimpleNamespace(number=3))
-    assert answer == "flown" and "Test 3 was measured better, with the help of its excitation." in reason
+    assert answer == "flown" and "Test 3 was measured better; without excitation these are better." in reason
 
 
 def test_a_twin_that_expects_worse_of_its_own_gains_and_of_those_measured_is_not_believed():

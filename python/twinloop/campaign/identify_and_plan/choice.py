@@ -85,17 +85,17 @@ class Choice:
         reason = f"The best gains flown: {refused}."
         if not flies:
             reason += " They left the envelope when they flew."
-        reason += self._helped(flown)
+        reason += self._measured_better(flown)
         return self._flown(flown, judged, recorded, reason)
 
     # Inside
 
-    def _helped(self, flown: Test) -> str:
-        """Which flight was measured better than that of the best gains, if its excitation did that."""
+    def _measured_better(self, flown: Test) -> str:
+        """Which flight was measured better than that of the best gains: an excitation helped it, or cost these."""
         better = standing.best_flown(self.book)
         if better is None or better.number == flown.number:
             return ""
-        return f" Test {better.number} was measured better, with the help of its excitation."
+        return f" Test {better.number} was measured better; without excitation these are better."
 
     def _refused(self, members: Sequence[_core.Model], judged: Judged, tuned: Floats) -> str:
         """Why tuned gains cannot be answered for; nothing if they can."""
