@@ -11,12 +11,14 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+import lives
 import twinloop as tl
 from conftest import pendulum_step
 from lives import SIGNALS, SMALL
 from sameness import same
 from twinloop.campaign.campaign_file import _toml, read_file, template
 from twinloop.faces.cli import main
+from twinloop.faces.telling import numbered
 from twinloop.logs import write_columns
 
 PENDULUM = template("rig.db").partition("[options]")[0]
@@ -220,6 +222,11 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     assert (
         "learnt from" in shown.stdout and "interrupted" not in shown.stdout and "finished" not in shown.stdout
     )
+
+
+def test_where_no_test_was_made_no_range_of_numbers_is_named():
+    with pytest.raises(tl.InvalidInput, match="expected one that was made, found 0; ask for one first"):
+        numbered(lives.new("default"), 0)
 
 
 @pytest.mark.parametrize(

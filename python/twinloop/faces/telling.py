@@ -24,8 +24,8 @@ def numbered(campaign: Campaign, number: int) -> Test:
         InvalidInput: no such test.
     """
     if not 0 <= number < len(campaign.tests):
-        last = len(campaign.tests) - 1
-        raise InvalidInput(f"Test: expected a number from 0 to {last}, found {number}; ask for one first.")
+        wanted = f"a number from 0 to {len(campaign.tests) - 1}" if campaign.tests else "one that was made"
+        raise InvalidInput(f"Test: expected {wanted}, found {number}; ask for one first.")
     return campaign.tests[number]
 
 

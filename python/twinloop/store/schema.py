@@ -84,4 +84,4 @@ progress = Table(
     Column("said", String(40), nullable=False),
     Column("record", Text, nullable=False),
 )
-"""What the writer of a campaign is doing, said every other second; there is no row where nobody works."""
+"""What the writer of a campaign is doing, said once a second at most; there is no row where nobody works."""
