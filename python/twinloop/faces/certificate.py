@@ -20,6 +20,7 @@ from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
 from twinloop.faces.figures.svg import panel_svg
 from twinloop.faces.figures.units import labelled, shown_unit, words
 from twinloop.faces.result import plain_dict
+from twinloop.faces.text.words import quality_words
 from twinloop.planning.quality import quality_unit
 
 
@@ -125,6 +126,7 @@ def page(facts: Mapping[str, Any], names: Sequence[str], units: Sequence[str]) -
         c=facts,
         title="Gain certificate" if facts["granted"] else "Gain certificate: refused",
         number=_number,
+        quality=quality_words,
         degrees=lambda value: None if value is None else math.degrees(value),
         plots=_plots(facts["prediction"], names, units),
         figures=f":root{{{variables(LIGHT)}}}@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}{RULES}",
