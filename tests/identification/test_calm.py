@@ -76,7 +76,7 @@ def test_what_is_left_of_a_description_is_its_likelihood_and_its_terms():
     context, after = learnt(runs, (*WITHOUT, calm))
     (old,), (new,) = before.sums, after.sums
     problem = posed(context, before)
-    regression = problem.regression(old.chain, problem.usable(list(old.weights)))
+    regression = problem.regression(old.chain, problem.values(problem.usable(list(old.weights))))
     weights = np.array(list(old.weights.values()))
     gained = [regression.likelihood(weights, found.chain.sensors, found.chain.motion) for found in (old, new)]
     assert new.description_length - old.description_length == pytest.approx(gained[1] - gained[0], abs=1e-9)

@@ -94,7 +94,7 @@ def posed(slope, noise):
     known = []
     for chain in chains(signals, "acceleration", guessed_noise([run], np.ones(4))):
         chain = chain.with_noise(chain.sensors, (1.0, 0.0, 1.0))
-        gram = problem.regression(chain, terms).gram(chain.sensors, chain.motion, WORKERS)
+        gram = problem.regression(chain, problem.values(terms)).gram(chain.sensors, chain.motion, WORKERS)
         weights, _, left = gram.solve(list(range(len(terms))), 1e-9)
         known.append(Sum(dict(zip(terms, weights.tolist(), strict=True)), left + 200.0, chain))
     return problem, signals, known, states

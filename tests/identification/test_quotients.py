@@ -170,7 +170,7 @@ def test_a_denominator_that_two_chains_share_is_found_and_paid_for_once():
 
 def _fitted(problem, chain, terms):
     """All of some terms, by least squares."""
-    gram = problem.regression(chain, terms).gram(chain.sensors, chain.motion, WORKERS)
+    gram = problem.regression(chain, problem.values(terms)).gram(chain.sensors, chain.motion, WORKERS)
     weights, _, left = gram.solve(list(range(len(terms))), 1e-9)
     return Sum(dict(zip(terms, weights.tolist(), strict=True)), left + 200.0, chain)
 

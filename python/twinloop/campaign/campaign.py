@@ -31,7 +31,6 @@ from twinloop.campaign.ranking import ranked
 from twinloop.campaign.reporting import plots, reported
 from twinloop.campaign.setup import checked, refuse_arguments
 from twinloop.campaign.taking_away import taken_controller, taken_twin
-from twinloop.campaign.twin_errors import free_runs
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard import Guard, Guarded
@@ -439,7 +438,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self._learn()
         known, book = self._method, self._book
         twins = known.twins_before(book)
-        errors = free_runs([twin.model for _, twin in twins], book, self._workers)
+        errors = closed_loop([twin.model for _, twin in twins], book.selected, self._workers)
         return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals(book)))
 
     def checks(self) -> Checks:

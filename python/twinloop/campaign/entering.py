@@ -45,7 +45,8 @@ def flown_test(setup: Setup, test: Test, trajectory: object, judge: Judge, least
         distance = quality = final_distance(recorded.states[-1], test.target(test.steps), setup.signals)
         if setup.preset != "paper":
             quality = setup.quality.flown(recorded, test.target_state)
-    return _experiment(setup, test, recorded, judge, distance, quality)
+    before = judge(with_run(setup.none_selected(), test, recorded))
+    return Experiment(test, recorded, before, frozen_error(recorded, setup.signals), distance, quality)
 
 
 def attached_run(setup: Setup, trajectory: object, judge: Judge) -> Experiment:
@@ -62,7 +63,9 @@ def attached_run(setup: Setup, trajectory: object, judge: Judge) -> Experiment:
     recorded = check_recorded(trajectory, setup.limits, None)
     recorded = continued(recorded, setup.signals, recorded.states[0])
     replayed = Replay(setup.signals, recorded.states[0], recorded.commands)
-    return _experiment(setup, replayed, recorded, judge, None, None)
+    before = judge(with_run(setup.none_selected(), replayed, recorded))
+    frozen = frozen_error(recorded, setup.signals)
+    return Experiment(replayed, recorded, before, frozen, None, None, attached=True)
 
 
 def partial_run(partial: Trajectory | None, reason: str) -> Trajectory | None:
@@ -138,17 +141,3 @@ def check_first_reading(trajectory: Trajectory, test: Test) -> None:
             f" {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the sensor"
             " was not ready: put into the first row what the state was, or run the test again."
         )
-
-
-def _experiment(
-    setup: Setup,
-    replayed: Test | Replay,
-    recorded: Trajectory,
-    judge: Judge,
-    distance: float | None,
-    quality: float | None,
-) -> Experiment:
-    before = judge(with_run(setup.none_selected(), replayed, recorded))
-    frozen = frozen_error(recorded, setup.signals)
-    attached = isinstance(replayed, Replay)
-    return Experiment(replayed, recorded, before, frozen, distance, quality, attached=attached)

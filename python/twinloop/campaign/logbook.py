@@ -83,7 +83,9 @@ class Logbook(Recorded, kind="logbook"):
         for i, (number, run) in enumerate(runs):
             at = f"{where}.experiments[{i}]"
             replayed = replay_of_record(run, setup) if number is None else book._numbered(number, at)
-            book._enter(Experiment.from_record(run, replayed))
+            read_run = Experiment.from_record(run, replayed)
+            check_recorded(read_run.trajectory, setup.limits, replayed.steps, least=1)
+            book._enter(read_run)
         failures = read(list[tuple[int, Any]], found["failures"], f"{where}.failures")
         for i, (number, failure) in enumerate(failures):
             at = f"{where}.failures[{i}]"
@@ -272,7 +274,6 @@ class Logbook(Recorded, kind="logbook"):
         return [self.tests[entry.test] for _, entry in self.asked if entry.test not in done]
 
     def _enter(self, run: Experiment) -> None:
-        check_recorded(run.trajectory, self.setup.limits, run.replayed.steps, least=1)
         self.selected = with_run(self.selected, run.replayed, run.trajectory)
         self.experiments.append(run)
 

@@ -17,6 +17,7 @@ from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 from twinloop.records import Recorded
+from twinloop.streams import Unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +100,10 @@ class Hypothesis(Recorded, kind="hypothesis"):
         correlated = sum(found.chain.motion.correlated > 0.0 for found in self.sums)
         length = self.length + price(self.form, self.actuation, self.alike, correlated)
         return Evidence(self.fit is not None, stable, self.smoothed, length)
+
+    def next_unit(self, unit: Unit) -> Unit:
+        """The part of an identification's unit of work from which the next search draws."""
+        return unit.part(self.start, self.searches + 1)
 
     def searched(self, sums: Sequence[Sum]) -> Hypothesis:
         """The same with the sums of one more search, not fitted yet."""

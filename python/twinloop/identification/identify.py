@@ -123,26 +123,19 @@ def identify_runs(
         under_way = UnderWay(tuple(context.runs), form, tuple(said))
         keep(under_way)
     context = replace(context, runs=under_way.runs).under(under_way.form)
-    for step in advanced(context, under_way):
-        under_way = step
-        keep(step)
-    first, *others = under_way.searches
+    searches = list(under_way.searches)
+    for number, start in enumerate(starts(context, under_way.form)):
+        if number == len(searches):
+            context.watch("noise")
+            searches.append(Found(start()))
+            keep(replace(under_way, searches=tuple(searches)))
+        for found in searched(context, searches[number]):
+            searches[number] = found
+            keep(replace(under_way, searches=tuple(searches)))
+    first, *others = searches
     found = decided(first, [found for other in others for found in (other.best, *other.rivals)])
     context.watch("committee")
     return concluded(context, found, under_way.said)
-
-
-def advanced(context: Context, under_way: UnderWay) -> Iterator[UnderWay]:
-    """What is left of the searches from all starts, after each start that is made and each proposal."""
-    for number, start in enumerate(starts(context, under_way.form)):
-        before = under_way.searches[:number]
-        if number == len(under_way.searches):
-            context.watch("noise")
-            under_way = replace(under_way, searches=(*before, Found(start())))
-            yield under_way
-        for found in searched(context, under_way.searches[number]):
-            under_way = replace(under_way, searches=(*before, found))
-            yield under_way
 
 
 def searched(context: Context, found: Found, proposals: Sequence[Proposal] = PROPOSALS) -> Iterator[Found]:

@@ -134,7 +134,7 @@ def other_noise(observer: Sequence[Chain], signals: Signals) -> list[Remark]:
 
 
 def remarks(
-    runs: Sequence[Run], pool: Pool, signals: Signals, sums: Sequence[Sum], left: float, readings: int
+    runs: Sequence[Run], pool: Pool, signals: Signals, sums: Sequence[Sum], chi_squared: float, readings: int
 ) -> list[Remark]:
     """Remarks on what was learnt.
 
@@ -143,7 +143,7 @@ def remarks(
         pool: of all expressions.
         signals: of the system.
         sums: of the best model.
-        left: χ² of its predictions.
+        chi_squared: χ² of its predictions.
         readings: that counted.
 
     Returns:
@@ -151,21 +151,21 @@ def remarks(
     """
     ignored = int(sum((run.weights == 0.0).sum() for run in runs))
     said = []
-    if not np.isfinite(left):
+    if not np.isfinite(chi_squared):
         said.append(
             serious(
                 "diverges",
                 "The model diverges on the runs that it was learnt from; fly another test before you trust it.",
             )
         )
-    elif left > 2.0 * readings:
+    elif chi_squared > 2.0 * readings:
         said.append(
             serious(
                 "misfit",
-                f"What is left is {left / readings:.3g} times the noise: something acts that no term describes.",
+                f"What is left is {chi_squared / readings:.3g} times the noise: something acts that no term describes.",
             )
         )
-    elif exact(left / max(1, readings)):
+    elif exact(chi_squared / max(1, readings)):
         said.append(
             note(
                 "exact",

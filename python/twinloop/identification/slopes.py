@@ -91,7 +91,7 @@ def _weights(degree: int, width: int) -> dict[str, Floats]:
     on, _ = _polynomials(degree, width, places)
     sizes = np.square(on).sum(axis=1)
 
-    def told(rows: Floats) -> Floats:
+    def weighing(rows: Floats) -> Floats:
         total = np.zeros((width, width))
         for row, own, size in zip(rows, on, sizes, strict=True):
             total += np.outer(row, own) / size
@@ -101,7 +101,7 @@ def _weights(degree: int, width: int) -> dict[str, Floats]:
         name: _polynomials(degree, width, places + by)[1]
         for name, by in {"slope": 0.0, "after": 0.5, "before": -0.5}.items()
     }
-    return {"value": told(on)} | {name: told(rows) for name, rows in slopes_at.items()}
+    return {"value": weighing(on)} | {name: weighing(rows) for name, rows in slopes_at.items()}
 
 
 def _polynomials(degree: int, width: int, places: Floats) -> tuple[Floats, Floats]:

@@ -116,7 +116,7 @@ class Writer:
         while self._is_plain_sum(number) or (define and self._is_sum(number)):
             operation, operands, _ = self.expressions[number]
             number, second = self._in_order(operation, operands)
-            sign, text = _signed(self._bracketed(second, PRODUCT))
+            sign, text = _signed(self._operand(second, PRODUCT))
             found.append((sign if operation == "+" else _opposite(sign), text))
             define = False
         found.append(_signed(self._texts[number][0] if define else self.text(number)))
@@ -159,7 +159,7 @@ class Writer:
         if operation == CONSTANT:
             return self.number(value), ATOM
         if operation == POWER:
-            return self.dialect.power.format(self._bracketed(operands[0], ATOM), int(value)), HIGH
+            return self.dialect.power.format(self._operand(operands[0], ATOM), int(value)), HIGH
         if operation in ("+", "-"):
             return self._sum(operation, operands)
         division = self.dialect.division
@@ -174,7 +174,7 @@ class Writer:
             first, second = second, first  # a product commutes to the bit
         # The right operand keeps its brackets even where algebra would not need them: rounding does.
         between = self.dialect.times if operation == "*" else operation
-        return f"{self._factor(first, PRODUCT)}{between}{self._bracketed(second, HIGH)}", PRODUCT
+        return f"{self._operand(first, PRODUCT, first=True)}{between}{self._operand(second, HIGH)}", PRODUCT
 
     def _is_plain_divisor(self, number: int) -> bool:
         """Whether a division by a node needs no protection: it is a constant that is large enough, or kept from 0."""
@@ -185,11 +185,11 @@ class Writer:
     def _sum(self, operation: str, operands: tuple[int, ...]) -> tuple[str, int]:
         first, second = self._in_order(operation, operands)
         if operation == "-" and self.expressions.constant_value(first) == 0.0:
-            text = self._bracketed(second, PRODUCT)
+            text = self._operand(second, PRODUCT)
             return f"-({text})" if text.startswith("-") else f"-{text}", SUM
-        sign, text = _signed(self._bracketed(second, PRODUCT))
+        sign, text = _signed(self._operand(second, PRODUCT))
         sign = sign if operation == "+" else _opposite(sign)
-        return f"{self._factor(first, SUM)} {sign} {text}", SUM
+        return f"{self._operand(first, SUM, first=True)} {sign} {text}", SUM
 
     def _in_order(self, operation: str, operands: tuple[int, ...]) -> tuple[int, int]:
         """Operands of a sum as they are written: it commutes to the bit, a - b + c for c + (a - b)."""
@@ -209,17 +209,11 @@ class Writer:
             return False
         return not (operation == "-" and self.expressions.constant_value(operands[0]) == 0.0)
 
-    def _factor(self, number: int, level: int) -> str:
-        """The first operand, that may begin with a sign."""
+    def _operand(self, number: int, level: int, first: bool = False) -> str:
+        """An operand, in brackets where it binds less tightly or has a sign that something other stands before."""
         text, own = (self.names[number], ATOM) if number in self.names else self._texts[number]
-        return f"({text})" if own < level else text
-
-    def _bracketed(self, number: int, level: int) -> str:
-        """An operand that something stands before; a constant or a product may begin with a sign."""
-        text, own = (self.names[number], ATOM) if number in self.names else self._texts[number]
-        if text.startswith("-") and (level > PRODUCT or own < PRODUCT):
-            return f"({text})"
-        return f"({text})" if own < level else text
+        signed = not first and text.startswith("-") and (level > PRODUCT or own < PRODUCT)
+        return f"({text})" if signed or own < level else text
 
 
 def _signed(text: str) -> Term:

@@ -18,11 +18,10 @@ from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
-from twinloop.campaign.twin_errors import free_runs
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
-from twinloop.objectives import normalised_error
+from twinloop.objectives import closed_loop, normalised_error
 from twinloop.steps import Watch
 from twinloop.streams import Unit
 
@@ -65,7 +64,20 @@ class Learner:
         """
         told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
         needed = () if asked is None else knowledge.needed_factors(asked)
-        identified = self._identified(book, None if asked is None else asked.identified, under_way, keep)
+        flights = learnt_from(book.experiments, self.options.most_readings)
+        identified = identify_runs(
+            [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
+            self.setup.signals,
+            self.options,
+            rests=self._rests(),
+            seed=self.setup.seed,
+            iteration=told,
+            earlier=None if asked is None else asked.identified,
+            workers=self.workers,
+            watch=self.watch,
+            under_way=under_way,
+            keep=keep,
+        )
         followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
         believed = [identified.members[i] for i in believed_members(followed)]
         follows = self._can_follow(identified, followed)
@@ -77,28 +89,6 @@ class Learner:
             told, identified, believed, follows, needed, (*before, lesson), models=(*models, identified.model)
         )
         return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
-
-    def _identified(
-        self,
-        book: Logbook,
-        earlier: Identified | None,
-        under_way: UnderWay | None,
-        keep: Callable[[UnderWay], None],
-    ) -> Identified:
-        flights = learnt_from(book.experiments, self.options.most_readings)
-        return identify_runs(
-            [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
-            self.setup.signals,
-            self.options,
-            rests=self._rests(),
-            seed=self.setup.seed,
-            iteration=len(book.experiments),
-            earlier=earlier,
-            workers=self.workers,
-            watch=self.watch,
-            under_way=under_way,
-            keep=keep,
-        )
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
@@ -128,7 +118,7 @@ class Learner:
         return missed
 
     def _lesson(self, identified: Identified, follows: bool, book: Logbook, followed: Following) -> Lesson:
-        free = free_runs(identified.members[:1], book, self.workers)[0].tolist()
+        free = closed_loop(identified.members[:1], book.selected, self.workers)[0].tolist()
         return Lesson(
             iteration=len(book.experiments),
             tests=tuple(run.number for run in book.experiments),

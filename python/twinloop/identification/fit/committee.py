@@ -81,7 +81,7 @@ def _structures(
                 continue
             terms = problem.usable(subset)
             if (i, subset) not in grams:
-                regression = problem.regression(found.chain, terms)
+                regression = problem.regression(found.chain, problem.values(terms))
                 grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, context.workers)
             limits = problem.limits(found.chain, terms)
             solved = bounded_solution(grams[i, subset], range(len(terms)), limits)

@@ -56,7 +56,7 @@ def tune(
     longest = LONGEST_MEMORY * signals.dt * max(len(run.commands) for run in hypothesis.runs)
     for turn in itertools.count():
         with engine_input():
-            tuned, left, readings, covariance, drawn = _core.tune(
+            tuned, chi_squared, readings, covariance, drawn = _core.tune(
                 model,
                 context.limits.engine,
                 [chain.engine for chain in observer],
@@ -77,7 +77,7 @@ def tune(
     if covariance.size:
         for place in (place for place, constant in enumerate(free) if constant in held):
             covariance = np.insert(np.insert(covariance, place, 0.0, axis=0), place, 0.0, axis=1)
-    fit = Fit(tuned, tuple(observer), left, readings, covariance)
+    fit = Fit(tuned, tuple(observer), chi_squared, readings, covariance)
     return fit, [bounded_model(one, limits)[0] for one in drawn]
 
 

@@ -40,7 +40,7 @@ def _calmed(problem: Problem, found: Sum) -> Sum:
     chain = found.chain
     if chain.motion.correlated == 0.0:
         return found
-    regression = problem.regression(chain, problem.usable(list(found.weights)))
+    regression = problem.regression(chain, problem.values(problem.usable(list(found.weights))))
     weights = np.array(list(found.weights.values()))
     before = regression.likelihood(weights, chain.sensors, chain.motion)
     white = (chain.motion.white, 0.0, chain.motion.correlation_time)

@@ -13,7 +13,8 @@ from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Run
 from twinloop.identification.search.description import shortest
-from twinloop.identification.search.selection import climbed, from_both_sides, posed, selected
+from twinloop.identification.search.selection import climbed, from_both_sides, posed
+from twinloop.identification.search.structure import search
 from twinloop.identification.starts import PARTS, begun
 from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
@@ -41,10 +42,12 @@ def parts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         part = climbed(brief, from_both_sides(brief, replace(part, actuation=begins)))
         whole = replace(whole, candidates=replace(whole.candidates, pool=part.pool))
         own = [term for sum_ in part.sums for term in sum_.weights]
-        tried = selected(
-            context, whole, posed(context, whole), own, part.sums, [sum_.chain for sum_ in part.sums],
-            moves=brief.options.moves // 4, starts=1,
+        sums = search(
+            posed(context, whole), [sum_.chain for sum_ in part.sums], own, part.sums,
+            moves=brief.options.moves // 4, starts=1, largest=context.options.largest,
+            unit=whole.next_unit(context.unit),
         )  # fmt: skip
+        tried = whole.searched(sums)
         whole = replace(whole, searches=tried.searches)
         answer = replace(fitted(context, tried), of_part=True)
         if answer.evidence.stable:

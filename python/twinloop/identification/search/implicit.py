@@ -127,8 +127,8 @@ def driving(problem: Problem, found: Sum) -> Floats:
         weights = np.array([found.weights[term] for term in terms])
         value: Floats = (problem.values(terms) * weights).sum(axis=2)
         missed = 0.0
-        left = problem.regression(chain, terms).residuals(weights)
-        for rows, residual in zip(problem.stages.runs, left, strict=True):
+        residuals = problem.regression(chain, problem.values(terms)).residuals(weights)
+        for rows, residual in zip(problem.stages.runs, residuals, strict=True):
             shown = slopes(np.ascontiguousarray(residual[:, 0]))
             if shown is None:
                 missed += float(np.square(residual[:, 0]).sum())
@@ -181,7 +181,7 @@ def whitened(
         largest: number of features at most.
         unit: of work.
     """
-    regressions = [problem.regression_on(sum_.chain, own) for sum_, own in zip(sums, columns, strict=True)]
+    regressions = [problem.regression(sum_.chain, own) for sum_, own in zip(sums, columns, strict=True)]
     chains: list[Chain] = [sum_.chain for sum_ in sums]
     for round_ in range(NOISE_ROUNDS + 1):
         grams = [

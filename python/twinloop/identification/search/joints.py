@@ -173,7 +173,7 @@ class _Joints:
     ) -> bool:
         """Whether one short walk under the noise that is known comes upon a shared mass: without, no more is spent."""
         grams = [
-            self.problem.regression_on(found.chain, own).gram(
+            self.problem.regression(found.chain, own).gram(
                 found.chain.sensors, found.chain.motion, self.problem.workers
             )
             for found, own in zip(known, columns, strict=True)
@@ -203,17 +203,17 @@ class _Joints:
             solved = self._solved(equations)
             if solved is None:
                 break
-            left = 0.0
+            chi_squared = 0.0
             for i, (sum_, (acceleration, answer)) in enumerate(zip(self.known, solved, strict=True)):
                 columns = self._columns(pairs[i], [own for own, _ in solved])[:, :, list(subsets[i])]
-                gram = self.problem.regression_on(
+                gram = self.problem.regression(
                     sum_.chain, answer[:, :, np.newaxis] * columns, acceleration[:, :, np.newaxis]
                 ).gram(sum_.chain.sensors, sum_.chain.motion, self.problem.workers)
-                left += gram.total
+                chi_squared += gram.total
                 step = gram.solve(list(range(gram.features)), RIDGE)
                 weights[i] = weights[i] if step is None else weights[i] + step[0]
-            if best is None or left < best[0]:
-                best = left, equations
+            if best is None or chi_squared < best[0]:
+                best = chi_squared, equations
         return None if best is None else best[1]
 
     def _costs(self, found: Sum, pairs: _Pairs) -> Floats:

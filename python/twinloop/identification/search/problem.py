@@ -77,29 +77,31 @@ class Problem:
             found[:, :, place] = self._values[term]
         return found
 
-    def regression(self, chain: Chain, terms: Sequence[int]) -> _core.Regression:
-        """Of one chain on terms that were found usable; what is known of it is taken out of its readings."""
-        return self.regression_on(chain, self.values(terms))
+    def regression(self, chain: Chain, columns: Columns, taken: Columns | None = None) -> _core.Regression:
+        """Of one chain on features, once what is known is taken out of its readings.
 
-    def regression_on(self, chain: Chain, columns: Columns, taken: Columns | None = None) -> _core.Regression:
-        """Of one chain on features that need not be terms (3, rows, p), where others are taken to be what they are."""
-        known = self.usable(self.priors.fixed.get(chain.states[0], ()))
-        readings = [run.states[:, list(chain.states)] for run in self.runs]
-        if known:
-            readings = self._of(chain, self.values(known), readings).residuals(np.ones(len(known)))
-        if taken is not None:
-            readings = self._of(chain, taken, readings).residuals(np.ones(taken.shape[2]))
-        return self._of(chain, columns, readings)
-
-    def _of(self, chain: Chain, columns: Columns, readings: Sequence[Floats]) -> _core.Regression:
-        start, middle, end = np.ascontiguousarray(columns)
+        Args:
+            chain: of states.
+            columns: the features, such as `values` of terms (3, rows, p).
+            taken: features that are taken to be in the law as they are (3, rows, q); None: the priors alone.
+        """
         states = list(chain.states)
-        records = [
-            (measured, run.weights[:, states], start[rows], middle[rows], end[rows])
-            for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
-        ]
-        with engine_input():
-            return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+        def on(columns: Columns, readings: Sequence[Floats]) -> _core.Regression:
+            start, middle, end = np.ascontiguousarray(columns)
+            records = [
+                (measured, run.weights[:, states], start[rows], middle[rows], end[rows])
+                for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
+            ]
+            with engine_input():
+                return _core.Regression(len(states), self.dt, chain.integrated, records)
+
+        readings = [run.states[:, states] for run in self.runs]
+        if known := self.usable(self.priors.fixed.get(states[0], ())):
+            readings = on(self.values(known), readings).residuals(np.ones(len(known)))
+        if taken is not None:
+            readings = on(taken, readings).residuals(np.ones(taken.shape[2]))
+        return on(columns, readings)
 
     def feedthrough(self, chain: Chain, terms: Sequence[int]) -> Floats:
         """Share of a reading's noise that each term has in the prediction of the same reading.

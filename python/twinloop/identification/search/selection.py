@@ -12,14 +12,13 @@ from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.description import shorter, shortest
-from twinloop.identification.search.implicit_laws import implicit_laws
+from twinloop.identification.search.joints import with_joints
 from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.structure import Sum, search
-from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import calm, first_noise, unexplained
 from twinloop.identification.terms.directions import directions
 from twinloop.identification.terms.evolution import evolve
-from twinloop.streams import Unit
 
 CALMER = 20.0
 """What terms must gain, in units of χ², that take the place of what disturbs."""
@@ -41,32 +40,6 @@ def posed(context: Context, hypothesis: Hypothesis, inputs: Stages | None = None
     )  # fmt: skip
 
 
-def selected(
-    context: Context,
-    hypothesis: Hypothesis,
-    problem: Problem,
-    terms: Sequence[int],
-    known: Sequence[Sum | None],
-    driven: Sequence[Chain],
-    *,
-    moves: int,
-    starts: int,
-    fixed_noise: bool = False,
-) -> Hypothesis:
-    """The hypothesis with the best sums among some terms, as `structure.search` finds them."""
-    sums = search(
-        problem, driven, terms, known,
-        moves=moves, starts=starts, largest=context.options.largest, unit=_next_unit(context, hypothesis),
-        fixed_noise=fixed_noise,
-    )  # fmt: skip
-    return hypothesis.searched(sums)
-
-
-def _next_unit(context: Context, hypothesis: Hypothesis) -> Unit:
-    """Of work, for the next search of a hypothesis."""
-    return context.unit.part(hypothesis.start, hypothesis.searches + 1)
-
-
 def from_both_sides(
     context: Context, hypothesis: Hypothesis, known: Sequence[Sum | None] | None = None
 ) -> Hypothesis:
@@ -84,13 +57,21 @@ def from_both_sides(
     terms, nothing = hypothesis.candidates.ladder[0], [None] * len(hypothesis.driven)
     usable = problem.usable(terms)
     below = [first_noise(problem, chain, usable, options.gusts) for chain in hypothesis.driven]
-    low = selected(
-        context, hypothesis, problem, terms, known or nothing, below, moves=options.moves, starts=2
-    )
+    low = hypothesis.searched(
+        search(
+            problem, below, terms, known or nothing,
+            moves=options.moves, starts=2, largest=options.largest, unit=hypothesis.next_unit(context.unit),
+        )
+    )  # fmt: skip
     if not options.noise_from_above:
         return replace(low, from_above=low.sums)
     above = [unexplained(problem, chain, options.gusts) for chain in hypothesis.driven]
-    high = selected(context, low, problem, terms, nothing, above, moves=options.moves, starts=2)
+    high = low.searched(
+        search(
+            problem, above, terms, nothing,
+            moves=options.moves, starts=2, largest=options.largest, unit=low.next_unit(context.unit),
+        )
+    )  # fmt: skip
     both = zip(low.sums, high.sums, strict=True)
     return replace(
         high,
@@ -113,10 +94,12 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
     problem, ladder = posed(context, climber, inputs), climber.candidates.ladder
     for number, terms in enumerate((ladder[:1] if brief else ladder) if options.libraries else ()):
         starts = options.starts if number == 0 and not brief else max(1, options.starts // 2)
-        climber = selected(
-            context, climber, problem, terms, climber.sums, [found.chain for found in climber.sums],
-            moves=options.moves, starts=starts, fixed_noise=number > 0,
+        sums = search(
+            problem, [found.chain for found in climber.sums], terms, climber.sums,
+            moves=options.moves, starts=starts, largest=options.largest,
+            unit=climber.next_unit(context.unit), fixed_noise=number > 0,
         )  # fmt: skip
+        climber = climber.searched(sums)
     if options.generations and not (brief and options.libraries):
         context.watch("evolution")
         seeds = [problem.pool.one, *range(problem.pool.inputs)] if options.libraries else list(ladder[0])
@@ -126,25 +109,39 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
                 problem, climber.sums, seeds,
                 operators=options.operators, generations=options.generations,
                 population=options.population, longest=options.longest, moves=options.moves // 4,
-                largest=options.largest, unit=_next_unit(context, climber), signals=context.signals,
+                largest=options.largest, unit=climber.next_unit(context.unit), signals=context.signals,
             )  # fmt: skip
             climber = climber.searched(sums)
     return _with_implicit_laws(context, climber, inputs, brief)
 
 
 def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages, again: bool) -> Hypothesis:
-    """The hypothesis with quotients and shared masses, where they pay; the very same where they do not."""
+    """The hypothesis with shared masses, then quotients, where they pay; the very same where they do not.
+
+    Args:
+        context: of the identification.
+        hypothesis: with the best sums so far.
+        inputs: of its runs and actuation.
+        again: whether quotients were searched before, on states that were not smoothed: those that there are get new
+            constants, and no others are looked for.
+    """
     options = context.options
     # Where forms are compared, increments get none: a period of any law resembles a quotient.
     compared = context.as_integrated and hypothesis.form != "acceleration"
     if not (options.implicit and options.libraries) or compared:
         return hypothesis
     grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
-    sums = implicit_laws(
-        posed(context, grown, inputs), context.signals, grown.sums, grown.candidates.ladder[-1],
-        again=again, moves=options.moves // 2, largest=options.largest, unit=_next_unit(context, grown),
-    )  # fmt: skip
-    return hypothesis if sums is None else grown.searched(sums)
+    problem, signals = posed(context, grown, inputs), context.signals
+    moves, largest = options.moves // 2, options.largest
+    unit = grown.next_unit(context.unit)
+    sums = with_joints(problem, signals, grown.sums, moves=moves, largest=largest, unit=unit)
+    if again:
+        sums = renewed(problem, signals, sums, moves=moves, largest=largest, unit=unit)
+    else:
+        terms = grown.candidates.ladder[-1]
+        sums = with_quotients(problem, signals, sums, terms, moves=moves, largest=largest, unit=unit)
+    changed = any(new is not old for new, old in zip(sums, grown.sums, strict=True))
+    return grown.searched(sums) if changed else hypothesis
 
 
 def undisturbed(context: Context, hypothesis: Hypothesis) -> Hypothesis:
@@ -160,11 +157,14 @@ def undisturbed(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         driven = [calm(problem, found.chain) for found in calmer.sums]
         if all(quiet is found.chain for quiet, found in zip(driven, calmer.sums, strict=True)):
             break
-        found = selected(context, calmer, problem, terms, calmer.sums, driven, moves=tried, starts=1)
-        pairs = zip(calmer.sums, found.sums, strict=True)
-        kept = tuple(
-            new if shorter(new.description_length + CALMER, old.description_length) else old
-            for old, new in pairs
+        found = search(
+            problem, driven, terms, calmer.sums,
+            moves=tried, starts=1, largest=context.options.largest, unit=calmer.next_unit(context.unit),
+        )  # fmt: skip
+        calmer = calmer.searched(
+            [
+                new if shorter(new.description_length + CALMER, old.description_length) else old
+                for old, new in zip(calmer.sums, found, strict=True)
+            ]
         )
-        calmer = replace(found, sums=kept)
     return calmer

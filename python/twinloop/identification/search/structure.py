@@ -14,7 +14,7 @@ from twinloop.arrays import Floats
 from twinloop.elementary import log, power
 from twinloop.errors import engine_input
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.subsets import Judged, all_judged, with_what_must_be
+from twinloop.identification.search.subsets import Judged, all_judged
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
 from twinloop.identification.terms.pool import Pool
@@ -126,23 +126,24 @@ def search(
     place = {term: i for i, term in enumerate(usable)}
     for cost, terms_out in zip(costs, forbidden or [set()] * len(costs), strict=True):
         cost[[place[term] for term in terms_out if term in place]] = np.inf
-    regressions = [problem.regression(chain, usable) for chain in chains]
+    columns = problem.values(usable)
+    regressions = [problem.regression(chain, columns) for chain in chains]
+
+    def walked(grams: Sequence[_core.Gram], costs: Sequence[Floats], number: int, round_: int) -> Walked:
+        """The walks of a number in a round; those of each draw from a stream of their own."""
+        share = 1 if round_ == 0 else 2
+        return _core.search_subsets(
+            grams, costs, moves=moves // share, largest=largest, starts=max(1, starts // share),
+            unit=unit.part(number * NOISE_ROUNDS + round_).named(purpose), workers=problem.workers,
+        )  # fmt: skip
+
     best: list[Sum] = []
     current = list(chains)
     for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
         grams = [
             r.gram(c.sensors, c.motion, problem.workers) for r, c in zip(regressions, current, strict=True)
         ]
-        walk = partial(
-            _walked,
-            moves=moves if round_ == 0 else moves // 2,
-            largest=largest,
-            starts=starts if round_ == 0 else max(1, starts // 2),
-            unit=unit,
-            purpose=purpose,
-            round_=round_,
-            workers=problem.workers,
-        )
+        walk = partial(walked, round_=round_)
         subsets = _chosen(problem, usable, place, chains, known, grams, costs, walk)
         coefficients = [_spread(judged[0], len(usable)) for judged in subsets]
         noisy, changed = current, False
@@ -163,26 +164,6 @@ def search(
         if not changed:
             break
     return best
-
-
-def _walked(
-    grams: Sequence[_core.Gram],
-    costs: Sequence[Floats],
-    number: int,
-    *,
-    moves: int,
-    largest: int,
-    starts: int,
-    unit: Unit,
-    purpose: Purpose,
-    round_: int,
-    workers: _core.Workers,
-) -> Walked:
-    """The walks of a number in a round; those of each number and round draw from a stream of their own."""
-    name = unit.part(number * NOISE_ROUNDS + round_).named(purpose)
-    return _core.search_subsets(
-        grams, costs, moves=moves, largest=largest, starts=starts, unit=name, workers=workers
-    )
 
 
 def _chosen(
@@ -250,10 +231,8 @@ def _best_subsets(
     subsets = [tuple(subset) for subset, _ in walked]
     if known is not None and all(term in place for term in known.weights):
         subsets.append(tuple(sorted(place[term] for term in known.weights)))
-    limits = problem.limits(chain, usable)
-    subsets = with_what_must_be(subsets, gram, costs, limits)
     return sorted(
-        all_judged(gram, subsets, costs, limits),
+        all_judged(gram, subsets, costs, problem.limits(chain, usable)),
         key=lambda found: (found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]), found[0]),
     )
 

@@ -14,26 +14,12 @@ Judged = tuple[tuple[int, ...], float, Floats]
 """A subset of features, its energy, its coefficients."""
 
 
-def with_what_must_be(
-    subsets: list[tuple[int, ...]], gram: _core.Gram, costs: Floats, limits: Limits
-) -> list[tuple[int, ...]]:
-    """Subsets that hold every term whose bounds exclude 0, as far as the runs can tell those terms apart."""
-    required = (
-        place for place, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[place])
-    )
-    must = _distinguishable(gram, required)
-    if not must:
-        return subsets
-    forced = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
-    if all(gram.solve(list(subset)) is None for subset in forced):
-        forced.append(tuple(sorted(must)))
-    return forced
-
-
 def all_judged(
     gram: _core.Gram, subsets: Sequence[tuple[int, ...]], costs: Floats, limits: Limits
 ) -> list[Judged]:
     """Least squares on subsets; where rounding leaves none of them a solution, on the largest parts that have one.
+
+    Terms whose bounds exclude 0 are in every subset, as far as the runs can tell those terms apart.
 
     Args:
         gram: of the features.
@@ -44,6 +30,11 @@ def all_judged(
     Returns:
         Those that have a solution.
     """
+    bounded = [i for i, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[i])]
+    if must := _distinguishable(gram, bounded):
+        subsets = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
+        if all(gram.solve(list(subset)) is None for subset in subsets):
+            subsets.append(tuple(sorted(must)))
     found = [_judged(gram, subset, costs, limits) for subset in dict.fromkeys(subsets)]
     if not any(found):
         parts = dict.fromkeys(_distinguishable(gram, subset) for subset in subsets)
@@ -64,9 +55,9 @@ def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Li
     solved = bounded_solution(gram, subset, limits)
     if solved is None:
         return None
-    weights, left = solved
+    weights, chi_squared = solved
     nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
     if nothing and len(nothing) < len(subset):
         # A term that is held at 0 is no term.
         return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
-    return subset, left + float(costs[list(subset)].sum()), weights
+    return subset, chi_squared + float(costs[list(subset)].sum()), weights

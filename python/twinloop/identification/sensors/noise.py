@@ -127,7 +127,7 @@ def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:
     Returns:
         The chain with that noise.
     """
-    regression = problem.regression(chain, problem.usable([problem.pool.one]))
+    regression = problem.regression(chain, problem.values(problem.usable([problem.pool.one])))
     low, slow = floor_of(chain, problem.dt, problem.integration(chain))
     # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
     begun = [_begun(chain, low, slow, problem.dt, size) for size in (GUSTS if gusts else (0.0,))]
@@ -151,7 +151,7 @@ def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: boo
     Returns:
         The chain with its noise estimated.
     """
-    regression = problem.regression(chain, terms)
+    regression = problem.regression(chain, problem.values(terms))
     low, slow = floor_of(chain, problem.dt, problem.integration(chain))
     sensors, motion = _begun(chain, low, slow, problem.dt, GUST if gusts else 0.0)
     readings = problem.readings(chain)

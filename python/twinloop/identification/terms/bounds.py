@@ -45,10 +45,10 @@ def bounded_solution(gram: _core.Gram, subset: Sequence[int], limits: Limits) ->
     solved = gram.solve(list(subset))
     if solved is None:
         return None
-    weights, covariance, left = solved
+    weights, covariance, chi_squared = solved
     boxed = [(i, limits[j]) for i, j in enumerate(subset) if j in limits]
     if all(low <= weights[i] <= high for i, (low, high) in boxed):
-        return weights, left
+        return weights, chi_squared
     forces = np.zeros(len(weights))
     for _ in range(SWEEPS):
         moved = 0.0
@@ -67,7 +67,7 @@ def bounded_solution(gram: _core.Gram, subset: Sequence[int], limits: Limits) ->
         return _held(solved, dict(boxed), at)
     for i, bounds in boxed:
         weights[i] = within(weights[i], bounds)
-    return weights, left + float((covariance * np.outer(forces, forces)).sum())
+    return weights, chi_squared + float((covariance * np.outer(forces, forces)).sum())
 
 
 def _held(solved: tuple[Floats, Floats, float], boxed: Limits, at: dict[int, float]) -> tuple[Floats, float]:
@@ -78,7 +78,7 @@ def _held(solved: tuple[Floats, Floats, float], boxed: Limits, at: dict[int, flo
         boxed: bounds of weights, by place.
         at: values at which some of them are held; others that leave their bounds then are held there, too.
     """
-    weights, covariance, left = solved
+    weights, covariance, chi_squared = solved
     waiting = dict(at)
     while waiting:
         for i, value in waiting.items():
@@ -87,7 +87,7 @@ def _held(solved: tuple[Floats, Floats, float], boxed: Limits, at: dict[int, flo
                 off = float(weights[i]) - value
                 weights = weights - off / variance * column
                 covariance = covariance - np.outer(column, column) / variance
-                left += off * off / variance
+                chi_squared += off * off / variance
             covariance[i] = covariance[:, i] = 0.0
             weights[i] = value
         at = at | waiting
@@ -96,7 +96,7 @@ def _held(solved: tuple[Floats, Floats, float], boxed: Limits, at: dict[int, flo
             for i, bounds in boxed.items()
             if i not in at and weights[i] != within(float(weights[i]), bounds)
         }
-    return weights, left
+    return weights, chi_squared
 
 
 def bounded_model(model: _core.Model, limits: Limits) -> tuple[_core.Model, set[int]]:
