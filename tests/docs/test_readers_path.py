@@ -1,0 +1,27 @@
+"""A reader who follows one run from `tell` to a printed coefficient does not meet ever more stops."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+STOPS = 75
+"""What it has come to; it may fall."""
+
+
+def test_the_path_from_tell_to_a_printed_coefficient_has_no_more_stops_than_it_had():
+    command = [sys.executable, ROOT / "scripts" / "readers_path.py", "--smoke", "--list"]
+    *listed, said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    names = [line.split()[1] for line in listed]
+    assert len(names) == len(set(names)) == int(re.search(r"(\d+) stops", said)[1]) <= STOPS
+    steps = (
+        "Campaign.tell",
+        "Campaign.twin",
+        "identify_runs",
+        "search",
+        "tune",
+        "equations",
+        "Writer.number",
+    )
+    assert [name for name in names if name in steps] == list(steps)
