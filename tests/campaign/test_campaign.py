@@ -401,7 +401,7 @@ def test_progress_says_where_the_campaign_is(monkeypatch, new_campaign, pendulum
     assert phases == ["experiment"] + ["models"] * 8 + ["tests"] * 4 + ["experiment"]
     assert seen[8].generation == seen[8].generations == 8
     assert seen[8].closed_loop == campaign.history[1].closed_loop
-    assert [p.told for p in seen] == [0] + [1] * 13
+    assert [p.experiments for p in seen] == [0] + [1] * 13
     assert seen[1].tests == (0,)
 
 

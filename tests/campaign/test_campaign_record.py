@@ -104,7 +104,7 @@ def damaged(record, path, value):
         (["logbook", "experiments", 0, 0], 7, "number of a test"),
         (["logbook", "tests", 0, "number"], 3, "keep the tests in their order"),
         (["logbook", "experiments", 0, 1, "trajectory", "t"], [0.0], "shape"),
-        (["memory", "latest", "told"], 3, "another campaign"),
+        (["memory", "latest", "experiments"], 3, "another campaign"),
         (["memory", "latest", "ahead"], 10**6, "generations left"),
         (["memory", "latest", "models", "population", 0], "program inputs=1", "expected"),
         (["memory", "latest", "models", "generation"], -1, "at least 0"),

@@ -40,7 +40,7 @@ def test_the_envelope_that_was_used_and_left_is_said():
     states = np.array(run.states)
     states[5:7, 1] = 15.0  # bounds are ± 12
     campaign.tell(test, type(run)(run.t, states, run.commands))
-    assert campaign.cost.left == 1 and campaign.cost.usage == pytest.approx(15.0 / 12.0)
+    assert campaign.cost.left_envelope == 1 and campaign.cost.usage == pytest.approx(15.0 / 12.0)
 
 
 def test_the_report_says_it_with_units():

@@ -35,13 +35,13 @@ def test_the_time_left_of_default_is_right_where_steps_take_their_usual_share(mo
     clock = [0.0]
     monkeypatch.setattr("twinloop.campaign.remaining.time.monotonic", lambda: clock[0])
     estimate = StepEstimate(experiments=3)
-    whole = sum(USUAL[p.phase][1] * (1 + p.told) for p in flown(3) if p.phase in STEPS)
+    whole = sum(USUAL[p.phase][1] * (1 + p.experiments) for p in flown(3) if p.phase in STEPS)
     told = []
     for now in flown(3):
         left = estimate.remaining(now)
         if left is not None:
             told.append((clock[0], left))
-        clock[0] += USUAL[now.phase][1] * (1 + now.told) if now.phase in STEPS else 0.0
+        clock[0] += USUAL[now.phase][1] * (1 + now.experiments) if now.phase in STEPS else 0.0
     assert len(told) > 20
     for moment, left in told:
         assert moment + left == pytest.approx(whole)

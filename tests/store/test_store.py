@@ -23,7 +23,7 @@ from lives import LIFE, OTHER_GAINS, SMALL, flown, lived, plain, stored
 from sameness import same
 from twinloop.campaign import keeping
 from twinloop.records import to_text
-from twinloop.store import Keeper, doing, found, kept, opened
+from twinloop.store import Keeper, doing, found, listed, opened
 
 
 def rows(path, table):
@@ -249,7 +249,7 @@ def test_several_campaigns_live_in_one_store(path, pendulum):
     two = stored(path, name="two", seed=1)
     flown(two, pendulum).ask()
     assert [
-        (row["name"], row["experiments"], row["tests"]) for row in kept(opened(path, read_only=True))
+        (row["name"], row["experiments"], row["tests"]) for row in listed(opened(path, read_only=True))
     ] == [
         ("one", 1, 1),
         ("two", 1, 2),

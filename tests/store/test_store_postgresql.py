@@ -17,7 +17,7 @@ from old_store import old_store
 from sameness import same
 from twinloop.faces.cli import main
 from twinloop.logs import write_columns
-from twinloop.store import kept, opened
+from twinloop.store import listed, opened
 
 pytest.importorskip("psycopg", reason="the driver psycopg is not installed")
 if not (shutil.which("initdb") and shutil.which("pg_ctl")):
@@ -82,7 +82,7 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(server, pendulum):
     other = stored(address, name="two", seed=1)
     assert len(tl.Campaign.load(address, "one", read_only=True).experiments) == 1
     source = opened(address, read_only=True)
-    assert [row["name"] for row in kept(source)] == ["one", "two"]
+    assert [row["name"] for row in listed(source)] == ["one", "two"]
     source.close()
     campaign.close()
     other.close()

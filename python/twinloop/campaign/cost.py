@@ -1,4 +1,4 @@
-"""What a campaign has cost on the system: runs, time in the air, envelope, and quality given away to learn."""
+"""The cost of a campaign on the system: runs, flight time, envelope, and loss of quality while learning."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from twinloop.campaign.logbook import Logbook
 
 @dataclass(frozen=True)
 class Cost:
-    """What was spent on the system.
+    """The cost of a campaign on the system.
 
     Args:
-        runs: of tests on the system, those that failed too.
-        cut: of these, that ended early with a record.
-        failed: of these, that failed on the system.
-        attached: runs that nobody asked for, which are no runs of tests.
-        abandoned: tests that were asked for and not flown.
-        seconds: of flight that were recorded, those of attached runs too, s.
-        left: recorded runs that left the envelope, as far as their readings tell.
-        usage: the most that any used of the envelope, 1 at a bound; 0 where none is declared.
-        best: the best quality of a complete run of the campaign's own task; None where there was none.
-        given_away: by how much all other complete runs of it were worse than that, together, in the same unit.
+        runs: runs of tests on the system, including failures.
+        cut: those of them that ended early with a record.
+        failed: those of them that failed.
+        attached: runs without a test.
+        abandoned: tests from `ask` that were not flown.
+        seconds: recorded flight time, attached runs included, s.
+        left_envelope: recorded runs that left the envelope, as far as their readings show.
+        usage: the largest usage of the envelope, 1 at a bound; 0 if no envelope is declared.
+        best: the best quality of a complete run of the campaign's own task; None if there is none.
+        given_away: sum of the differences of all other complete runs of this task to `best`, in the same unit.
     """
 
     runs: int
@@ -32,7 +32,7 @@ class Cost:
     attached: int
     abandoned: int
     seconds: float
-    left: int
+    left_envelope: int
     usage: float
     best: float | None
     given_away: float | None
@@ -59,7 +59,7 @@ def cost(book: Logbook) -> Cost:
         attached=len(book.experiments) - len(asked),
         abandoned=len(set(book.abandoned) - book.flown),
         seconds=math.fsum(float(run.trajectory.t[-1] - run.trajectory.t[0]) for run in book.experiments),
-        left=sum(run.left_envelope for run in book.experiments),
+        left_envelope=sum(run.left_envelope for run in book.experiments),
         usage=max((run.usage for run in book.experiments), default=0.0),
         best=best,
         given_away=None if best is None else math.fsum(quality - best for quality in qualities),

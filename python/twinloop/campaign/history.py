@@ -20,13 +20,13 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     """One run on the system.
 
     Args:
-        replayed: what a twin flies to be compared with it: the test, or the commands as they were recorded.
-        trajectory: what the system answered.
-        before: closed-loop error on the run of the twin that the last `ask` knew; None if nothing was asked yet.
+        replayed: what a twin flies for the comparison: the test, or the recorded commands.
+        trajectory: the measured run.
+        before: closed-loop error on this run of the twin at the last `ask`; None if there was no `ask` yet.
         frozen: closed-loop error of the model that never moves, on the run.
         final_distance: distance of the last measured state to the target; None if the run was cut, or has no target.
-        quality: what the campaign minimises, as measured; None if the run was cut, or has no target.
-        attached: whether nobody asked for it.
+        quality: measured quality, which the campaign minimises; None if the run was cut, or has no target.
+        attached: whether it is a run without a test.
     """
 
     replayed: Test | Replay
@@ -39,12 +39,12 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     @property
     def test(self) -> Test | None:
-        """What was asked for; None for a run that nobody asked for."""
+        """The test; None for an attached run."""
         return self.replayed if isinstance(self.replayed, Test) else None
 
     @property
     def number(self) -> int | None:
-        """Of the test; None for a run that nobody asked for."""
+        """Number of the test; None for an attached run."""
         return None if self.test is None else self.test.number
 
     @property
@@ -54,12 +54,12 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     @property
     def kept_envelope(self) -> bool:
-        """Whether it ran to its end and never left the envelope: where a run was cut nobody knows."""
+        """Whether it ran to its end and never left the envelope; False for a run that was cut."""
         return self.complete and not self.left_envelope
 
     @property
     def usage(self) -> float:
-        """The most that its readings used of the envelope: 1 at a bound; 0 where none is declared."""
+        """Largest usage of the envelope by its readings: 1 at a bound; 0 if no envelope is declared."""
         return float(self._usages().max())
 
     @property
@@ -83,7 +83,7 @@ class Failure(Recorded, kind="failure", given=("test",)):
     Args:
         test: that was flown.
         reason: what happened, in a few words.
-        recorded: whether what was recorded until then is among the experiments.
+        recorded: whether the record up to the failure is among the experiments.
     """
 
     test: Test
@@ -98,7 +98,7 @@ class TestLoop(Recorded, kind="test_loop"):
     Args:
         test: number of the test that it gave.
         genes: gains of the test, in their units.
-        objectives: of the test: discrimination, instability and, where it is one, control quality.
+        objectives: of the test: discrimination, instability and, if it is an objective, control quality.
         flat: whether all tests of the random population ended at the same distance on the best model, which
             then ignores the commands.
         generations: that it ran.
@@ -129,11 +129,11 @@ class Planned(Recorded, kind="planned"):
         test: number of the test.
         genes: gains of the test, in their units.
         predicted: quality on the committee, mean; infinite if a member diverges.
-        spread: standard deviation that the measured quality is expected to have.
+        spread: expected standard deviation of the measured quality.
         risk: probability that the flight leaves the envelope, by the committee.
         safe: whether every member keeps the margin.
-        bits: what the flight is expected to tell.
-        gain: quality that knowing the right member would bring.
+        bits: expected information of the flight.
+        gain: improvement of the quality if the right member were known.
         reason: why this one.
         flown: quality on the system, mean over complete runs; None if there was none.
     """
@@ -156,23 +156,23 @@ class Lesson(Recorded, kind="lesson"):
 
     Args:
         iteration: its number, from 1.
-        tests: numbers of the selected tests, in the order they were told; None for a run that nobody asked for.
-        form: what the model's outputs mean.
+        tests: numbers of the selected tests, in the order of `tell`; None for an attached run.
+        form: meaning of the model's outputs.
         terms: of the equations.
-        misfit: χ² of the predictions for each reading; 1 where only noise is left.
-        readings: that counted.
-        ignored: readings taken for outliers.
+        misfit: χ² of the predictions per reading; 1 if only noise remains.
+        readings: number of readings that counted.
+        ignored: number of outliers.
         sensors: standard deviation of each state's sensor, estimated, in its unit.
         lags: time constant of each command's actuator, s.
         delays: of each command's actuator, periods.
-        hidden: states that commands fill: which commands, whether with their squares, the mean at rest in units of
-            their scale (None: that of the first period), and the time in s after which 1/e is left.
-        offsets: by how much later than those of the driven states each state's readings were taken from it, s.
+        hidden: states that commands fill: which commands, whether squared, the mean at rest in units of their scale
+            (None: that of the first period), and the time constant in s.
+        offsets: delay of each state's readings against those of the driven states, s.
         closed_loop: of the best model, one for each selected test, SI units squared; infinite where it diverges.
         normalised: closed_loop over that of the model that never moves.
-        follows: whether the best model, flown by itself, follows at least half of the runs that it was learnt from; if
-            not, nothing is planned on it.
-        remarks: what a person should know.
+        follows: whether free runs of the best model follow at least half of the runs that it was learnt from; if not,
+            no test is planned with it.
+        remarks: diagnostics.
         asked: the tests planned after it.
     """
 
@@ -202,7 +202,7 @@ class Iteration(Recorded, kind="iteration"):
     Args:
         iteration: its number.
         generations: that it ran.
-        tests: numbers of the selected tests, in the order they were told.
+        tests: numbers of the selected tests, in the order of `tell`.
         archive_size: non-dominated models.
         capped_generations: generations in which the non-dominated set was pruned to its cap.
         open_loop: of the best trade-off, one for each selected test, SI units squared.
@@ -210,7 +210,7 @@ class Iteration(Recorded, kind="iteration"):
         normalised: closed_loop over that of the model that never moves.
         intron_share: mean share of instructions that cannot affect the outputs, over the population.
         evaluations: models that were run on the tests since the start.
-        spared: offspring that were not run since the start: their effective code was their parent's.
+        spared: offspring that were not run, since the start: their effective code was their parent's.
         asked: the test loops that followed.
     """
 
@@ -230,26 +230,26 @@ class Iteration(Recorded, kind="iteration"):
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a campaign is, as told to its progress callback after every chunk of work.
+    """The state of a campaign, for its progress callback after every chunk of work.
 
     Args:
         phase: "models", "tests", "experiment", or a step of the preset `default`.
         iteration: of the double loop.
-        generation: of the loop that is running.
-        generations: that it will run.
-        told: experiments that were told.
-        tests: numbers of the tests that are being learnt; None for a run that nobody asked for.
+        generation: of the running loop.
+        generations: number of generations of the running loop.
+        experiments: number of experiments so far.
+        tests: numbers of the tests that are being learnt; None for an attached run.
         open_loop: of the best trade-off, one for each of them.
         closed_loop: of the best trade-off, one for each of them.
-        archive_size: of the loop that is running.
-        evaluations: of the loop that is running, since its start.
+        archive_size: of the running loop.
+        evaluations: of the running loop, since its start.
     """
 
     phase: str
     iteration: int
     generation: int
     generations: int
-    told: int
+    experiments: int
     tests: tuple[int | None, ...]
     open_loop: tuple[float, ...]
     closed_loop: tuple[float, ...]

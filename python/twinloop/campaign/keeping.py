@@ -19,7 +19,7 @@ from twinloop.campaign.remaining import estimate
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
 from twinloop.records import Record, Recorded
-from twinloop.store import Keeper, Kept, Store, begun, found, kept, opened, shown_name
+from twinloop.store import Keeper, Store, Stored, begun, found, listed, opened, shown_name
 from twinloop.versions import versions
 
 Answer = TypeVar("Answer")
@@ -65,7 +65,7 @@ class Keeping:
         except BaseException:
             self.close()
             raise
-        self.kept: Kept = held
+        self.stored: Stored = held
         self._runs: int | None = held.runs
         self._system: Record | None = held.system
         self._flown: object = None
@@ -113,14 +113,14 @@ class Keeping:
         Args:
             progress: of the campaign.
         """
-        experiments = max(self._budget or 1, progress.told)
+        experiments = max(self._budget or 1, progress.experiments)
         self._remaining.experiments = experiments
-        left, now = self._remaining.remaining(progress), time.monotonic()
+        remaining, now = self._remaining.remaining(progress), time.monotonic()
         if self._said is not None and abs(now - self._said) < BEAT:
             return
         self._said = now
         doing = {"phase": progress.phase, "generation": progress.generation, "generations": progress.generations,
-                 "told": progress.told, "experiments": experiments, "left": left}  # fmt: skip
+                 "told": progress.experiments, "experiments": experiments, "left": remaining}  # fmt: skip
         with suppress(StoreFailure):  # what has to be kept will tell it
             self._keeper.say(doing)
 
@@ -181,7 +181,7 @@ class Keeping:
         return self._runs
 
 
-def look(where: str | Path, name: str | None, read_only: bool) -> Kept:
+def look(where: str | Path, name: str | None, read_only: bool) -> Stored:
     """What a store holds of a campaign.
 
     Args:
@@ -223,7 +223,7 @@ def _of_store(
 ) -> Answer:
     store = opened(where, read_only=read_only)
     try:
-        answer, names = wanted(store, name), [row["name"] for row in kept(store)]
+        answer, names = wanted(store, name), [row["name"] for row in listed(store)]
     finally:
         store.close()
     if answer is None and name is not None and names:

@@ -202,7 +202,7 @@ class Logbook(Recorded, kind="logbook"):
         Raises:
             InvalidInput: a test of another campaign, or a trajectory that cannot be learnt from.
         """
-        self._enter(flown_test(self.setup, self.known(test), trajectory, judge))
+        self._enter(flown_test(self.setup, self.own(test), trajectory, judge))
 
     def attach(self, trajectory: object, judge: Judge) -> None:
         """Enters a run that nobody asked for.
@@ -228,11 +228,11 @@ class Logbook(Recorded, kind="logbook"):
         Raises:
             InvalidInput: a test of another campaign, no reason, or a record that cannot be learnt from.
         """
-        known = self.known(test)
+        own = self.own(test)
         recorded = partial_run(partial, reason)
         if recorded is not None:
-            self._enter(flown_test(self.setup, known, recorded, judge, least=1))
-        self.failures.append(Failure(known, reason, recorded=recorded is not None))
+            self._enter(flown_test(self.setup, own, recorded, judge, least=1))
+        self.failures.append(Failure(own, reason, recorded=recorded is not None))
 
     def abandon(self, test: object) -> None:
         """Enters that a test will not be flown.
@@ -243,13 +243,13 @@ class Logbook(Recorded, kind="logbook"):
         Raises:
             InvalidInput: a test of another campaign, or one that was flown.
         """
-        known = self.known(test)
-        if known.number in self.flown:
+        own = self.own(test)
+        if own.number in self.flown:
             raise InvalidInput(
-                f"Campaign.abandon: expected a test that was not flown, found test {known.number}, of which"
+                f"Campaign.abandon: expected a test that was not flown, found test {own.number}, of which"
                 " a run was told; nothing is left to abandon."
             )
-        self.abandoned.append(known.number)
+        self.abandoned.append(own.number)
 
     @property
     def flown(self) -> set[int]:
@@ -282,14 +282,17 @@ class Logbook(Recorded, kind="logbook"):
             raise InvalidInput(f"Record {where}: expected the number of a test, found {number}.")
         return self.tests[number]
 
-    def known(self, test: object) -> Test:
+    def own(self, test: object) -> Test:
         """A test of this campaign.
 
         Args:
             test: to be looked up.
 
+        Returns:
+            The test as the logbook holds it.
+
         Raises:
-            InvalidInput: it is none.
+            InvalidInput: a test of another campaign, or a changed one.
         """
         check_signals(test, self.setup.signals)
         assert isinstance(test, Test)  # check_signals has refused everything else

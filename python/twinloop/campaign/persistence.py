@@ -23,7 +23,7 @@ from twinloop.campaign.setup import Setup
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.records import Record, Recorded, checked_record
-from twinloop.store import Kept
+from twinloop.store import Stored
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -54,7 +54,7 @@ class Persistent(Recorded):
         """Goes on with what a store holds, and keeps there what comes."""
         keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
         try:
-            self._recall(keeping.kept)
+            self._recall(keeping.stored)
         except BaseException:
             keeping.close()
             raise
@@ -63,7 +63,7 @@ class Persistent(Recorded):
         # A campaign that nobody holds any more writes no more; the end of the process is one of those.
         weakref.finalize(self, keeping.close)
 
-    def _recall(self, held: Kept) -> None:
+    def _recall(self, held: Stored) -> None:
         self._book = Logbook.from_record(held.logbook, self.setup)
         if held.memory is not None:
             self._method.restore(held.memory, self._book)
@@ -148,7 +148,7 @@ class Persistent(Recorded):
         """
         keeping = Keeping(where, name, self.setup, self._book.identity, self.threads)
         try:
-            mine, known = self._book.to_record(), keeping.kept.logbook
+            mine, known = self._book.to_record(), keeping.stored.logbook
             lists = [key for key, value in known.items() if isinstance(value, list)]
             if known["identity"] != mine["identity"] or any(
                 mine[key][: len(known[key])] != known[key] for key in lists

@@ -130,16 +130,16 @@ class StepEstimate:
             progress: where the campaign is.
         """
         now, names = time.monotonic(), list[str](STEPS)
-        if self._running != (progress.phase, progress.told):
+        if self._running != (progress.phase, progress.experiments):
             first = 0
             if self._running is not None and self._running[0] in STEPS:
-                step, told = self._running
+                step, experiments = self._running
                 self._seconds[step] += now - self._since
-                self._work[step] += _work(told)
-                first = names.index(step) + 1 if told == progress.told else 0
+                self._work[step] += _work(experiments)
+                first = names.index(step) + 1 if experiments == progress.experiments else 0
             if progress.phase in STEPS:
                 self._passed |= set(names[first : names.index(progress.phase)])
-            self._running, self._since = (progress.phase, progress.told), now
+            self._running, self._since = (progress.phase, progress.experiments), now
         usual = sum(USUAL[step][1] * work for step, work in self._work.items())
         if usual <= 0.0:
             return None
@@ -155,23 +155,23 @@ class StepEstimate:
     def _seconds_ahead(self, progress: Progress, rates: dict[str, float], running: float) -> float:
         names = list[str](STEPS)
         seconds = 0.0
-        for told in range(1, self.experiments + 1):
-            last = told == self.experiments
+        for experiments in range(1, self.experiments + 1):
+            last = experiments == self.experiments
             steps = [name for name in names if not (last and name == "candidates")]
-            whole = sum(rates[step] for step in steps) * _work(told)
+            whole = sum(rates[step] for step in steps) * _work(experiments)
             seconds += whole * self.later
-            if told > progress.told:
+            if experiments > progress.experiments:
                 seconds += whole
-            elif told == progress.told and progress.phase in steps:
+            elif experiments == progress.experiments and progress.phase in steps:
                 after = steps[names.index(progress.phase) + 1 :]
-                seconds += max(0.0, rates[progress.phase] * _work(told) - running)
-                seconds += sum(rates[step] for step in after) * _work(told)
+                seconds += max(0.0, rates[progress.phase] * _work(experiments) - running)
+                seconds += sum(rates[step] for step in after) * _work(experiments)
         return seconds
 
 
-def _work(told: int) -> float:
+def _work(experiments: int) -> float:
     """How much there is to do after so many experiments, more or less."""
-    return 1.0 + told
+    return 1.0 + experiments
 
 
 def estimate(options: AnyOptions, experiments: int, later: int = 0) -> Remaining:

@@ -27,7 +27,7 @@ def status(book: Logbook, test: object) -> str:
     Raises:
         InvalidInput: a test of another campaign.
     """
-    number = book.known(test).number
+    number = book.own(test).number
     runs = _runs(book, number)
     if failed(book, number):
         return "failed"

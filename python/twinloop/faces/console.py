@@ -105,8 +105,8 @@ class Watch:
         self, progress: Progress, rate: float | None, remaining: float | None
     ) -> list[tuple[str, str]]:
         if progress.phase == "experiment":
-            return [("flying experiment", f"{progress.told + 1} of {self.experiments}")]
-        facts = [("experiments", f"{progress.told} of {self.experiments}")]
+            return [("flying experiment", f"{progress.experiments + 1} of {self.experiments}")]
+        facts = [("experiments", f"{progress.experiments} of {self.experiments}")]
         if progress.phase in STEPS:
             facts.append(
                 ("step", f"{progress.generation} of {progress.generations}, {USUAL[progress.phase][0]}")

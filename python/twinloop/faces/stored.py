@@ -20,7 +20,7 @@ from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
 from twinloop.faces.working import answers, check_answer, described, knows_nothing, patient, work
-from twinloop.store import Kept, kept, opened, shown_name
+from twinloop.store import Stored, listed, opened, shown_name
 from twinloop.systems import BUILT_IN, Quadrotor
 
 
@@ -109,7 +109,7 @@ def show(store: str, name: str | None, as_json: bool) -> None:
     _print({"store": facts, "result": result}, text, as_json)
 
 
-def _result(campaign: Campaign, held: Kept) -> dict[str, Any]:
+def _result(campaign: Campaign, held: Stored) -> dict[str, Any]:
     """What was learnt when the store was written last; `interrupted` where that is not all that was told."""
     result: dict[str, Any] = summary(campaign, _named(held), Stopwatch(campaign.threads).info())
     last = campaign.history[-1]
@@ -118,7 +118,7 @@ def _result(campaign: Campaign, held: Kept) -> dict[str, Any]:
     return result
 
 
-def _learnt(campaign: Campaign, held: Kept) -> str | None:
+def _learnt(campaign: Campaign, held: Stored) -> str | None:
     """How far learning is, where a person flies or not every flight is learnt; None: as the result says it."""
     learnt, told = len(campaign.history[-1].tests), len(campaign.experiments)
     if learnt < told:
@@ -129,12 +129,12 @@ def _learnt(campaign: Campaign, held: Kept) -> str | None:
 def _campaigns(store: str) -> list[dict[str, Any]]:
     source = opened(store, read_only=True)
     try:
-        return kept(source)
+        return listed(source)
     finally:
         source.close()
 
 
-def _system(held: Kept) -> Quadrotor:
+def _system(held: Stored) -> Quadrotor:
     """The system that a campaign flies, if it is a built-in one."""
     kind = None if held.system is None else held.system["kind"]
     if kind not in BUILT_IN:
@@ -146,7 +146,7 @@ def _system(held: Kept) -> Quadrotor:
     return BUILT_IN[kind].from_record(held.system)
 
 
-def _named(held: Kept) -> dict[str, object]:
+def _named(held: Stored) -> dict[str, object]:
     try:
         system = _system(held)
     except (NotAvailable, InvalidInput):
@@ -154,7 +154,7 @@ def _named(held: Kept) -> dict[str, object]:
     return described("quadrotor", system)
 
 
-def _facts(held: Kept, campaign: Campaign) -> dict[str, object]:
+def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
     return {
         "name": held.name,
         "created": held.created,

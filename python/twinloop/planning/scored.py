@@ -1,4 +1,4 @@
-"""Scores that were judged before: a search that was cut goes on from them."""
+"""Scores of an interrupted search: it continues from them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ Score = Callable[[Floats], Floats]
 
 @dataclass
 class Scored:
-    """Scores in the order in which they are asked for: first those that were kept, then those that are judged.
+    """Scores in the order of the calls: earlier ones are taken from the record, later ones are computed.
 
-    Searches are a function of their scores, and these are what takes time: searches that were cut go on from them.
+    A search depends only on its scores, and the scores take the time. So an interrupted search continues from them.
 
     Args:
-        kept: scores that were judged before, one array for each set of genes that was asked for.
-        keep: called with all of them whenever there is one more.
+        judged: scores of earlier calls, one array for each set of genes.
+        keep: called with all scores after each new one.
     """
 
-    kept: tuple[Floats, ...] = ()
-    keep: Callable[[tuple[Floats, ...]], None] = lambda kept: None
+    judged: tuple[Floats, ...] = ()
+    keep: Callable[[tuple[Floats, ...]], None] = lambda judged: None
     _given: int = field(default=0, init=False)
 
     def __call__(self, score: Score) -> Score:
@@ -31,10 +31,10 @@ class Scored:
 
         def remembered(genes: Floats) -> Floats:
             at, self._given = self._given, self._given + 1
-            # What is no score of these genes was kept of another search, and all behind it.
-            if at >= len(self.kept) or self.kept[at].shape != (len(genes), 2):
-                self.kept = (*self.kept[:at], score(genes))
-                self.keep(self.kept)
-            return self.kept[at]
+            # A score of another shape is from another search, and so are all later ones.
+            if at >= len(self.judged) or self.judged[at].shape != (len(genes), 2):
+                self.judged = (*self.judged[:at], score(genes))
+                self.keep(self.judged)
+            return self.judged[at]
 
         return remembered

@@ -2,21 +2,21 @@
 
 from twinloop.store.approvals import approve, approved
 from twinloop.store.database import Store, is_address, opened, shown_name
-from twinloop.store.keeper import Keeper, Kept, begun, found, kept
+from twinloop.store.keeper import Keeper, Stored, begun, found, listed
 from twinloop.store.watching import Doing, doing, state
 
 __all__ = [
     "Doing",
     "Keeper",
-    "Kept",
     "Store",
+    "Stored",
     "approve",
     "approved",
     "begun",
     "doing",
     "found",
     "is_address",
-    "kept",
+    "listed",
     "opened",
     "shown_name",
     "state",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Kept:
+class Stored:
     """What a store holds of one campaign.
 
     Args:
@@ -32,7 +32,7 @@ class Kept:
         experiments: that it will make in all, as was said last; None: nobody has said.
         created: when, in UTC.
         sessions: versions and processor each time it was opened to be written.
-        told: when each experiment was told, in UTC.
+        told_at: time of each `tell`, in UTC.
     """
 
     name: str
@@ -44,10 +44,10 @@ class Kept:
     experiments: int | None
     created: str
     sessions: tuple[Record, ...]
-    told: tuple[str, ...]
+    told_at: tuple[str, ...]
 
 
-def kept(store: Store) -> list[dict[str, Any]]:
+def listed(store: Store) -> list[dict[str, Any]]:
     """The campaigns of a store, in the order in which they were begun.
 
     Args:
@@ -75,7 +75,7 @@ def kept(store: Store) -> list[dict[str, Any]]:
         return [dict(row._mapping) for row in rows]
 
 
-def found(store: Store, name: str | None) -> Kept | None:
+def found(store: Store, name: str | None) -> Stored | None:
     """A campaign of a store.
 
     Args:
@@ -116,7 +116,7 @@ def found(store: Store, name: str | None) -> Kept | None:
                 " copy from before."
             )
     logbook = {name: [from_text(entry.record, what) for entry in found] for name, found in entries.items()}
-    return Kept(
+    return Stored(
         name=row.name,
         setup=from_text(row.setup, what),
         logbook={"kind": "logbook", "version": 1, "identity": row.identity, **logbook},
@@ -126,7 +126,7 @@ def found(store: Store, name: str | None) -> Kept | None:
         experiments=row.experiments,
         created=row.created,
         sessions=tuple({"started": s.started, **from_text(s.provenance, what)} for s in opened),
-        told=tuple(run.told for run in runs),
+        told_at=tuple(run.told for run in runs),
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from twinloop.campaign import Campaign
 from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput
-from twinloop.store import kept, opened
+from twinloop.store import listed, opened
 from twinloop.sweep.flying import Flown, begun, fly
 from twinloop.sweep.jobs import Job, system_of
 from twinloop.sweep.workers import HERE, finished, threads_on
@@ -57,10 +57,10 @@ def sweep(jobs: Sequence[Job], store: str | Path, cluster: str | Client = HERE) 
         StoreFailure: the store cannot be written.
     """
     threads = threads_on(cluster)
-    done = _kept(store)
+    done = _finished(store)
     todo = []
     for job in jobs:
-        known = _known(job, store) if job.name in done else None
+        known = _stored(job, store) if job.name in done else None
         if known is None:
             todo.append(job)
         else:
@@ -76,15 +76,15 @@ def sweep(jobs: Sequence[Job], store: str | Path, cluster: str | Client = HERE) 
             yield Outcome(job, campaign, None, flown.seconds)
 
 
-def _kept(store: str | Path) -> set[str]:
+def _finished(store: str | Path) -> set[str]:
     base = opened(store, create=True)
     try:
-        return {row["name"] for row in kept(base)}
+        return {row["name"] for row in listed(base)}
     finally:
         base.close()
 
 
-def _known(job: Job, store: str | Path) -> Campaign | None:
+def _stored(job: Job, store: str | Path) -> Campaign | None:
     """The campaign that the store holds, if it is finished; one that is not makes room for nothing and is refused."""
     asked = begun(job, system_of(job.system, job.seed), threads=1).setup.to_record()
     if look(store, job.name, read_only=True).setup != asked:

@@ -63,7 +63,7 @@ class Coevolution:
         self.report = report
         self.memory = Memory()
         self.learner = Learner(setup.signals, options, setup.seed, workers)
-        self._told = 0
+        self._experiments = 0
 
     def to_record(self) -> Record:
         """What is remembered, as plain values; an iteration that is running too."""
@@ -87,7 +87,7 @@ class Coevolution:
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
         """One iteration on all that was told since the last test was asked for."""
-        self._told = told = len(book.experiments)
+        self._experiments = told = len(book.experiments)
         latest = self.memory.latest
         if at_once and latest is not None:
             return
@@ -219,7 +219,7 @@ class Coevolution:
                 iteration=self.iteration,
                 generation=generation,
                 generations=generations,
-                told=self._told,
+                experiments=self._experiments,
                 tests=() if self.memory.latest is None else self.memory.latest.tests,
                 open_loop=tuple(best[::2]),
                 closed_loop=tuple(best[1::2]),

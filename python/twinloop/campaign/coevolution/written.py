@@ -23,7 +23,7 @@ class WrittenLearning(Recorded, kind="model_loop"):
 
     Args:
         models: population, archive and counters.
-        told: experiments that it learns.
+        experiments: number of experiments that it learns.
         iteration: that is running, or was the last.
         ahead: generations of it that are still to be run.
         capped_before: generations before it in which the non-dominated set was pruned.
@@ -31,14 +31,14 @@ class WrittenLearning(Recorded, kind="model_loop"):
     """
 
     models: ModelSnapshot
-    told: int
+    experiments: int
     iteration: int
     ahead: int
     capped_before: int
     finished: tuple[Iteration, ...]
 
-    VERSION = 2
-    RENAMED: ClassVar[Mapping[str, str]] = {"left": "ahead"}
+    VERSION = 3
+    RENAMED: ClassVar[Mapping[str, str]] = {"left": "ahead", "told": "experiments"}
 
     @staticmethod
     def of(learning: Learning) -> WrittenLearning:
@@ -62,12 +62,12 @@ class WrittenLearning(Recorded, kind="model_loop"):
         Raises:
             InvalidInput: it learnt other experiments than there are, or more generations are left than there were.
         """
-        learnt = book.first(self.told)
+        learnt = book.first(self.experiments)
         models = self.models.restored(learner.options, learner.signals, learner.workers)
         objectives = self.models.population_objectives.shape[1]
-        if objectives != 2 * self.told or not 0 <= self.ahead <= learner.options.model_generations:
+        if objectives != 2 * self.experiments or not 0 <= self.ahead <= learner.options.model_generations:
             raise InvalidInput(
-                f"Record model_loop: expected {2 * self.told} objectives and at most"
+                f"Record model_loop: expected {2 * self.experiments} objectives and at most"
                 f" {learner.options.model_generations} generations left, found {objectives} and {self.ahead}."
             )
         return Learning(

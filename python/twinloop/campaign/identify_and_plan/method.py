@@ -270,7 +270,7 @@ class IdentifyAndPlan:
                 iteration=max(1, self.iteration),
                 generation=STEPS.index(step) + 1,
                 generations=len(STEPS),
-                told=len(self._told),
+                experiments=len(self._told),
                 tests=() if lesson is None else lesson.tests,
                 open_loop=(),
                 closed_loop=() if lesson is None else lesson.closed_loop,

@@ -11,7 +11,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
 from twinloop.faces.telling import attach, numbered, tell, tell_failed
-from twinloop.store import Doing, approve, approved, doing, kept, opened, state
+from twinloop.store import Doing, approve, approved, doing, listed, opened, state
 
 LOST = 120.0
 """Seconds after which a writer that says nothing may have ended without a word: no step is silent for much longer."""
@@ -42,7 +42,7 @@ class Desk:
     def campaigns(self) -> list[dict[str, object]]:
         """Name, when begun, tests and experiments of each campaign."""
         with closing(opened(self.store, read_only=True)) as base:
-            return kept(base)
+            return listed(base)
 
     def look(self, name: str) -> Campaign:
         """A campaign to look at.
@@ -227,16 +227,16 @@ def in_words(seen: Doing) -> str:
         seen: in the store.
     """
     record = seen.record
-    told, experiments, left = record["told"], record["experiments"], record["left"]
+    done, experiments, remaining = record["told"], record["experiments"], record["left"]
     phase, step, steps = str(record["phase"]), record["generation"], record["generations"]
     if phase == "experiment":
-        said = f"flying experiment {told + 1} of {experiments}"
+        said = f"flying experiment {done + 1} of {experiments}"
     else:
         names = {"models": "evolving models", "tests": "evolving tests"}
         what, turn = (USUAL[phase][0], "step") if phase in USUAL else (names.get(phase, phase), "generation")
-        said = f"{what}, {turn} {step} of {steps}; experiments told: {told} of {experiments}"
-    if left is not None:
-        said += f"; about {duration(left)} left"
+        said = f"{what}, {turn} {step} of {steps}; experiments told: {done} of {experiments}"
+    if remaining is not None:
+        said += f"; about {duration(remaining)} left"
     if seen.silent > LOST:
         said += f"; nothing was heard of it for {duration(seen.silent)}, it may have ended without a word"
     return f"Working: {said}."

@@ -21,7 +21,7 @@ def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
         ["runs on the system", str(cost["runs"])],
         ["of these cut, failed", f"{cost['cut']}, {cost['failed']}"],
         ["flight that was recorded", f"{cost['seconds']:.4g} s"],
-        ["runs that left the envelope", str(cost["left"])],
+        ["runs that left the envelope", str(cost["left_envelope"])],
         [
             "most of the envelope that any used",
             f"{100.0 * cost['usage']:.3g} %" if cost["usage"] else "none declared",

@@ -14,7 +14,7 @@ from twinloop.campaign.keeping import as_typed, look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.working import knows_nothing
 from twinloop.records.reading import from_text
-from twinloop.store import Kept, is_address
+from twinloop.store import Stored, is_address
 
 LARGEST = 1 << 30
 """Bytes of a record that is read."""
@@ -98,10 +98,10 @@ def _of_store(where: str, name: str | None) -> Source:
     return Source(campaign, held.name, kind, sessions, _elapsed(held))
 
 
-def _elapsed(held: Kept) -> float | None:
-    if not held.told:
+def _elapsed(held: Stored) -> float | None:
+    if not held.told_at:
         return None
-    began, ended = (datetime.fromisoformat(when) for when in (held.created, held.told[-1]))
+    began, ended = (datetime.fromisoformat(when) for when in (held.created, held.told_at[-1]))
     return max(0.0, (ended - began).total_seconds())
 
 
