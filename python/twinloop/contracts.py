@@ -17,7 +17,7 @@ from twinloop.trajectory import check_recorded
 
 
 class ContractBroken(TwinloopError, AssertionError):
-    """A promise that a system or controller does not keep."""
+    """A requirement that a system or controller violates."""
 
 
 def check_system(
@@ -29,10 +29,10 @@ def check_system(
     target_state: Floats | None = None,
     steps: int = 20,
 ) -> None:
-    """Runs a short test on a system and checks what comes back.
+    """Runs a short test on a system and checks its result.
 
     Args:
-        system: what to check.
+        system: to check.
         controller: a family to fly; by default the system's own.
         gains: by name; by default the system's own.
         initial_state: (n_x,), SI units, radians; by default the system's own, or zeros.
@@ -40,8 +40,8 @@ def check_system(
         steps: length of the test.
 
     Raises:
-        ContractBroken: a promise that is not kept, with what was found.
-        InvalidInput: a trajectory that cannot be learnt from.
+        ContractBroken: a requirement that is violated, with the value that was found.
+        InvalidInput: a trajectory that cannot be learnt.
     """
     signals = system.signals
     _promise(isinstance(signals, Signals), f"signals to be twinloop.Signals, found {type(signals).__name__}")
@@ -75,15 +75,15 @@ def check_system(
 
 
 def check_controller(family: UnboundFamily, signals: Signals, seed: int = 0) -> None:
-    """Draws controllers of a family and checks that they are bounded, repeatable and forget when told to.
+    """Draws controllers of a family and checks that they are bounded and repeatable, and that `reset` works.
 
     Args:
-        family: what to check.
-        signals: what to bind it to.
+        family: to check.
+        signals: for the family.
         seed: of the drawn gains and states.
 
     Raises:
-        ContractBroken: a promise that is not kept, with what was found.
+        ContractBroken: a requirement that is violated, with the value that was found.
     """
     bound = family.bind(signals)
     low = np.array([gain.low for gain in bound.gains])

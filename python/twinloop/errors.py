@@ -8,10 +8,10 @@ from contextlib import contextmanager
 
 
 class TwinloopError(Exception):
-    """Everything that Twinloop raises on purpose.
+    """Base of all errors of Twinloop.
 
     Args:
-        sentence: what was expected, what was found, what to do; it is told in one line.
+        sentence: what was expected, what was found, what to do; in one line.
     """
 
     def __init__(self, sentence: str) -> None:
@@ -19,36 +19,36 @@ class TwinloopError(Exception):
 
 
 class InvalidInput(TwinloopError, ValueError):
-    """Something that was passed in cannot be used; nothing was changed by the call."""
+    """An argument cannot be used; the call has changed nothing."""
 
 
 class SystemFailure(TwinloopError, RuntimeError):
-    """The system under test raised, or answered with something that is no next state."""
+    """The system under test raised an exception, or returned something that is no next state."""
 
 
 class NoAnswer(SystemFailure):
-    """The system has not answered a test that still waits for it: what hangs, or a log that is not there yet."""
+    """The system has not answered a test: it hangs, or a log is not there yet; the test still waits."""
 
 
 class TooRisky(TwinloopError, RuntimeError):
-    """A test that was asked for is riskier than what was allowed; it waits and was not flown."""
+    """A test is riskier than allowed; it was not flown and still waits."""
 
 
 class StoreFailure(TwinloopError, RuntimeError):
-    """A store cannot be read or written now; what it held before it holds still."""
+    """A store cannot be read or written now; its contents are unchanged."""
 
 
 class NotAvailable(TwinloopError, RuntimeError):
-    """What was asked for does not exist yet, or not in this installation."""
+    """The requested value does not exist yet, or not in this installation."""
 
 
 class RemarkWarning(UserWarning):
-    """A serious remark on data or a twin: look into it before you use the result. `twin.remarks` has it as a value."""
+    """A serious remark on data or a twin: check it before you use the result. `twin.remarks` has it as a value."""
 
 
 @contextmanager
 def at(where: str) -> Iterator[None]:
-    """Refusals of what stands somewhere, told with its place.
+    """Adds the place to the errors of a block, such as a file and its section.
 
     Args:
         where: such as a file and its section.

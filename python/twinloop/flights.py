@@ -32,13 +32,14 @@ def candidates(
     Args:
         family: of the controllers.
         genes: gains (K, size), in their units.
-        initial_states: where each starts (K, n_x), or where all start (n_x,), SI units, radians.
-        target_states: where each should end (K, n_x), or all (n_x,), the same units; or a row for each state of each
+        initial_states: of each flight (K, n_x), or of all (n_x,), SI units, radians.
+        target_states: of each flight (K, n_x), or of all (n_x,), the same units; or a row for each state of each
             flight (K, n + 1, n_x).
         steps: number of commands of each, n.
-        excitation: what is added to the commands of each (K, n, n_u), in their units; None: nothing.
-        hold_back: what holds the excitation of all of them back while they fly; None: nothing does.
-        limits: where a flight counts as diverged; None: at ten times a state's scale.
+        excitation: signal that is added to the commands of each flight (K, n, n_u), in their units; None: no
+            excitation.
+        hold_back: holds the excitation of all flights back; None: it is not held back.
+        limits: magnitudes at which a flight has diverged; None: ten times each state's scale.
 
     Returns:
         The engine's flights.
@@ -61,12 +62,12 @@ def candidates(
 
 
 def quality(kind: str, weights: ArrayLike, *, effort: float = 0.0, effort_rate: float = 0.0) -> _core.Quality:
-    """What a flight is judged by, to be minimised: the error that is left, plus what commands cost.
+    """The quality of a flight, to be minimised: its error plus the cost of its commands.
 
     Args:
         kind: "iae", Σ_k dt Σ_i w_i |x_i(k + 1) − target_i|; "ise", the same with squares;
             "final_distance", √(Σ_i w_i (x_i(n) − target_i)²).
-        weights: how much each state counts, w (n_x,), at least 0.
+        weights: of each state, w (n_x,), at least 0.
         effort: factor of Σ_k dt Σ_j (u_j / scale_j)², at least 0.
         effort_rate: factor of Σ_k Σ_j ((u_j(k) − u_j(k − 1)) / scale_j)² / dt from the second command on.
 
@@ -98,19 +99,17 @@ def qualities(
     Args:
         dynamics: m members of a committee; or a built-in plant, for oracles (m = 1).
         flights: K candidates.
-        measure: what they are judged by.
+        measure: their quality.
         signals: of the system, with its envelope.
-        noise: D draws of what the sensors add to each state (D, n + 1, n_x), in the units of the states;
-            None: perfect sensors.
-        offsets: D draws of what is added to the initial state (D, n_x); None: nothing.
-        measured: whether qualities are those of the readings, as a record of the flight will give them, or of the
-            true states.
-        workers: how the work is carried out; one thread by default.
+        noise: D draws of the sensor noise (D, n + 1, n_x), in the units of the states; None: perfect sensors.
+        offsets: D draws of a change of the initial state (D, n_x); None: no change.
+        measured: whether qualities are of the readings, as in a record of the flight, or of the true states.
+        workers: threads of the engine; one by default.
 
     Returns:
-        Qualities (m, max(D, 1), K), and usages of the envelope in the same shape: the largest
-        |x − middle| / half-width over the true states, the first included, that have an envelope, 0 if none
-        has; both infinite where the flight diverged.
+        Qualities (m, max(D, 1), K), and usages of the envelope in the same shape: the largest |x − middle| /
+        half-width over the true states with an envelope, the first state included; 0 without an envelope. Both are
+        infinite if the flight diverged.
 
     Raises:
         InvalidInput: members, weights or draws that do not fit the flights.
@@ -131,24 +130,24 @@ def disagreements(
     cap: float = 100.0,
     workers: _core.Workers | None = None,
 ) -> tuple[Floats, Integers]:
-    """How far apart the members of a committee predict each flight, and where most.
+    """The disagreement of a committee on each flight, and where it is largest.
 
-    The value is log det(I + D Dᵀ): row m of D is member m's noise-free trajectory minus the members' mean,
-    each entry divided by the sd of its state and winsorised. It is summed over all steps and states and not
-    divided by their number: where readings carry independent noise of these sds, it grows with what a flight
-    tells about which member is right. A member that diverges stays where it last was within the limits.
+    The value is log det(I + D Dᵀ): row m of D is member m's noise-free trajectory minus the members' mean, each entry
+    divided by the sd of its state and winsorised. It is summed over all steps and states and not divided by their
+    number: if readings carry independent noise of these sds, it grows with the information of a flight about which
+    member is right. A member that diverges keeps its last state within the limits.
 
     Args:
         models: m members.
         flights: K candidates.
-        sds: what counts as a difference in each state (n_x,), such as the sensors' noise, in its unit.
-        cap: sds that a deviation from the mean counts at most.
-        workers: how the work is carried out; one thread by default.
+        sds: unit of the differences in each state (n_x,), such as the standard deviation of its sensor, in its unit.
+        cap: largest deviation from the mean that counts, in sds.
+        workers: threads of the engine; one by default.
 
     Returns:
-        Values (K,), to be maximised, 0 where all agree; and (K, 4): row of the states from 1 to n and state
-        where two members are the most sds apart, the member that predicts the largest value there and the one
-        that predicts the smallest; zeros where no two ever differ.
+        Values (K,), to be maximised, 0 if all members agree; and (K, 4): the row (1 to n) and the state with the
+        largest difference of two members in sds, the member with the largest value there and the member with the
+        smallest; zeros if no two members differ.
 
     Raises:
         InvalidInput: no models, models for other signals, or sds that are not above 0.

@@ -20,17 +20,17 @@ BEGINS, ENDS = 0.4, 0.6
 
 @dataclass(frozen=True, eq=False)
 class HoldBack(Recorded, kind="hold_back"):
-    """How much of an excitation is sent in a period, by the reading before it.
+    """The share of an excitation that is sent in a period, from the reading before it.
 
-    All of it while every state is within its inner range, nothing once one is at an end of its outer range or beyond,
-    and in between in proportion to what is left; the state with the least decides.
+    The share is 1 while every state is within its inner range. It is 0 once a state has reached an end of its outer
+    range. In between it is linear; the smallest share of all states counts.
 
     Args:
         full: inner range of each state (n_x, 2), in its unit.
-        none: outer range of each state (n_x, 2), likewise; infinite in both where a state holds nothing back.
+        none: outer range of each state (n_x, 2), likewise; infinite in both if a state does not count.
 
     Raises:
-        InvalidInput: other shapes, or an inner range that does not lie within the outer one.
+        InvalidInput: other shapes, or an inner range that is not within the outer one.
     """
 
     full: Floats
@@ -51,10 +51,10 @@ class HoldBack(Recorded, kind="hold_back"):
         return _core.HoldBack(self.full, self.none)
 
     def ranges(self, signals: Signals) -> dict[str, dict[str, list[float | None]]]:
-        """Inner range ("full") and outer range ("none") of each state that holds anything back, for a sheet.
+        """Inner range ("full") and outer range ("none") of each state that counts, for a test sheet.
 
         Args:
-            signals: that it is for.
+            signals: of the system.
 
         Returns:
             By the state's name, low and high end in its unit; None for an end that is open.
@@ -67,18 +67,18 @@ class HoldBack(Recorded, kind="hold_back"):
 
     @classmethod
     def between(cls, signals: Signals, initial_state: ArrayLike, target_state: ArrayLike) -> HoldBack | None:
-        """What keeps an excitation out of the margins of the envelope that its task does not need.
+        """Keeps an excitation away from the ends of the envelope.
 
         The room of a state, on each side, reaches from the farthest point of its task (the start and all targets) to
-        the end of its envelope. An excitation is held back from 0.4 of that room on, and is nothing at 0.6.
+        the end of its envelope. An excitation is held back from 0.4 of that room on, and is zero at 0.6.
 
         Args:
-            signals: of the system; a state without an envelope, or one that is periodic, holds nothing back.
-            initial_state: where the flight starts (n_x,), SI units, radians.
-            target_state: where it leads (n_x,), or a row for each state (n + 1, n_x), the same units.
+            signals: of the system; a periodic state, or one without an envelope, does not count.
+            initial_state: of the flight (n_x,), SI units, radians.
+            target_state: of the flight (n_x,), or a row for each state (n + 1, n_x), the same units.
 
         Returns:
-            What holds it back; None where no state does.
+            The ranges; None if no state counts.
         """
         points = np.vstack([np.atleast_2d(initial_state), np.atleast_2d(target_state)])
         full = np.tile([-np.inf, np.inf], (signals.n_x, 1))

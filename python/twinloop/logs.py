@@ -37,32 +37,32 @@ def load(
 ) -> Trajectory:
     """A recorded flight from a file.
 
-    A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order; other columns
-    are left out, and the commands of the last row may be empty. A file of NumPy (`.npz`) has arrays `t` (n + 1,),
-    `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), the last row of which counts for nothing.
+    A CSV file has a header with `t` (s), the names of the states and those of the commands, in any order; other
+    columns are ignored, and the commands of the last row may be empty. A file of NumPy (`.npz`) has arrays `t` (n +
+    1,), `states` (n + 1, n_x) and `commands` (n, n_u) or (n + 1, n_u), whose last row is ignored.
 
-    A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with times of its own. They are brought onto the
-    period of the signals: states are interpolated between the samples beside each time, commands are those sent last.
-    Where two samples are more than two periods apart the log is refused. Of a topic with a quaternion `q` the angles
-    "roll", "pitch" and "yaw" can be named, too.
+    A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with its own times. They are resampled to the
+    period of the signals: states are interpolated between two samples, and each command is the last one sent. If two
+    samples are more than two periods apart, the log is refused. A topic with a quaternion `q` also has the angles
+    "roll", "pitch" and "yaw".
 
     Args:
         path: of the file.
         signals: names of the columns, and the order of states and commands.
         ended: "completed", "aborted" or "diverged".
         reason: why it did not complete.
-        name: what messages call it; None: its path.
+        name: of the log in messages; None: its path.
         columns: of a `.ulg` the field of each state and command, such as {"roll": "vehicle_attitude.roll", "motor":
             "actuator_outputs/1.output[0]"}, in the units of the signals.
-        start: of a `.ulg`, s after its beginning; None: as soon as all fields are there.
-        stop: of a `.ulg`, s after its beginning; None: as long as all fields are there.
+        start: of a `.ulg`, s after its beginning; None: when all fields have begun.
+        stop: of a `.ulg`, s after its beginning; None: when the first field ends.
 
     Returns:
         The flight.
 
     Raises:
-        InvalidInput: no such file, a column or field that is missing, something that is no number, or samples of a
-            `.ulg` that are too far apart.
+        InvalidInput: no such file, a missing column or field, a value that is no number, or samples of a `.ulg` that
+            are too far apart.
         NotAvailable: a `.ulg` without the package pyulog.
     """
     t, states, commands = read_log(path, signals, name, columns, Window(start, stop))
@@ -81,7 +81,7 @@ def read_log(
     Args:
         path: of the file.
         signals: names of the columns, and the order of states and commands.
-        name: what messages call it; None: its path.
+        name: of the log in messages; None: its path.
         columns: of a `.ulg` the field of each state and command.
         window: of a `.ulg`, the part that is meant.
 

@@ -21,12 +21,12 @@ from twinloop.trajectory import Trajectory
 def selected_tests(
     tests: Sequence[Test], trajectories: Sequence[Trajectory], limits: Limits | None = None
 ) -> _core.SelectedTests:
-    """Tests and what the system answered, as the engine judges models on them.
+    """Tests with their measured runs, as the engine judges models on them.
 
     Args:
         tests: at least one, all of one family.
         trajectories: one for each test.
-        limits: where a run counts as diverged; None: at ten times a state's scale.
+        limits: magnitudes at which a run has diverged; None: ten times each state's scale.
 
     Returns:
         The engine's set of selected tests.
@@ -55,13 +55,13 @@ def open_loop(
 ) -> Floats:
     """One-step-ahead error: mean squared error of M(ω_t, η_t) against η_{t+1} (paper, section IV.B).
 
-    A model with lags, delays or hidden states is told the recorded commands of each test from its beginning, in the
-    order of time, and predicts from each recorded state with the memory that these leave.
+    The memory of a model with lags, delays or hidden states follows the recorded commands of each test from its
+    beginning. The model predicts from each recorded state with that memory.
 
     Args:
         models: m of them.
         selected: N tests with their trajectories.
-        workers: how the work is carried out; one thread by default.
+        workers: threads of the engine; one by default.
 
     Returns:
         Errors (m, N), SI units squared, mean over steps and components; infinite where a prediction is not finite.
@@ -81,11 +81,11 @@ def closed_loop(
     Args:
         models: m of them.
         selected: N tests with their trajectories.
-        workers: how the work is carried out; one thread by default.
+        workers: threads of the engine; one by default.
 
     Returns:
         Errors (m, N), SI units squared, mean over the n predicted states and all components; infinite for a run that
-        diverged, which `lasted` tells more of. Only the ranking of the paper's model loop puts a number in its place.
+        diverged; `lasted` gives its length. Only the ranking of the paper's model loop uses a finite number instead.
 
     Raises:
         InvalidInput: models for other signals.
@@ -97,15 +97,15 @@ def closed_loop(
 def lasted(
     models: Sequence[_core.Model], selected: _core.SelectedTests, workers: _core.Workers | None = None
 ) -> Integers:
-    """Steps that free runs with the controller in the loop last before they diverge.
+    """Number of steps of free runs with the controller in the loop, before they diverge.
 
     Args:
         models: m of them.
         selected: N tests with their trajectories.
-        workers: how the work is carried out; one thread by default.
+        workers: threads of the engine; one by default.
 
     Returns:
-        Steps (m, N); as many as were recorded of the test where the run does not diverge.
+        Steps (m, N); all recorded steps of the test if the run does not diverge.
 
     Raises:
         InvalidInput: models for other signals.
@@ -122,14 +122,14 @@ def k_step(
 ) -> Floats:
     """Error k steps ahead: of free runs of k steps from every recorded state, under the recorded commands.
 
-    Between the one-step error, which hardly sees what builds up, and the free run, which after a while sees nothing
-    else. Lags, delays and hidden states begin each run with the memory of what was commanded before it.
+    It lies between the one-step error, which hardly shows accumulated errors, and the free run, which after a while
+    shows nothing else. Lags, delays and hidden states start each run with the memory of the earlier commands.
 
     Args:
         models: m of them.
         selected: N tests with their trajectories.
         steps: k, from 1, which gives `open_loop`, to the steps of the shortest test.
-        workers: how the work is carried out; one thread by default.
+        workers: threads of the engine; one by default.
 
     Returns:
         Errors (m, N), SI units squared, mean over the n + 1 − k predictions and all components; infinite where a
@@ -147,7 +147,7 @@ def frozen_error(trajectory: Trajectory, signals: Signals | None = None) -> floa
 
     Args:
         trajectory: a recorded run of at least one step.
-        signals: of the system; None where no state is periodic.
+        signals: of the system; None if no state is periodic.
 
     Returns:
         Mean square of states 1 to n minus state 0, over steps and components, SI units squared.
@@ -193,8 +193,8 @@ def final_distances(
         family: of the controllers.
         genes: gains of k tests (k, size), in their units.
         task: start, target and length of all of them.
-        limits: where a run counts as diverged; None: at ten times a state's scale.
-        workers: how the work is carried out; one thread by default.
+        limits: magnitudes at which a run has diverged; None: ten times each state's scale.
+        workers: threads of the engine; one by default.
 
     Returns:
         Distances (m, k); infinite where the run diverged.
@@ -213,10 +213,10 @@ def discrimination(distances: ArrayLike, cap: float) -> Floats:
 
     Args:
         distances: (models, tests), infinite where a run diverged.
-        cap: what a distance counts at most.
+        cap: largest distance that counts.
 
     Returns:
-        One objective a test (tests,), to be minimised.
+        One objective per test (tests,), to be minimised.
 
     Raises:
         InvalidInput: not a matrix, or a cap that is not above 0.
@@ -230,10 +230,10 @@ def instability(distances: ArrayLike, cap: float) -> Floats:
 
     Args:
         distances: (mutants, tests), infinite where a run diverged.
-        cap: what a distance counts at most; a mutant at the cap counts as its square.
+        cap: largest distance that counts; a mutant at the cap counts as its square.
 
     Returns:
-        One objective a test (tests,), to be minimised.
+        One objective per test (tests,), to be minimised.
 
     Raises:
         InvalidInput: not a matrix, or a cap that is not above 0.

@@ -12,7 +12,7 @@ Archive = _core.Archive
 
 
 def ranks(objectives: ArrayLike) -> Integers:
-    """Front of each row: 0 for those that nothing dominates, 1 for those that only they dominate, and so on.
+    """Front of each row: 0 for rows that no row dominates, 1 for rows that only front 0 dominates, and so on.
 
     Args:
         objectives: (rows, columns), minimised.
@@ -21,7 +21,7 @@ def ranks(objectives: ArrayLike) -> Integers:
         Ranks (rows,).
 
     Raises:
-        InvalidInput: not a matrix, or a number in it that is not finite.
+        InvalidInput: not a matrix, or numbers that are not finite.
     """
     with engine_input():
         return _core.ranks(_matrix(objectives))

@@ -18,8 +18,8 @@ class Remark(Recorded, kind="remark"):
     """What a person should know.
 
     Args:
-        code: what it is about, in a word or two that do not change, such as "does-not-follow".
-        severity: "note", or "serious": do not use the result before you have looked into this.
+        code: a fixed word or two, such as "does-not-follow".
+        severity: "note", or "serious": check this before you use the result.
         sentence: the same for a person.
 
     Raises:
@@ -40,7 +40,7 @@ class Remark(Recorded, kind="remark"):
 
     @property
     def serious(self) -> bool:
-        """Whether a result should not be used before this was looked into."""
+        """Whether this must be checked before the result is used."""
         return self.severity == "serious"
 
     def __str__(self) -> str:

@@ -11,12 +11,12 @@ from twinloop.signals import Signals
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """Commands that are sent whatever the states do, without a controller.
+    """Recorded commands, sent without a controller.
 
     Args:
         signals: of the system.
-        initial_state: where the run starts (n_x,), SI units, radians.
-        commands: at least one row (n, n_u), in their units, each held for a period and sent as it is.
+        initial_state: of the run (n_x,), SI units, radians.
+        commands: at least one row (n, n_u), in their units, each held for a period and not clipped.
 
     Raises:
         InvalidInput: shapes that do not fit the signals, or numbers that are not finite.

@@ -26,13 +26,13 @@ class State(Recorded, kind="state"):
     Args:
         name: a Python identifier; it appears in equations and tables.
         unit: SI, radians for angles.
-        scale: its usual size, in its unit; a run that leaves ten times this counts as diverged.
-        derivative_of: the state whose derivative in time this one is, where that is known.
-        envelope: smallest and largest value that the system may safely take, in its unit.
-        noise: standard deviation of its sensor, in its unit, where that is known; the preset `default` begins its own
-            estimate there and says where the two are far apart.
-        periodic: whether it is an angle that wraps: True where it is in rad, or its period in its unit, such as 360.0.
-            Errors and differences then take the short way, and a model sees it within half a period of 0.
+        scale: its usual size, in its unit; a run that leaves ten times this has diverged.
+        derivative_of: name of the state whose time derivative this state is, if there is one.
+        envelope: smallest and largest safe value, in its unit.
+        noise: standard deviation of its sensor, in its unit, if it is known; the preset `default` starts its own
+            estimate there, and a remark says if the two differ much.
+        periodic: whether it is an angle that wraps: True for an angle in rad, or its period in its unit, such as
+            360.0. Errors and differences then take the short way, and a model sees it within half a period of 0.
 
     Raises:
         InvalidInput: a name, unit, scale, envelope, noise or period that cannot be used.
@@ -64,7 +64,7 @@ class State(Recorded, kind="state"):
 
     @property
     def period(self) -> float | None:
-        """What can be added without changing what it stands for, in its unit; None where nothing can."""
+        """Period of an angle that wraps, in its unit; None otherwise."""
         return (
             (2.0 * math.pi if self.periodic else None) if isinstance(self.periodic, bool) else self.periodic
         )
@@ -76,10 +76,10 @@ class Command(Recorded, kind="command"):
 
     Args:
         name: a Python identifier; it appears in equations and tables.
-        unit: SI. Commands of one unit and the same bounds are taken for alike, such as rotors: they share an actuator's
-            lag and delay. Call the units of unlike ones differently, "pump" and "heater" instead of "1" and "1".
+        unit: SI. Commands with the same unit and bounds count as alike, such as rotors: they share an actuator's lag
+            and delay. Give commands that are not alike different units, "pump" and "heater" instead of "1" and "1".
         bounds: smallest and largest value that is ever sent, in its unit.
-        scale: what a model sees as 1, in its unit; by default the larger magnitude of the two bounds.
+        scale: value that is 1 for a model, in its unit; by default the larger magnitude of the two bounds.
 
     Raises:
         InvalidInput: a name, unit, bounds or scale that cannot be used.
@@ -99,14 +99,14 @@ class Command(Recorded, kind="command"):
 
     @property
     def size(self) -> float:
-        """What a model sees as 1, in the command's unit."""
+        """The value that is 1 for a model, in the command's unit."""
         assert self.scale is not None  # __post_init__ has set it
         return self.scale
 
 
 @dataclass(frozen=True)
 class RigidBody(Recorded, kind="rigid_body"):
-    """A prior: three angles of a rigid body are turned by its three body rates.
+    """A prior: the three body rates of a rigid body turn its three angles.
 
     Args:
         angles: names of roll, pitch and yaw, in rad, turned about z, then y, then x.
@@ -137,10 +137,11 @@ class Signals(Recorded, kind="signals"):
         states: n_x of them, in the order of a state vector.
         commands: n_u of them, in the order of a command vector.
         dt: period, s; a command is held for one period.
-        kinematics: which states are angles and body rates of a rigid body, if any are.
+        kinematics: which states are angles and body rates of a rigid body, if there are any.
 
     Raises:
-        InvalidInput: none of a kind, a name used twice, or a `derivative_of` or `kinematics` that make no sense.
+        InvalidInput: no states or no commands, a name used twice, or a `derivative_of` or `kinematics` that do not
+            fit.
     """
 
     states: Sequence[State]
@@ -213,7 +214,7 @@ class Signals(Recorded, kind="signals"):
 
     @cached_property
     def driven(self) -> tuple[int, ...]:
-        """States that no other states say the motion of: all but integrals of another and angles of a rigid body."""
+        """States whose motion is learnt: all except integrals of other states and angles of a rigid body."""
         given = {state.derivative_of for state in self.states}
         if self.kinematics is not None:
             given |= set(self.kinematics.angles)
@@ -225,7 +226,7 @@ class Signals(Recorded, kind="signals"):
         return [(i, state.period) for i, state in enumerate(self.states) if state.period is not None]
 
     def difference(self, a: ArrayLike, b: ArrayLike) -> Floats:
-        """The difference a − b, the short way where a state is periodic: at most half its period in either direction.
+        """The difference a − b; for a periodic state the short way, at most half a period in either direction.
 
         Args:
             a: states (…, n_x), in their units.
@@ -240,10 +241,10 @@ class Signals(Recorded, kind="signals"):
         return difference
 
     def wrapped(self, states: ArrayLike) -> Floats:
-        """States with the periodic ones within half a period of 0: what a model sees.
+        """States as a model sees them, the periodic ones within half a period of 0.
 
         Args:
-            states: (…, n_x), in their units; more columns are left as they are.
+            states: (…, n_x), in their units; further columns stay as they are.
 
         Returns:
             A copy.
@@ -254,7 +255,7 @@ class Signals(Recorded, kind="signals"):
         return wrapped
 
     def continued(self, states: Floats, start: Floats) -> Floats:
-        """Rows of readings with the periodic states going on from row to row by the short way.
+        """Rows of readings with continuous periodic states: from row to row they take the short way.
 
         Args:
             states: (rows, n_x), in their units.
@@ -275,7 +276,7 @@ class Signals(Recorded, kind="signals"):
 
     @property
     def substeps(self) -> int:
-        """Runge-Kutta steps in which a model integrates a rigid body over a period, as the scales of its rates need."""
+        """Runge-Kutta steps per period of a rigid body, as the scales of its rates require."""
         return self.engine.substeps
 
     @cached_property

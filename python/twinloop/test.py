@@ -25,23 +25,23 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
     """One candidate experiment; run it with `system.run(test)`, or by hand with `test.controller()`.
 
     Args:
-        family: what its controller is one of.
+        family: of its controller.
         genes: gains of the controller (size,), in their units.
-        initial_state: state to start from (n_x,), SI units, radians.
-        target_state: state to lead to (n_x,), the same units; or a row for each state of the run (n + 1, n_x), a
+        initial_state: where the run starts (n_x,), SI units, radians.
+        target_state: where it should end (n_x,), the same units; or a row for each state of the run (n + 1, n_x), a
             reference that varies with time.
         steps: number of commands, n.
-        excitation: what is added to the controller's commands (n, n_u), in their units; the sum is clipped to
-            the commands' bounds. None: nothing.
+        excitation: signal that is added to the controller's commands (n, n_u), in their units; the sum is clipped to
+            the commands' bounds. None: no excitation.
         number: its number in the campaign, from 0.
         campaign: identity of the campaign that it belongs to; empty if none.
-        predicted: quality that the twin predicts, where it was asked (with the preset "paper" the final distance);
-            infinite if it diverges.
-        measured: quality that was flown, mean over complete runs; None if there was none.
-        spread: standard deviation that the measured quality is expected to have; None where nothing was predicted.
-        risk: probability that the flight leaves the envelope, by the committee; None where there was none.
-        reason: why this test, for a person.
-        hold_back: what holds the excitation back while it flies; None: nothing does.
+        predicted: predicted quality (with the preset "paper" the final distance); infinite if the twin diverges; None
+            without a prediction.
+        measured: flown quality, mean over complete runs; None if there are none.
+        spread: expected standard deviation of the measured quality; None without a prediction.
+        risk: probability that the flight leaves the envelope, by the committee; None without a committee.
+        reason: why this test was chosen, as a sentence.
+        hold_back: holds the excitation back during the flight; None: it is not held back.
 
     Raises:
         InvalidInput: shapes that do not fit the family's signals, or numbers that are not finite.
@@ -81,7 +81,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
 
     @property
     def signals(self) -> Signals:
-        """Of the system that it is for."""
+        """Signals of the system."""
         return self.family.signals
 
     @property
@@ -95,7 +95,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
         return _core.Task(self.initial_state, self.target_state, self.steps)
 
     def target(self, k: int) -> Floats:
-        """The state to lead to at time k dt (n_x,), k from 0 to n: what a loop passes to its controller.
+        """The target state at time k dt (n_x,), k from 0 to n; a loop passes it to its controller.
 
         Args:
             k: number of the period.
@@ -103,15 +103,15 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
         return self.target_state if self.target_state.ndim == 1 else self.target_state[k]
 
     def controller(self) -> Controller:
-        """A fresh controller for one run: `.command(state, target)` once a period, the excitation in it."""
+        """A new controller for one run, with the excitation: `.command(state, target)` once per period."""
         return self.family.controller(self.genes, self.excitation, self.hold_back)
 
     def judged(self, predicted: float | None, measured: float | None) -> Test:
         """The same test with its quality.
 
         Args:
-            predicted: what the twin predicts.
-            measured: what was flown.
+            predicted: quality that the twin predicts.
+            measured: flown quality.
 
         Returns:
             A copy under the same number.
@@ -119,14 +119,14 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
         return dataclasses.replace(self, predicted=predicted, measured=measured)
 
     def quiet(self) -> Test:
-        """The same test without its excitation: what is flown once nothing is to be learnt any more."""
+        """The same test without its excitation."""
         return dataclasses.replace(self, excitation=None, hold_back=None)
 
     def explained(self, spread: float, risk: float, reason: str) -> Test:
-        """The same test with what a committee says of it.
+        """The same test with the predictions of a committee.
 
         Args:
-            spread: standard deviation that the measured quality is expected to have.
+            spread: expected standard deviation of the measured quality.
             risk: probability that the flight leaves the envelope.
             reason: why this test.
 
@@ -136,7 +136,7 @@ class Test(Shown, Recorded, kind="test", given=("family",)):
         return dataclasses.replace(self, spread=spread, risk=risk, reason=reason)
 
     def same_as(self, other: Test) -> bool:
-        """Whether both stand for the same experiment of the same campaign."""
+        """Whether both are the same experiment of the same campaign."""
         return (
             (self.campaign, self.number, self.steps) == (other.campaign, other.number, other.steps)
             and self.genes.tobytes() == other.genes.tobytes()

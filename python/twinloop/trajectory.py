@@ -28,8 +28,8 @@ class Trajectory(Shown, Recorded, kind="trajectory"):
         commands: commands as sent (n, n_u), in their units.
         ended: "completed", "aborted" or "diverged".
         reason: why it did not complete, in a few words.
-        true_states: states without sensor noise (n + 1, n_x), where an oracle knows them; never learnt from.
-        band: lower and upper end, between which nine of ten readings are expected (2, n + 1, n_x), where a committee
+        true_states: states without sensor noise (n + 1, n_x), if a simulator has them; learning never uses them.
+        band: lower and upper limit, between which nine of ten readings are expected (2, n + 1, n_x), if a committee
             predicted the run.
 
     Raises:

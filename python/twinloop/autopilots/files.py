@@ -87,11 +87,11 @@ FORMATS = {
 
 @dataclass(frozen=True)
 class Autopilot:
-    """What holds the gains of a system: which parameters stand for them, and in which file it reads them.
+    """An autopilot: its parameters for the gains of a controller, and its file format.
 
     Args:
         kind: "px4", "px4-shell", "ardupilot", "betaflight", "ros2" or "json".
-        parameters: of each gain by its name; None for a gain that the autopilot has not got, and that is 0.
+        parameters: of each gain by its name; None for a gain of 0 that the autopilot does not have.
         node: of ROS 2.
 
     Raises:
@@ -123,11 +123,11 @@ class Autopilot:
 
     @property
     def suffix(self) -> str:
-        """Of its files."""
+        """Suffix of its files."""
         return FORMATS[self.kind].suffix
 
     def values(self, gains: Mapping[str, float]) -> dict[str, Value]:
-        """Parameters by name, as the file will hold them.
+        """Parameters by name, as in the file.
 
         Args:
             gains: all of a controller, by name, in their units.
@@ -142,7 +142,7 @@ class Autopilot:
 
         Args:
             gains: all of a controller, by name, in their units.
-            heading: what it is, for a person; one line.
+            heading: a comment of one line.
 
         Raises:
             InvalidInput: as for `values`.

@@ -15,13 +15,13 @@ Value = float | int
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter that stands for a gain: scale times the gain, plus the offset.
+    """The parameter of a gain: scale times the gain, plus the offset.
 
     Args:
-        name: of the parameter, as the autopilot calls it.
-        scale: what the gain is multiplied with, in units of the parameter for one of the gain.
-        offset: what is added then, in units of the parameter.
-        limits: smallest and largest value of the parameter; None: none are known.
+        name: of the parameter in the autopilot.
+        scale: factor on the gain, in units of the parameter per unit of the gain.
+        offset: in units of the parameter.
+        limits: smallest and largest value of the parameter; None: no limits.
         whole: whether the parameter is a whole number; then the value is rounded.
 
     Raises:
@@ -51,7 +51,7 @@ class Parameter:
             )
 
     def value(self, gain: str, given: float) -> Value:
-        """What the parameter is set to.
+        """The value of the parameter.
 
         Args:
             gain: its name, for an error.

@@ -43,9 +43,9 @@ class Sweep:
     """A chirp on one command.
 
     Args:
-        command: name of the command that it is added to.
-        axis: where the autopilot adds it: "rate roll", "mixer pitch", "angle yaw", …; the command must be what enters
-            there.
+        command: name of the command to which it is added.
+        axis: input of the autopilot to which it is added: "rate roll", "mixer pitch", "angle yaw", …; the command
+            must be that input.
         amplitude: in the unit of the command.
         first: frequency at the start, Hz.
         last: at the end, Hz, above the first.
@@ -84,7 +84,7 @@ class Sweep:
             )
 
     def excitation(self, kind: str, signals: Signals, steps: int) -> Floats:
-        """What the autopilot adds to the commands, at the start of each period; nothing after its end.
+        """The signal that the autopilot adds to the commands, at the start of each period; zero after its end.
 
         Args:
             kind: of the autopilot, "ardupilot" or "betaflight".
@@ -92,7 +92,7 @@ class Sweep:
             steps: of the test.
 
         Returns:
-            (steps, n_u), in the commands' units: what `campaign.test(gains, excitation=…)` takes.
+            (steps, n_u), in the commands' units, for `campaign.test(gains, excitation=…)`.
 
         Raises:
             InvalidInput: another autopilot or command, a flight that ends before the sweep, or one too fast for it.
@@ -119,11 +119,11 @@ class Sweep:
         return added
 
     def settings(self, kind: str, test: Test) -> str:
-        """The file of settings that makes the autopilot excite a test as it asks.
+        """The file of settings with which the autopilot generates the excitation of a test.
 
         Args:
             kind: of the autopilot.
-            test: whose excitation must be this sweep.
+            test: its excitation must be this sweep.
 
         Raises:
             InvalidInput: a sweep that the autopilot cannot make.

@@ -28,16 +28,17 @@ REPEATS = 32
 
 @dataclass(frozen=True)
 class Advice:
-    """What another experiment would bring, by the committee's own estimate, beside what a repeated flight scatters.
+    """The expected benefit of another experiment, as the committee estimates it, beside the scatter of one flight.
 
     Args:
-        before_test: number of the test that was planned last; the estimate was made then. None: none was.
-        trusted: whether the twin followed its runs then and does now; if not, it can advise nobody.
-        gain: quality that knowing which model is right would have brought; None where no committee was asked.
-        share: of the quality of the controller to fly that this is; None where either is unknown.
-        scatter: standard deviation of the quality if one flight were repeated; None where it cannot be told.
-        stop: whether the gain is lost in the scatter: for the controller another experiment does not pay. None where
-            nobody can say.
+        before_test: number of the test that was planned last; the estimate is of that time. None: there is no such
+            test.
+        trusted: whether the twin followed its runs at that time and does now; if not, there is no advice.
+        gain: improvement of the quality if it were known which model is right; None without a committee.
+        share: `gain` over the quality of the controller to fly; None if either is unknown.
+        scatter: standard deviation of the quality of a repeated flight; None if it is unknown.
+        stop: whether the gain is below the scatter, so that for the controller another experiment does not pay. None
+            if this is unknown.
     """
 
     before_test: int | None

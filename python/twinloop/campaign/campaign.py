@@ -65,20 +65,20 @@ class Campaign(Shown, Persistent, kind="campaign"):
             everywhere), or "both", the default.
         quality: what is minimised: "iae" (integrated absolute error, the default), "ise" (squared) or "final_distance"
             (the paper's).
-        weights: of states in the quality, by name, such as {"pitch": 2.0}. By default the states that a task is about
-            count with 1 and rates with 0, each in units of its scale ("final_distance": all with 1, as they are).
+        weights: of states in the quality, by name, such as {"pitch": 2.0}. By default rates count with 0 and all
+            other states with 1, each in units of its scale ("final_distance": all with 1, as they are).
         operators: that evolved programs may use; by default the preset's.
-        threads: how many the engine may use, by default all that there are; no result depends on it.
-        progress: called with a `Progress` a few times a second while the loops run.
+        threads: number of threads of the engine, by default all; no result depends on it.
+        progress: called with a `Progress` a few times a second during the work.
         store: a file of SQLite, or the address of a database such as "postgresql+psycopg://user@host/database", where
-            all that is asked and told is committed before the call returns. A campaign of this name that is there
-            already, with the same arguments, goes on with the same bits. None: nothing outlives the process.
+            each test and each run is committed before the call returns. An existing campaign of this name, with the
+            same arguments, continues with the same bits. None: the campaign ends with the process.
         name: of the campaign in its store, which may hold several.
 
     Raises:
-        InvalidInput: an argument that cannot be used, or that this version does not have.
+        InvalidInput: an argument that cannot be used.
         NotAvailable: the packages of the extra `store` are missing.
-        StoreFailure: somebody else writes the campaign, or the store cannot be written.
+        StoreFailure: another process writes the campaign, or the store cannot be written.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     @property
     def options(self) -> AnyOptions:
-        """Of the preset, with those that were changed."""
+        """Options of the preset, with your changes."""
         return self.setup.options
 
     # Ask and tell
@@ -135,12 +135,12 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
         Args:
             gains: all gains by name, or (size,) in order; in their units and bounds.
-            excitation: what is added to the controller's commands (steps, n_u), in their units; the sum is
-                clipped to the commands' bounds. None: nothing. By default the preset's own, a gentle one that
-                fades out and is held back by what the states do; the preset "paper" has none.
+            excitation: signal that is added to the controller's commands (steps, n_u), in their units; the sum is
+                clipped to the commands' bounds. None: no excitation. The default is the preset's own: a gentle one
+                that fades out, and is held back near the ends of the envelope; the preset "paper" has none.
 
         Returns:
-            The test, to be flown and told.
+            The test; fly it, then `tell` its run.
 
         Raises:
             InvalidInput: gains or an excitation that cannot be used.
@@ -161,20 +161,20 @@ class Campaign(Shown, Persistent, kind="campaign"):
             return self._book.new_test(genes, excitation=added, hold_back=hold_back)
 
     def ask(self, last: bool = False) -> Test:
-        """Learns from all that was told, then picks the test on which the best models disagree.
+        """Learns from all runs so far, then plans the test on which the best models disagree.
 
-        Asking again without telling learns nothing new and gives another test.
+        Asking again without a new run learns nothing new and gives another test.
 
         Args:
-            last: whether no other test will be asked for. The preset "default" then flies the best gains that it
-                knows, without excitation, unless its option `exploit_last` is off or `tests` asks no committee; to
-                "paper", whose tests have no excitation, it means nothing.
+            last: whether this is the last test. The preset "default" then flies its best gains without excitation,
+                unless its option `exploit_last` is off or its option `tests` uses no committee. The preset "paper"
+                ignores it.
 
         Returns:
-            The test, to be flown and told, with its predicted quality, its risk and the reason for it.
+            The test, with its predicted quality, its risk and its reason; fly it, then `tell` its run.
 
         Raises:
-            NotAvailable: nothing was told yet.
+            NotAvailable: there is no run yet.
         """
         self.interrupted = False
         self._learn()
@@ -182,20 +182,20 @@ class Campaign(Shown, Persistent, kind="campaign"):
             return self._method.ask(self._book, bool(last))
 
     def ask_batch(self, size: int = 3) -> tuple[Test, ...]:
-        """Alternatives to be flown in any order, or not at all: all tests that wait, asked for until there are `size`.
+        """Alternatives: the waiting tests, with new ones from `ask` until there are `size`.
 
-        Each is asked for as by `ask`, from what is known now. Tell each that was flown and abandon the others; nothing
-        is learnt from a test that was not flown. Calling it again, also after a crash, asks for what is missing only.
+        Fly them in any order. Tell the run of each flown test and abandon the others: a test that was not flown adds
+        nothing. A second call, also after a crash, only adds missing tests.
 
         Args:
-            size: how many shall wait.
+            size: number of waiting tests.
 
         Returns:
-            The tests that wait, the one most worth flying first: those that keep the envelope before the others, then
-            by the bits that a flight would tell, or with the goal "control" by the predicted quality.
+            The waiting tests, the best one first: tests that keep the envelope come before the others, then the order
+            is by bits of information, or with the goal "control" by predicted quality.
 
         Raises:
-            NotAvailable: nothing was told yet.
+            NotAvailable: there is no run yet.
             InvalidInput: no whole number of at least 1.
         """
         wanted = whole("Campaign.ask_batch, size", size, least=1)
@@ -205,11 +205,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return ranked(self._book.waiting(), plans, self.setup.goal)
 
     def tell(self, test: Test, trajectory: Trajectory) -> None:
-        """Adds a run to what is to be learnt. Tests may be told in any order; one told again is a replicate.
+        """Adds the run of a test, in any order; a second run of a test is a replicate.
 
         Args:
             test: from this campaign.
-            trajectory: what the system answered; shorter than the test if the run was cut.
+            trajectory: the measured run; shorter than the test if the run was cut.
 
         Raises:
             InvalidInput: a test of another campaign, or a useless trajectory; nothing has changed.
@@ -219,15 +219,15 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self.interrupted = False
 
     def tell_failed(self, test: Test, reason: str, partial: Trajectory | None = None) -> None:
-        """Tells that a test failed on the system: that, too, is a result.
+        """Adds the failure of a test on the system.
 
-        It has no quality, counts as a run, and speaks against its gains: the preset "default" never takes them, or
-        gains close to them, for known to fly.
+        A failure has no quality, and counts as a run. The preset "default" then does not treat these gains, or gains
+        close to them, as safe.
 
         Args:
             test: from this campaign.
             reason: what happened, in a few words.
-            partial: what was recorded until then, of at least one step; it is learnt from. None: nothing.
+            partial: the record up to the failure, of at least one step; it is learnt. None: no record.
 
         Raises:
             InvalidInput: a test of another campaign, no reason, or a useless record; nothing has changed.
@@ -237,10 +237,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self.interrupted = False
 
     def attach(self, trajectory: Trajectory) -> None:
-        """Adds a run that nobody asked for, of any length and under any commands, to what is to be learnt.
+        """Adds a run without a test, of any length and under any commands.
 
-        The twin is judged on it by its free run under the recorded commands. It has no quality, and is no run of a
-        test: `run` does not count it.
+        The twin is judged on it by its free run under the recorded commands. It has no quality, and `run` does not
+        count it.
 
         Args:
             trajectory: of the same signals.
@@ -259,10 +259,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self.interrupted = False
 
     def abandon(self, test: Test) -> None:
-        """Says that a test will not be flown: `run` does not fly it. If it is flown after all, tell it.
+        """Marks a test as not to be flown: `run` skips it. If somebody flies it later, tell its run.
 
         Args:
-            test: from this campaign, of which no run was told.
+            test: from this campaign, without a run.
 
         Raises:
             InvalidInput: a test of another campaign, or one that was flown.
@@ -292,33 +292,33 @@ class Campaign(Shown, Persistent, kind="campaign"):
         timeout: float | None = None,
         max_risk: float | None = None,
     ) -> Campaign:
-        """The whole loop; the last test is that of `ask(last=True)`.
+        """Runs the whole loop; the last test comes from `ask(last=True)`.
 
-        What was asked for, and neither told nor abandoned, is flown first. Where nothing was told, the first test is
-        the last one made by `campaign.test`, or that of `system.default_gains`.
+        Waiting tests are flown first. Without any run, the first test is the last one made by `campaign.test`, or one
+        with `system.default_gains`.
 
-        A test in which the system raises a `SystemFailure` has failed, as by `tell_failed`. The loop goes on with
-        another one if some test was flown and the one before did not fail; if not, the failure is raised.
+        If the system raises a `SystemFailure`, the test has failed, as with `tell_failed`. The loop continues with
+        another test if some test was flown and the one before did not fail; otherwise the failure is raised.
 
         Args:
             system: anything with `signals` and `run(test)`.
-            experiments: runs on the system in all, the first, those told before and those that failed included, those
-                that were attached not.
-            timeout: seconds that the system may take for a test; None: as long as it wants.
-            max_risk: probability, by the committee, that a test leaves the envelope, above which it is not flown; None:
-                any. Tests of your own have none that is known, and are flown.
+            experiments: total number of runs on the system. The first run, earlier runs and failures count; attached
+                runs do not.
+            timeout: seconds that the system may take for a test; None: no limit.
+            max_risk: largest accepted risk, the probability by the committee that a test leaves the envelope; None:
+                no limit. Tests of your own have no predicted risk, and are flown.
 
         Returns:
             The campaign.
 
         Raises:
-            InvalidInput: no system, one that answers with something else than a usable trajectory, fewer experiments
-                than were told already, or a `max_risk` that is no probability.
-            KeyboardInterrupt: Ctrl-C. Nothing that was told is lost: `interrupted` says so, the results give the best
-                so far, and calling again goes on from there with the same bits.
+            InvalidInput: no system, a system that returns no usable trajectory, fewer experiments than there are
+                already, or a `max_risk` that is no probability.
+            KeyboardInterrupt: Ctrl-C. No run is lost: `interrupted` is true, the results give the best so far, and
+                another call continues with the same bits.
             NotAvailable: there is no first test.
             NoAnswer: the system did not answer in time; its test still waits and nothing is lost.
-            SystemFailure: the first test failed, or two in a row; both are told.
+            SystemFailure: the first test failed, or two in a row; the failures are in the campaign.
             TooRisky: a test is riskier than `max_risk`; it waits. Raise `max_risk`, fly it by hand, or abandon it.
         """
         budget, allowed = checked_budget(self, system, experiments), checked_risk(max_risk)
@@ -341,26 +341,28 @@ class Campaign(Shown, Persistent, kind="campaign"):
         overrun: float = 0.5,
         clock: Callable[[], float] | None = time.monotonic,
     ) -> Guard:
-        """A test's controller with a watch, for a loop of one's own: `reset`, `command(state, target)`, `tripped`.
+        """A test's controller with supervision, for your own loop: `reset`, `command(state, target)`, `tripped`.
 
-        It looks at readings, envelope and clock, and, where a twin follows the flights so far, at its band and ahead
-        with its committee. Once something is wrong it gives the fallback's commands; `guard.trajectory(last)` is told.
+        It checks readings, envelope and clock. If a twin follows the flights so far, it also checks the twin's band,
+        and predicts ahead with the committee. Once a check fails it sends the fallback's commands; tell
+        `guard.trajectory(last)` after the flight.
 
         Args:
             test: that is flown.
             fallback: gains by name; or a command that is safe to hold (n_u,), in its units. None: the first controller
                 that was flown, or, before any was, the test's own without its excitation.
-            horizon: how far it looks ahead, s; 0: not at all. None: a fifth of the test.
-            false_alarms: share of flights, by the committee's own account, that the watch of the band may end.
+            horizon: of the prediction, s; 0: no prediction. None: a fifth of the test.
+            false_alarms: share of flights that the check of the band may end without cause, by the committee's own
+                prediction.
             overrun: share of the period by which a period may be late.
-            clock: gives the time in s; None: time is not watched.
+            clock: gives the time in s; None: time is not checked.
 
         Returns:
             The guard, at the start of a flight.
 
         Raises:
             InvalidInput: a test for other signals, or arguments that do not fit.
-            NotAvailable: controllers in Python, in whose memory nobody can look ahead; pass horizon=0.
+            NotAvailable: controllers in Python, whose memory cannot be predicted; pass horizon=0.
         """
         return guard_of(
             self, test, fallback, horizon=horizon, false_alarms=false_alarms, overrun=overrun, clock=clock
@@ -374,7 +376,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         horizon: float | None = None,
         false_alarms: float = 0.01,
     ) -> Guarded:
-        """A system whose every run has a guard in its loop, for `run`; the clock is not watched.
+        """A system with a guard in each run, for `run`; the clock is not checked.
 
         Args:
             system: anything with `signals` and `run(test)` that closes the loop with the test's controller.
@@ -394,22 +396,22 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     @property
     def twin(self) -> Twin:
-        """The best model, after learning all that was told; the best so far after an interruption."""
+        """The best model, after learning all runs; the best so far after an interruption."""
         self._learn()
         return self._method.twin(self._book)
 
     @property
     def best_test(self) -> Test:
-        """The controller to fly, without excitation, after learning all that was told.
+        """The controller to fly, without excitation, after learning all runs.
 
-        With the preset "default": the gains tuned on the committee, unless it is not confident that they beat the
-        best ones flown. With "paper": the flown test that ended nearest to its target. It carries the quality that
-        the twin predicts and, if it was flown, the measured one. To fly and tell it, make a test of it with
-        `campaign.test`.
+        With the preset "default": the gains tuned on the committee, or the best flown gains if the committee is not
+        confident that the tuned ones are better. With "paper": the flown test that ended nearest to its target. It
+        has the quality that the twin predicts and, if it was flown, the measured one. To fly it, make a test of its
+        gains with `campaign.test`.
 
         Raises:
-            NotAvailable: nothing was told; or, with "default", there is no controller to fly: none has flown to its
-                end, and the twin cannot answer for the one that it prefers.
+            NotAvailable: there is no run; or, with "default", no controller to fly: no flight was completed, and the
+                twin does not support its preferred gains.
         """
         self._learn()
         with self._interruptible():
@@ -419,10 +421,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     @property
     def controller(self) -> Controller:
-        """That of `best_test`, for a real loop: `.parameters`, `.reset()`, `.command(state, target)`.
+        """The controller of `best_test`, for a real loop: `.parameters`, `.reset()`, `.command(state, target)`.
 
-        It is one object with one memory for as long as the gains of `best_test` are the same: call `reset` before each
-        run. Other gains, which only something that was told can bring, are another controller, at rest.
+        It is one object with one memory as long as the gains of `best_test` are the same: call `reset` before each
+        run. After a new run the gains may change; then it is another controller, at rest.
         """
         best = self.best_test
         if self._controller is None or self._controller.genes.tobytes() != best.genes.tobytes():
@@ -430,10 +432,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return self._controller
 
     def examine(self) -> Examination:
-        """All that an engineer checks, computed when it is asked for, after learning all that was told.
+        """The numbers that an engineer checks, each computed on first access, after learning all runs.
 
         Raises:
-            NotAvailable: nothing was told.
+            NotAvailable: there is no run.
         """
         self._learn()
         known, book = self._method, self._book
@@ -442,44 +444,44 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals(book)))
 
     def checks(self) -> Checks:
-        """Whether the twin may be believed and the controller flown, check by check; printable.
+        """Whether the twin can be trusted and the controller flown, check by check; printable.
 
         Returns:
-            Checks with their value, limit and sentence; `passed` says whether all that bind hold, `twin_passed` whether
-            those of the twin do.
+            Checks with their value, limit and sentence; `passed` says whether all binding checks pass, `twin_passed`
+            whether those of the twin pass.
 
         Raises:
-            NotAvailable: nothing was told.
+            NotAvailable: there is no run.
         """
         return checks(self.examine())
 
     def certificate(self) -> Certificate:
-        """The controller to fly with what speaks for it and what nobody tested, or why it is refused.
+        """The controller to fly with the evidence for it and what nobody tested, or why it is refused.
 
         Raises:
-            NotAvailable: nothing was told.
+            NotAvailable: there is no run.
         """
         return certificate(self)
 
     def margins(
         self, parameters: Mapping[str, float] | ArrayLike | None = None, broken_at: str = "axes"
     ) -> Margins:
-        """How far the loops of a controller are from instability around the target, on the twin and on its committee.
+        """Stability margins of a controller's loops around the target, on the twin and on its committee.
 
-        Each loop is broken at one place while the others stay closed. All is in discrete time, with the delays and lags
-        of actuators. The twin is linearised at the target under the command that holds it, the controller where its
-        error is 0.
+        Each loop is broken at one place while the others stay closed. The loops are in discrete time, with the delays
+        and lags of actuators. The twin is linearised at the target under the command that holds it, the controller at
+        zero error.
 
         Args:
             parameters: gains of the controller, by name or in order; None: those of `best_test`.
-            broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+            broken_at: "axes", between the law of each axis and the mixer, or "commands".
 
         Returns:
             Gain, phase and delay margins, crossover, Ms and Mt of each loop, nominal and the worst of the committee.
 
         Raises:
-            InvalidInput: unknown gains, or another place to break a loop at.
-            NotAvailable: nothing was told, or the twin or the controller cannot be linearised there.
+            InvalidInput: unknown gains, or another place to break a loop.
+            NotAvailable: there is no run, or the twin or the controller cannot be linearised there.
         """
         genes = self.best_test.genes if parameters is None else self.family.genes(parameters)
         loops, names = loops_around(self.twin, self.setup, genes, broken_at)
@@ -488,16 +490,16 @@ class Campaign(Shown, Persistent, kind="campaign"):
     def export_twin(
         self, to: str | Path, *, kind: str | None = None, precision: str = "double", force: bool = False
     ) -> str | tuple[Path, ...]:
-        """The twin for use elsewhere: `twin.export`, refused where a check of the twin that binds fails.
+        """The twin for use elsewhere: `twin.export`, refused if a binding check of the twin fails.
 
         Args:
             to: a kind, or the path of a file with the suffix of one.
-            kind: of the file where its suffix does not say it.
+            kind: of the file, if its suffix is not enough.
             precision: of C, "double" or "float".
-            force: also a twin that fails a check, and without comparing what is made.
+            force: exports also a twin that fails a check, and without a comparison.
 
         Returns:
-            The text where a kind was asked for, else the paths that were written.
+            The text if `to` is a kind, else the paths that were written.
 
         Raises:
             InvalidInput: no such kind, or a path that cannot be written.
@@ -513,7 +515,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         precision: str = "double",
         force: bool = False,
     ) -> str | tuple[Path, ...]:
-        """A controller as Python or C99 without dependencies, one call a period; clipped, with all its options.
+        """A controller as Python or C99 without dependencies, one call per period; clipped, with all its options.
 
         It is run on the states of the campaign's flights and compared with the controller itself: differences above
         1e-9 of a command's scale are refused (1e-3 in single precision).
@@ -522,29 +524,29 @@ class Campaign(Shown, Persistent, kind="campaign"):
             to: "python" or "c", or the path of a file that ends in ".py" or ".c".
             parameters: gains, by name or in order; None: those of `best_test`.
             precision: of C, "double" or "float".
-            force: without the comparison.
+            force: exports without the comparison.
 
         Returns:
-            The text where a kind was asked for (in C the header, then the source), else the paths that were written.
+            The text if `to` is a kind (in C the header, then the source), else the paths that were written.
 
         Raises:
             InvalidInput: unknown gains, no such kind, or a path that cannot be written.
-            NotAvailable: a family of one's own, or an export that could not be checked.
+            NotAvailable: a family in Python, or an export that could not be checked.
         """
         return taken_controller(self, to, parameters, precision, force)
 
     @property
     def committee(self) -> tuple[_core.Model, ...]:
-        """Models that judge tests, the best first, after learning all that was told."""
+        """The models that judge tests, the best first, after learning all runs."""
         self._learn()
         return tuple(self._method.committee())
 
     @property
     def models(self) -> _core.ModelSearch:
-        """The paper's model loop as a value, after learning all that was told.
+        """The paper's model loop as a value, after learning all runs.
 
         Raises:
-            NotAvailable: the preset has no such loop, or nothing was told.
+            NotAvailable: the preset has no such loop, or there is no run.
         """
         self._learn()
         if not isinstance(self._method, Coevolution):
@@ -556,27 +558,27 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     @property
     def experiments(self) -> tuple[Experiment, ...]:
-        """All that was told and attached, in order."""
+        """All runs, told and attached, in order."""
         return tuple(self._book.experiments)
 
     @property
     def tests(self) -> tuple[Test, ...]:
-        """All that were made, by their numbers."""
+        """All tests, by their numbers."""
         return tuple(self._book.tests)
 
     @property
     def waiting(self) -> tuple[Test, ...]:
-        """Tests that were asked for, and neither told nor abandoned, in their order."""
+        """Tests from `ask` that wait for their run: neither told nor abandoned, in order."""
         return tuple(self._book.waiting())
 
     @property
     def runs(self) -> int:
-        """Runs of tests on the system, the failed ones too; those that were attached are none of a test."""
+        """Number of runs of tests on the system, with failures, without attached runs."""
         return self._book.runs
 
     @property
     def failures(self) -> tuple[Failure, ...]:
-        """Tests that failed, in the order they were told."""
+        """Failed tests, in the order of `tell_failed`."""
         return tuple(self._book.failures)
 
     @property
@@ -586,14 +588,14 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     @property
     def advice(self) -> Advice | None:
-        """What another experiment would bring, after learning all that was told; None with the preset "paper"."""
+        """The expected benefit of another experiment, after learning all runs; None with the preset "paper"."""
         twin, history = self.twin, self.history
         lessons = [record for record in history if isinstance(record, Lesson)]
         return advice(twin, self.setup, lessons, controller_to_fly(self)[0]) if lessons else None
 
     @property
     def cost(self) -> Cost:
-        """What the campaign has cost on the system so far: runs, seconds, envelope, quality given away."""
+        """The cost of the campaign on the system so far: runs, seconds, envelope, loss of quality."""
         return cost(self._book)
 
     @property
@@ -602,7 +604,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return plots(self)
 
     def report(self, to: str | Path | None = None, name: str = "campaign") -> str:
-        """The whole result for a person, beginning with a verdict of three sentences; `print(campaign)` shows it.
+        """The whole result, after a verdict of three sentences; `print(campaign)` shows it.
 
         Args:
             to: a file that ends in ".html", for one page with figures that needs nothing else; None: as text.
@@ -613,7 +615,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
         Raises:
             InvalidInput: a file that cannot be written.
-            NotAvailable: nothing was told, or Jinja2 is missing.
+            NotAvailable: there is no run, or Jinja2 is missing.
         """
         return reported(self, to, name)
 
@@ -626,7 +628,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
     @property
     def history(self) -> tuple[Iteration, ...] | tuple[Lesson, ...]:
-        """One record for each turn of the loop; the last may be unfinished after an interruption."""
+        """One record for each iteration of the loop; after an interruption the last one may be unfinished."""
         return self._method.history(self._book)
 
     # Inside

@@ -43,16 +43,16 @@ class Use:
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """A controller to fly with what speaks for it, or why there is none.
+    """A controller to fly with the evidence for it, or why there is none.
 
     Args:
         checks: all of the campaign.
         law_gains: of the controllers, with units and bounds.
-        best: the controller to fly; None where there is none.
-        old: the controller that was flown first, to go back to; None where none was.
+        best: the controller to fly; None if there is none.
+        old: the first controller, to return to; None if none was flown.
         experiments: that it was judged on.
         members: models of the committee.
-        margins: of its loops; None where they cannot be computed, or the twin does not follow its flights.
+        margins: of its loops; None if they cannot be computed, or if the twin does not follow its flights.
         step: the predicted flight of its task, with a band; None without a controller.
         uses: of the range of each state.
         not_tested: what nobody has tested, in sentences.

@@ -22,23 +22,23 @@ def identify(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Twin:
-    """Learns a twin from recorded runs, each of its own length, under whatever commands.
+    """Learns a twin from recorded runs of any length, under any commands.
 
-    It is what a campaign of the preset `default` learns from runs that were attached to it.
+    A campaign of the preset `default` learns the same from attached runs.
 
     Args:
         runs: at least one, at the signals' period; SI units, radians.
         signals: of the system.
         seed: of all random numbers; equal seeds give equal bits.
         options: other values for some of the preset's options, by name.
-        threads: how many the engine may use, by default all that there are; no result depends on it.
+        threads: number of threads of the engine, by default all; no result depends on it.
         progress: called with a `Progress` a few times a second.
 
     Returns:
         The twin, with its errors on each run, its committee and its remarks.
 
     Raises:
-        InvalidInput: no runs, or one that cannot be learnt from.
+        InvalidInput: no runs, or a run that cannot be learnt.
     """
     return learnt_from_logs(runs, signals, seed=seed, options=options, threads=threads, progress=progress)[0]
 
@@ -65,7 +65,7 @@ def learnt_from_logs(
         progress: called with a `Progress` a few times a second.
 
     Raises:
-        InvalidInput: no runs, or one that cannot be learnt from.
+        InvalidInput: no runs, or a run that cannot be learnt.
     """
     found, apart = list(runs), list(held_out)
     if not found or not all(isinstance(run, Trajectory) for run in [*found, *apart]):

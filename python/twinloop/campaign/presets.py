@@ -28,8 +28,8 @@ class Options:
         model_population: models in the population (the paper).
         model_generations: generations of the model loop in each iteration (the paper).
         test_population: tests in the population (the paper).
-        test_generations: generations of the test loop; None: a thirtieth of the models' with two objectives,
-            a twentieth with three, at least 1 (the ratios of the paper's Table I).
+        test_generations: generations of the test loop; None: a thirtieth of the models' with two objectives, a
+            twentieth with three, at least 1 (the ratios of the paper's Table I).
         form: what a program's outputs mean, "absolute", "increment" or "acceleration" (our choice).
         spare_registers: registers beside inputs and outputs (our choice).
         pages: pages of a program (the paper).
@@ -45,7 +45,7 @@ class Options:
         mutation_share: share of offspring made by mutation (our choice).
         crossover_share: share of offspring made by crossover (our choice).
         reproduction_share: share of offspring that are copies (our choice).
-        elite_share: share of the population that is kept as it is (our choice; elitism is the paper's).
+        elite_share: share of the population that is copied unchanged (our choice; elitism is the paper's).
         ranking_pressure: of the linear ranking, 1 to 2 (our choice; ranking selection is the paper's).
         divergence_factor: multiple of a state's scale beyond which a run counts as diverged (our choice).
         archive_cap: largest size of a non-dominated set (our choice).
@@ -120,7 +120,7 @@ class Options:
 
     @property
     def generations_of_tests(self) -> int:
-        """Generations of the test loop, with Table I's ratio where none were given."""
+        """Generations of the test loop; by default with Table I's ratio."""
         if self.test_generations is not None:
             return self.test_generations
         return max(1, self.model_generations // (20 if self.control_quality else 30))
@@ -130,7 +130,7 @@ class Options:
 class DefaultOptions(PlanningOptions, IdentificationOptions):
     """Options of the preset `default`: how a twin is identified, then how tests are planned.
 
-    Each is described where it is defined: `IdentificationOptions` and `PlanningOptions`.
+    `IdentificationOptions` and `PlanningOptions` describe them.
 
     Raises:
         InvalidInput: a value out of range.

@@ -26,9 +26,9 @@ from twinloop.signals import Signals
 
 @dataclass(frozen=True, eq=False)
 class Cascade(Recorded, kind="cascade"):
-    """On every axis a P on the angle asks for a rate, and a PID on the rate keeps it.
+    """Per axis, a P controller on the angle sets a rate, and a PID controller on the rate follows it.
 
-    rate asked for = clip(K (target − angle) + target's rate, ± limit), e = rate asked for − rate, and
+    rate set point = clip(K (target − angle) + target's rate, ± limit), e = rate set point − rate, and
     u = K_P e + K_I ∫e − K_D d(rate)/dt, where the derivative is the difference of the measured rate over one period.
     The integral is updated before it is used. In PX4 the gains are MC_ROLL_P, MC_ROLLRATE_P, _I and _D, and the limit
     is MC_ROLLRATE_MAX.
@@ -38,14 +38,13 @@ class Cascade(Recorded, kind="cascade"):
         gains: bounds (low, high) of "<angle>.kp" (the outer loop), "<rate>.kp", "<rate>.ki" and "<rate>.kd" for every
             axis; a third item "log" where decades matter; a number instead of bounds fixes a gain.
         output: from the axes to the commands; None: axis i is command i.
-        rate_limits: largest rate that is asked for, by the name of the rate, in its unit; without one any.
-        anti_windup: "clamping": an integral does not take a step that would push a command further beyond the bound
-            that it is at. None: integrals always go on.
+        rate_limits: largest rate set point, by the name of the rate, in its unit; without one there is no limit.
+        anti_windup: "clamping": an integral takes no step that would push a command further beyond a bound that it
+            has reached. None: integrals never stop.
         derivative_filter: time constant of a first-order low-pass filter on the derivative of the rate, s; 0: none.
 
     Raises:
-        InvalidInput: gains or limits that do not fit the axes, bounds the wrong way round, or options that there are
-            not.
+        InvalidInput: gains or limits that do not fit the axes, bounds in the wrong order, or unknown options.
     """
 
     axes: Sequence[tuple[str, str]]
@@ -90,7 +89,7 @@ class Cascade(Recorded, kind="cascade"):
         """The family over these signals; gains in the order (K, K_P, K_I, K_D) per axis.
 
         Args:
-            signals: where the axes are found.
+            signals: with the states of the axes.
 
         Returns:
             The family, its gains with units.

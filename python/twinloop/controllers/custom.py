@@ -17,36 +17,36 @@ from twinloop.signals import Signals
 
 
 class Law(Protocol):
-    """What a class of controllers must have."""
+    """The methods of a controller in Python."""
 
     def reset(self) -> None:
-        """Forgets the run so far; called at the start of every run."""
+        """Clears the memory; called at the start of every run."""
         ...
 
     def command(self, state: Floats, target: Floats) -> ArrayLike:
-        """What to send for the coming period (n_u,), for a measured state and a target (n_x,), in their units."""
+        """The command for the coming period (n_u,), from a measured state and a target (n_x,), in their units."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Custom:
-    """Controllers of a class in Python; for laws that no family here has.
+    """Controllers of a class in Python, for laws that no family here has.
 
-    An object of the class is one controller. The search makes one for each flight that it simulates, and asks it for
-    every command, one at a time and on the thread that asked, however many threads a campaign may use. That is slow: a
-    flight of 100 periods takes about 0.7 ms, some thirty times that of a law of the engine, and a campaign with its
-    default options simulates about a million flights for each test that it asks for; choose fewer `evaluations`,
-    `draws` and `candidates`. Commands are clipped to their bounds. A campaign with such controllers has no record.
+    An object of the class is one controller. The search makes one for each simulated flight and calls it for every
+    command, one at a time and on the calling thread, for any number of threads of the campaign. This is slow: a
+    flight of 100 periods takes about 0.7 ms, some thirty times as long as with a law of the engine, and a campaign
+    with its default options simulates about a million flights for each test; choose fewer `evaluations`, `draws` and
+    `candidates`. Commands are clipped to their bounds. A campaign with such controllers has no record.
 
     Args:
-        law: makes a controller of its gains, called with all of them by name: a class with `reset()` and
-            `command(state, target)`. What it does must follow from its gains and what it was asked since `reset()`.
+        law: makes a controller from all its gains by name: a class with `reset()` and `command(state, target)`. The
+            commands must depend only on the gains and on the calls since `reset()`.
         gains: bounds (low, high) by name; a third item "log" where decades matter; a number instead of bounds fixes a
             gain.
         units: of the gains, by name; without one "".
 
     Raises:
-        InvalidInput: a law that cannot be called, no gains, or bounds the wrong way round.
+        InvalidInput: a law that cannot be called, no gains, or bounds in the wrong order.
     """
 
     law: Callable[..., Law]
@@ -77,13 +77,13 @@ class Custom:
         """The family over these signals; gains in the order of their names.
 
         Args:
-            signals: that the controllers read and command.
+            signals: states and commands of the controllers.
 
         Returns:
             The family.
 
         Raises:
-            InvalidInput: no gain with bounds, or a law that makes something without `reset` or `command`.
+            InvalidInput: no gain with bounds, or a law whose objects lack `reset` or `command`.
         """
         assert self.units is not None  # __post_init__ has set it
         names, law = list(self.gains), self.law

@@ -23,24 +23,24 @@ AT_A_BOUND = 0.01
 
 @runtime_checkable
 class UnboundFamily(Protocol):
-    """A description of controllers that becomes a `Family` once the signals are known."""
+    """A description of controllers; with signals it becomes a `Family`."""
 
     def bind(self, signals: Signals) -> Family:
-        """The family over these signals; raises InvalidInput where the two do not fit."""
+        """The family over these signals; raises InvalidInput if the two do not fit."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Controllers that differ by their gains alone.
+    """Controllers that differ in their gains only.
 
     Args:
-        signals: what they read and command.
+        signals: states and commands of the controllers.
         law_gains: all gains of the law, in its order: those with bounds, and those that are fixed.
         engine: the same family in the native engine.
 
     Raises:
-        InvalidInput: the engine counts other gains than are named, or none has bounds.
+        InvalidInput: the engine has another number of gains, or no gain has bounds.
     """
 
     signals: Signals
@@ -62,7 +62,7 @@ class Family:
 
     @cached_property
     def fixed(self) -> dict[str, float]:
-        """Gains that all controllers share, by name, in their units."""
+        """Values of the fixed gains, by name, in their units."""
         return {gain.name: gain.value for gain in self.law_gains if isinstance(gain, FixedGain)}
 
     @property
@@ -118,7 +118,7 @@ class Family:
             genes: (size,), in the units of the gains.
 
         Returns:
-            A value for each gain of the law, in its order, the fixed ones too.
+            A value for each gain of the law, in its order, including fixed gains.
 
         Raises:
             InvalidInput: another number of genes, or one that is not finite.
@@ -134,7 +134,7 @@ class Family:
             )
 
     def to_unit(self, genes: ArrayLike) -> Floats:
-        """Genes as places in the box, 0 to 1, logarithmic where decades matter.
+        """Genes as places in the box, 0 to 1, on a logarithmic scale for logarithmic gains.
 
         Args:
             genes: (…, size), in the units of the gains.
@@ -148,13 +148,13 @@ class Family:
         return self._in_the_box(self.engine.places, genes)
 
     def at_bounds(self, genes: ArrayLike) -> dict[str, str]:
-        """Which bound each gain is at, or within 1 % of its range of: there the box decides, not the quality.
+        """The bound that each gain has reached, within 1 % of its range: there the box decides, not the quality.
 
         Args:
             genes: (size,), in the units of the gains.
 
         Returns:
-            "lower", "upper" or "", by the gains' names; of decades where these matter.
+            "lower", "upper" or "", by the gains' names; the range of a logarithmic gain is in decades.
 
         Raises:
             InvalidInput: another number of genes.
@@ -194,12 +194,12 @@ class Family:
 
         Args:
             genes: (size,), in the units of the gains.
-            excitation: what is added to its commands, a row a period (n, n_u), in the units of the commands;
-                nothing after the last row. None: nothing.
-            hold_back: what holds that back while it flies; None: nothing does.
+            excitation: signal that is added to its commands, a row per period (n, n_u), in the units of the commands;
+                zero after the last row. None: no excitation.
+            hold_back: holds the excitation back during the flight; None: it is not held back.
 
         Returns:
-            A controller with a memory of its own.
+            A controller with its own memory.
 
         Raises:
             InvalidInput: another number of genes or columns, or a number that is not finite.
@@ -210,13 +210,13 @@ class Family:
 
 
 class Controller:
-    """One controller with its memory, for a real loop: call `command` once a period.
+    """One controller with its memory, for a real loop: call `command` once per period.
 
     Args:
-        family: what it is one of.
+        family: of the controller.
         genes: its gains (size,), in their units.
-        excitation: what is added to its commands, a row a period (n, n_u); None: nothing.
-        hold_back: what holds that back; None: nothing does.
+        excitation: signal that is added to its commands, a row per period (n, n_u); None: no excitation.
+        hold_back: holds the excitation back; None: it is not held back.
     """
 
     def __init__(
@@ -240,18 +240,18 @@ class Controller:
         return self.family.parameters(self.genes)
 
     def reset(self) -> None:
-        """Forgets the run so far, and starts the excitation again; call it at the start of every run."""
+        """Clears the memory and restarts the excitation; call it at the start of every run."""
         self._law.reset()
 
     def command(self, state: ArrayLike, target: ArrayLike) -> Floats:
-        """What to send for the coming period.
+        """The command for the coming period.
 
         Args:
             state: measured state (n_x,), SI units, radians.
-            target: state to lead to (n_x,), the same units.
+            target: target state (n_x,), the same units.
 
         Returns:
-            Command (n_u,), the excitation of this period in it, within its bounds, in its units.
+            Command (n_u,) with the excitation of this period, within its bounds, in its units.
 
         Raises:
             InvalidInput: another shape, or a number that is not finite; the memory is unchanged.

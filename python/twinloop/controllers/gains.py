@@ -22,7 +22,7 @@ class Gain:
         unit: such as "N m/rad".
         low: smallest value, in its unit.
         high: largest value, in its unit.
-        logarithmic: whether decades matter more than differences.
+        logarithmic: whether a search treats it on a logarithmic scale.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class FixedGain:
-    """A gain that all controllers of a family share: no parameter, and no gene.
+    """A fixed gain of a family: no parameter, and no gene.
 
     Args:
         name: such as "roll.ki".

@@ -36,26 +36,25 @@ def lqr_gains(
     state_weights: Mapping[str, float] | None = None,
     command_weights: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
-    """Gains that lead small errors to zero at the least weighted sum of squared errors and commands.
+    """Gains that minimise the weighted sum of squared errors and commands for small errors.
 
-    The model is linearised by central differences at the target, under the commands that the family sends
-    when there is no error (for a quadrotor: hovering). A state that is not fed back is taken to stay where it
-    is.
+    The model is linearised by central differences at the target, under the commands that the family sends for zero
+    error (for a quadrotor: hovering). A state without feedback is assumed to be constant.
 
     Args:
-        model: anything that steps: `twin.model`, a plant, or a function (state, command) -> next state.
+        model: with a step: `twin.model`, a plant, or a function (state, command) -> next state.
         family: a bound `StateFeedback`.
         target_state: (n_x,), SI units, radians.
         state_weights: cost of a squared error by the name of its state, or "<state>.integral"; by default
             1 / scale² of the state, and the same for its integral over seconds.
-        command_weights: cost of a command's squared departure from its rest, by name; by default 1 / scale².
+        command_weights: cost of a command's squared deviation from its rest, by name; by default 1 / scale².
 
     Returns:
-        All gains of the family by name, clipped to their bounds; a fixed one as it is.
+        All gains of the family by name, clipped to their bounds; fixed gains as they are.
 
     Raises:
-        InvalidInput: no family of state feedbacks, unknown names, or weights that are not above 0 (commands)
-            or are below 0 (states).
+        InvalidInput: no family of state feedbacks, unknown names, weights of commands that are not above 0, or
+            weights of states below 0.
         NotAvailable: the model diverges at the target, or no feedback through this output makes it stable
             there.
     """

@@ -11,11 +11,11 @@ from twinloop.records import Recorded
 
 @dataclass(frozen=True, eq=False)
 class Mixer(Recorded, kind="mixer"):
-    """command = clip(sign(v) |v| ** power), v = matrix u + offset, with u one entry an axis.
+    """command = clip(sign(v) |v| ** power), v = matrix u + offset, with one entry of u per axis.
 
     Args:
         matrix: (n_u, axes), from the axes to the actuators.
-        offset: (n_u,), what the actuators get when all axes ask for nothing; zeros by default.
+        offset: (n_u,), commands of the actuators for u = 0; zeros by default.
         power: exponent, such as 0.5 from squared rotor speeds to rotor speeds.
         unit: the unit of u, for the units of the gains.
 
@@ -43,7 +43,7 @@ class Mixer(Recorded, kind="mixer"):
         return self.matrix, self.offset, self.power
 
     def check(self, commands: int, axes: int) -> None:
-        """Refuses to map other numbers of axes and commands than its matrix has.
+        """Checks that the matrix fits these numbers of axes and commands.
 
         Args:
             commands: n_u.

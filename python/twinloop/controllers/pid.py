@@ -35,12 +35,12 @@ class PID(Recorded, kind="pid"):
         gains: bounds (low, high) of "<angle>.kp", "<angle>.ki" and "<angle>.kd" for every axis; a third item
             "log" where decades matter; a number instead of bounds fixes a gain.
         output: from the axes to the commands; None: axis i is command i.
-        anti_windup: "clamping": an integral does not take a step that would push a command further beyond the bound
-            that it is at. None: integrals always go on.
+        anti_windup: "clamping": an integral takes no step that would push a command further beyond a bound that it
+            has reached. None: integrals never stop.
         derivative_filter: time constant of a first-order low-pass filter on the rates, s; 0: none.
 
     Raises:
-        InvalidInput: gains that do not fit the axes, bounds the wrong way round, or options that there are not.
+        InvalidInput: gains that do not fit the axes, bounds in the wrong order, or unknown options.
     """
 
     axes: Sequence[Axis]
@@ -62,7 +62,7 @@ class PID(Recorded, kind="pid"):
         """The family over these signals; gains in the order (K_P, K_I, K_D) per axis.
 
         Args:
-            signals: where the axes are found.
+            signals: with the states of the axes.
 
         Returns:
             The family, its gains with units.

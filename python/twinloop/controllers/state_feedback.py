@@ -24,19 +24,19 @@ from twinloop.signals import Signals
 
 @dataclass(frozen=True, eq=False)
 class StateFeedback(Recorded, kind="state_feedback"):
-    """u = K (target − x) + K_I ∫(target − x): every output answers the error of every state.
+    """u = K (target − x) + K_I ∫(target − x): every output responds to the error of every state.
 
-    The gain of "roll" on the first output is called "roll->u1", or "roll->torque" where there is no mixer and
-    the output is the command "torque"; that of an integral is "roll.integral->u1". Integrals are updated
-    before they are used. There is no anti-windup.
+    The gain of "roll" on the first output is called "roll->u1", or "roll->torque" without a mixer, when the output is
+    the command "torque"; that of an integral is "roll.integral->u1". Integrals are updated before they are used.
+    There is no anti-windup.
 
     Args:
-        states: names of the states that are fed back; None: all.
-        gains: bounds of every gain: one (low, high) for all, or by name, where "roll" stands for the gains of
-            roll on all outputs; a third item "log" where decades matter. A number instead fixes the gain.
-        output: from the outputs u1, u2, … to the commands, which may hold an offset such as the thrust of
-            hovering; None: output i is command i.
-        integral: names of the states whose error is integrated and fed back too.
+        states: names of the feedback states; None: all.
+        gains: bounds of every gain: one (low, high) for all, or by name, where "roll" stands for the gains of roll on
+            all outputs; a third item "log" where decades matter. A number instead fixes the gain.
+        output: from the outputs u1, u2, … to the commands, possibly with an offset such as the thrust of hovering;
+            None: output i is command i.
+        integral: names of the states whose integrated error is fed back too.
 
     Raises:
         InvalidInput: a name that is given twice, no state at all, or bounds that cannot be used.
@@ -64,7 +64,7 @@ class StateFeedback(Recorded, kind="state_feedback"):
         """The family over these signals; gains in rows of (states, integrals), one row an output.
 
         Args:
-            signals: where the states are found.
+            signals: with these states.
 
         Returns:
             The family, its gains with units.
@@ -124,10 +124,10 @@ class StateFeedback(Recorded, kind="state_feedback"):
 
 @dataclass(frozen=True, eq=False)
 class FeedbackFamily(Family):
-    """A family of state feedbacks, which knows what it feeds back to where; made by `StateFeedback.bind`.
+    """A family of state feedbacks with its states, integrals and outputs; made by `StateFeedback.bind`.
 
     Args:
-        signals: what they read and command.
+        signals: states and commands of the controllers.
         law_gains: all gains of the law, in its order.
         engine: the same family in the native engine.
         states: names of the states that are fed back.

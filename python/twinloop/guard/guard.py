@@ -25,28 +25,29 @@ CERTAIN = 2
 
 
 class Guard:
-    """A test's controller with somebody who watches: `reset()`, then `command(state, target)` once a period.
+    """A test's controller with supervision: `reset()`, then `command(state, target)` once per period.
 
-    Each period it looks, in this order, whether the reading is finite and not frozen, the period was kept, the reading
-    is inside the envelope, the reading is where the twin's band has it, and no member of the committee, under the
-    test's own controller and excitation, leaves the envelope within the horizon. At the first no it has *tripped*: from
-    then on the fallback's commands are given, and `trajectory` holds the flight until then.
+    Each period it checks, in this order: the reading is finite and not frozen; the period is not too long; the
+    reading is inside the envelope; the readings agree with the twin's band; no member of the committee, under the
+    test's own controller and excitation, leaves the envelope within the horizon. At the first failed check it has
+    *tripped*: from then on it sends the fallback's commands, and `trajectory` has the flight up to there.
 
-    A reading that cannot be believed is replaced, for the fallback, by what the twin makes of the one before.
+    For the fallback, a reading that cannot be trusted is replaced by the twin's prediction from the previous reading.
 
     Args:
-        test: that is flown.
+        test: to fly.
         fallback: a controller, or a command that is safe to hold (n_u,), in its units.
-        twin: that looks ahead and has the band; None: only readings, envelope and clock are watched.
-        flown: flights so far, with the tests that they were, which the band is checked on.
-        horizon: how far it looks ahead, s; 0: not at all. None: a fifth of the test.
-        false_alarms: share of flights, by the committee's own account, that the watch of the band ends without cause.
+        twin: for the prediction and the band; None: only readings, envelope and clock are checked.
+        flown: flights so far with their tests, on which the band is checked.
+        horizon: of the prediction, s; 0: no prediction. None: a fifth of the test.
+        false_alarms: share of flights that the check of the band ends without cause, by the committee's own
+            prediction.
         overrun: share of the period by which a period may be late.
-        clock: gives the time in s; None: time is not watched, as in a simulation.
+        clock: gives the time in s; None: time is not checked, as in a simulation.
 
     Raises:
         InvalidInput: arguments that do not fit each other.
-        NotAvailable: a law in Python, in whose memory nobody can look ahead; pass horizon=0.
+        NotAvailable: a law in Python, whose memory cannot be predicted; pass horizon=0.
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class Guard:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start of a flight; call it at the start of every one."""
+        """Clears the memory; call it at the start of every flight."""
         self.period = 0
         self.tripped = False
         self.reason = ""
@@ -110,11 +111,11 @@ class Guard:
             self._band.reset()
 
     def command(self, state: ArrayLike, target: ArrayLike) -> Floats:
-        """What to send for the coming period.
+        """The command for the coming period.
 
         Args:
-            state: as read (n_x,), SI units, radians; what a sensor did not give is NaN.
-            target: state to lead to (n_x,), the same units.
+            state: reading (n_x,), SI units, radians; NaN for a missing value.
+            target: target state (n_x,), the same units.
 
         Returns:
             Command (n_u,), within its bounds: the test's, or the fallback's once the guard has tripped.
@@ -149,17 +150,16 @@ class Guard:
         return command
 
     def trajectory(self, last: ArrayLike | None = None) -> Trajectory:
-        """The flight: whole, or until the guard tripped, with the reason.
+        """The flight: complete, or until the guard tripped, with the reason.
 
         Args:
             last: the reading after the last command (n_x,); needed unless the guard has tripped.
 
         Returns:
-            A run of even periods; `ended` is "aborted" where the guard tripped, or where the loop ended sooner than the
-            test.
+            A run of even periods; `ended` is "aborted" if the guard tripped, or if the loop ended before the test.
 
         Raises:
-            InvalidInput: no last reading of a flight that was not ended.
+            InvalidInput: `last` is missing and the guard has not tripped.
         """
         dt, n = self.signals.dt, min(self.period, self.test.steps)
         if self.tripped_at is not None:

@@ -17,9 +17,9 @@ from twinloop.trajectory import Trajectory
 
 
 class Guarded(System):
-    """Runs tests with a guard in the loop; a run that the guard ended is returned until then, as aborted.
+    """Runs tests with a guard in the loop; if the guard ends a run, the run up to there is returned as aborted.
 
-    The system flies on under the fallback to the end of the test; `flown` keeps that run, `guard` the guard.
+    The system continues under the fallback to the end of the test; `flown` has that run, `guard` the guard.
 
     Args:
         system: anything with `signals` and `run(test)` that closes the loop with the test's controller.
@@ -47,7 +47,7 @@ class Guarded(System):
             test: what to fly.
 
         Returns:
-            What was measured until the guard tripped, if it did.
+            The measured run, up to the moment when the guard tripped.
         """
         guard = self.make(test)
         run = self.system.run(led_by(guard, test))

@@ -14,49 +14,50 @@ LEAST_MOVES = 100
 
 @dataclass(frozen=True)
 class IdentificationOptions:
-    """How a twin is learnt.
+    """Options of the identification.
 
     Args:
-        form: what a program's outputs mean, "acceleration" (derivatives of the states whose motion no others give),
-            "increment" (what a period adds) or "absolute" (the next state); "auto": derivatives, unless increments
-            describe the readings more briefly, as they do those of a simulator that takes one Euler step a period.
-            Under fixed or bounded terms, whose constants mean one of the two, nothing is searched: derivatives where
-            any are declared, else increments.
-        libraries: that terms are taken from, any of "linear", "quadratic", "damping", "roots", "friction",
-            "trigonometric", "quotients", "cubic"; none: evolved programs only.
-        seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they stand on
+        form: meaning of a program's outputs, "acceleration" (derivatives of the driven states), "increment" (change
+            over a period) or "absolute" (the next state); "auto": derivatives, unless increments describe the
+            readings more briefly, as for a simulator with one Euler step per period. With fixed or bounded terms,
+            whose constants are meant for one of the two, nothing is compared: derivatives if any are declared, else
+            increments.
+        libraries: sources of terms, any of "linear", "quadratic", "damping", "roots", "friction", "trigonometric",
+            "quotients", "cubic"; none: evolved programs only.
+        seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they are on
             the first rung of the ladder.
-        fixed_terms: what is known of the law, such as "rate: -9.81 * sin(angle)": a state that an output drives, and a
-            formula with its constants, which stay as they are.
-        bounded_terms: what is known of constants, such as "rate: sin(angle) in -20 .. -5": the coefficient of a term
-            in the equation of a state lies between two numbers, either of which may be left out; bounds that exclude 0
-            say that the term is in the law.
-        most_readings: that a twin is learnt from, those of all states at one time counted once; of more, whole flights
-            are left out that are neither recent nor were a surprise.
+        fixed_terms: known terms of the law, such as "rate: -9.81 * sin(angle)": a driven state, and a formula with
+            its constants, which stay as they are.
+        bounded_terms: bounds on constants, such as "rate: sin(angle) in -20 .. -5": the coefficient of a term in the
+            equation of a state is between two numbers, either of which may be left out; bounds that exclude 0 mean
+            that the term is in the law.
+        most_readings: largest number of readings that a twin is learnt from, with all states at one time counted
+            once; if there are more, whole flights are left out: old ones that the twin predicted well.
         operators: that evolved programs may use.
         generations: of evolved features; 0: none.
         restarts: of the evolution.
         population: features that are judged at once.
         longest: description length of an evolved expression at most, nats.
-        directions: whether what alike commands do together, as read off the best model so far, is a term of its own, in
-            squares and times states, too.
+        directions: whether directions of alike commands, read off the best model so far, are terms, also in squares
+            and times states.
         moves: of a walk over subsets of terms.
-        starts: walks for each output.
-        largest: terms of an output at most.
-        most_terms: of a rung at most; a library with which there would be more is left out.
-        noise_from_above: whether the noise is also searched from the largest that could be, so that the strongest terms
-            come first, rather than only from what all terms together leave.
-        gusts: whether disturbances may last, as gusts do, rather than be white.
+        starts: number of walks for each output.
+        largest: number of terms of an output.
+        most_terms: largest number of terms of a rung; a library that would exceed it is left out.
+        noise_from_above: whether the noise is also searched from its largest value, so that the strongest terms come
+            first, and not only from the residuals of all terms.
+        gusts: whether disturbances may be correlated, as gusts are, and not only white.
         price_disturbances: whether correlated disturbances that explain less than they cost are dropped in the end.
         implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
             masses.
         lags: whether lags and delays of the actuators are searched.
-        longest_delay: of an actuator, periods, that is tried in any case; longer ones are where a lag may stand in.
-        hidden: whether a hidden state that commands fill and that fades, such as a climb or heat, is searched.
+        longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
+            replaced them.
+        hidden: whether a hidden state that commands fill and that decays, such as a climb or heat, is searched.
         offsets: whether sensors may be late or early against those of the driven states.
         tuning: whether constants are tuned on predictions.
-        tuning_steps: at most.
-        passes: how often terms are selected; from the second on with states that the model has smoothed.
+        tuning_steps: largest number of steps of the tuning.
+        passes: number of selections of terms; from the second on with states that the model has smoothed.
         committee_size: models that judge tests, the best included.
         parts: whether, as long as there is one run, models of its parts are members too.
         divergence_factor: multiple of a state's scale beyond which a run counts as diverged.

@@ -16,13 +16,12 @@ class TestErrors(Recorded, kind="test_errors"):
     """How well a twin follows one selected test.
 
     Args:
-        test: number of the test, None for a run that nobody asked for; a replicate has a row of its own.
+        test: number of the test, None for an attached run; a replicate has its own row.
         open_loop: mean squared error one step ahead, over steps and components, SI units squared.
-        closed_loop: mean squared error of the free run under the test's own controller, or, for a run that nobody asked
-            for, under its recorded commands; the same units; infinite where it
-            diverges.
+        closed_loop: mean squared error of the free run under the test's own controller, or, for an attached run,
+            under its recorded commands; the same units; infinite if it diverges.
         normalised: closed_loop over that of the model that never moves; 1 means useless.
-        before: closed-loop error of the twin that the last `ask` before it knew; None if nothing was asked yet.
+        before: closed-loop error of the twin at the last `ask` before the run; None if there was no `ask` yet.
         after: closed-loop error now.
     """
 
@@ -64,7 +63,7 @@ class StateFit:
         name: of the state.
         unit: of the state.
         rmse: root mean square of recorded minus simulated, in its unit; infinite if the free run diverged.
-        fit: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖), %: 100 is perfect, 0 knows the mean only; None if the state never moved.
+        fit: 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖), %: 100 is perfect, 0 is as good as the mean; None if the state never moved.
         r2: 1 − ‖y − ŷ‖² / ‖y − ȳ‖²; None if the state never moved.
     """
 
@@ -76,7 +75,7 @@ class StateFit:
 
 
 class FitTable(tuple[StateFit, ...]):
-    """How well a twin's free run follows a record, one row a state; printable."""
+    """How well a twin's free run follows a record, one row per state; printable."""
 
     def __str__(self) -> str:
         """A table as text."""

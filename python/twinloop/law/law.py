@@ -17,18 +17,17 @@ class Law:
     """Equations, kinematics, actuators, hidden states, sensors' offsets and the integrator of a twin.
 
     The inputs of the expressions are the states, the effects of the commands in units of their scales, and the hidden
-    states. With the form "acceleration", outputs are the derivatives of the states that no others give, integrated by
-    one Runge-Kutta step of order four a period, to which effects and hidden states are known at its start, middle and
-    end; with "absolute" they are the next state, with "increment" what is added to the state, under the effects in the
-    middle of the period.
+    states. With the form "acceleration", outputs are the derivatives of the driven states. They are integrated by one
+    Runge-Kutta step of order four per period, with effects and hidden states at its start, middle and end. With
+    "absolute" outputs are the next state, with "increment" its change, under the effects in the middle of the period.
 
     Args:
         signals: of the system.
         form: "absolute", "increment" or "acceleration".
-        expressions: where the equations are.
-        outputs: their nodes, in the order of the states that they drive.
+        expressions: with the equations.
+        outputs: nodes of the outputs, in the order of the states that they drive.
         actuation: actuators and hidden states.
-        offsets: by how much later than those of the driven states each state is read (n_x,), s.
+        offsets: delay of each state's readings against those of the driven states (n_x,), s.
     """
 
     signals: Signals
@@ -44,7 +43,7 @@ class Law:
 
         Args:
             model: of the engine.
-            signals: what it is a model of.
+            signals: of the system.
 
         Returns:
             Equations with the bits of the model's program.
@@ -75,12 +74,12 @@ class Law:
 
     @cached_property
     def command_symbols(self) -> tuple[str, ...]:
-        """What the equations call the effect of each command in units of its scale."""
+        """Name in the equations of each command's effect, in units of its scale."""
         return tuple(_scaled(command.name, command.size, self.signals) for command in self.signals.commands)
 
     @cached_property
     def hidden_symbols(self) -> tuple[str, ...]:
-        """What the equations call the hidden states."""
+        """Names of the hidden states in the equations."""
         return tuple(hidden_names(self.signals, len(self.actuation.hidden)))
 
     @property

@@ -32,12 +32,12 @@ class CorrelatedDisturbance(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Noise(Recorded, kind="noise"):
-    """What a twin does not predict.
+    """The noise that a twin does not predict.
 
     Args:
         sensors: standard deviation of each state's sensor (n_x,), in its unit.
-        moves: standard deviation of what a white disturbance adds to each state in a period (n_x,), in its unit.
-        correlated: disturbances that are.
+        moves: standard deviation of the white disturbance of each state per period (n_x,), in its unit.
+        correlated: correlated disturbances.
         dt: period, s.
     """
 
@@ -63,12 +63,12 @@ class Noise(Recorded, kind="noise"):
         return found
 
     def drawn(self, draws: int, steps: int, stream: _core.Stream) -> tuple[Floats, Floats]:
-        """What sensors add to readings (draws, steps + 1, n_x), and disturbances to states (draws, steps, n_x)."""
+        """Draws of sensor noise (draws, steps + 1, n_x) and of disturbances of the states (draws, steps, n_x)."""
         noise = self.sensors * stream.normals(draws, steps + 1, len(self.sensors))
         return noise, self.disturbance(draws, steps, stream)
 
     def disturbance(self, draws: int, steps: int, stream: _core.Stream) -> Floats:
-        """Draws of what disturbances add to the states (draws, steps, n_x)."""
+        """Draws of disturbances of the states (draws, steps, n_x)."""
         added = self.moves * stream.normals(draws, steps, len(self.moves))
         for states, integrated, size, time in self.correlated:
             kept = float(exp(-self.dt / time))

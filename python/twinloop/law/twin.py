@@ -42,19 +42,19 @@ STARTS = 5.0
 
 
 class Twin(Shown, Recorded, kind="twin"):
-    """A model that stands in for the system.
+    """A model that replaces the system in simulations.
 
     Args:
         model: the engine's model.
-        signals: what it is a model of.
-        errors: how well it follows the selected tests.
+        signals: of the system.
+        errors: on the selected tests.
         divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
         members: of the committee, for the band of a simulated run; none: no band.
         noise: of sensors and disturbances, for the band.
         seed: of the band's random numbers.
-        inflation: factor on the spread of the members, where they were found to be too sure.
-        remarks: what a person should know of it and of the data.
-        flights: that it was learnt from, on which its exports are checked.
+        inflation: calibration factor on the spread of the members.
+        remarks: diagnostics of the twin and the data.
+        flights: that it was learnt from; its exports are checked on them.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class Twin(Shown, Recorded, kind="twin"):
 
     @property
     def follows(self) -> bool:
-        """Whether the twin, flown by itself, follows at least half of the flights that it was learnt from."""
+        """Whether the twin's free runs follow at least half of the flights that it was learnt from."""
         noise = 0.0 if self.noise is None else float(np.square(self.noise.sensors).mean())
         lost = 0
         for row in self.errors:
@@ -153,7 +153,7 @@ class Twin(Shown, Recorded, kind="twin"):
         | kind | file | what it is |
         |---|---|---|
         | `python` | `.py` | `simulate(initial_state, commands)` and a class with `step`; it needs nothing but Python |
-        | `c` | `.c`, `.h` | C99 with one period a call; no allocation, nothing but <math.h> |
+        | `c` | `.c`, `.h` | C99 with one period per call; no allocation, nothing but <math.h> |
         | `fmu3`, `fmu2` | `.fmu` | for co-simulation by FMI 3.0 or 2.0: C sources, and a binary for this machine |
         | `casadi` | `.py` | CasADi functions of one period, `start` and `step` |
         | `control` | `.py` | `system`, a nonlinear system of python-control |
@@ -168,13 +168,13 @@ class Twin(Shown, Recorded, kind="twin"):
 
         Args:
             to: a kind, or the path of a file with the suffix of one.
-            kind: of the file where its suffix does not say it: "casadi", "control", "fmu2", "gymnasium", "sympy".
+            kind: of the file, if its suffix is not enough: "casadi", "control", "fmu2", "gymnasium", "sympy".
             precision: of C, "double" or "float".
-            force: also a twin that does not follow its own flights, and without the comparison.
-            episode: what an environment begins with; None: as the first flight did, towards 0, for as long.
+            force: exports also a twin that does not follow its own flights, without the comparison.
+            episode: start, target and length of an environment; None: those of the first flight, with the target 0.
 
         Returns:
-            The text where a kind was asked for (in C the header, then the source), else the paths that were written.
+            The text if `to` is a kind (in C the header, then the source), else the paths that were written.
 
         Raises:
             InvalidInput: no such kind, or a path that cannot be written.
@@ -188,14 +188,14 @@ class Twin(Shown, Recorded, kind="twin"):
         return Law.of(self.model, self.signals)
 
     def equations(self, digits: int = 6) -> str:
-        """The twin as text that SymPy reads, too.
+        """The twin as text, which SymPy reads as well.
 
         Args:
-            digits: significant digits of constants; 17 give every bit back.
+            digits: significant digits of constants; 17 give every bit.
 
         Returns:
-            A legend, then the equations, multiplied out, with the ± of each constant where a committee stands behind
-            the twin. With 17 digits they are as the program computes them.
+            A legend, then the equations, multiplied out, with the ± of each constant if the twin has a committee.
+            With 17 digits they are as the program computes them.
 
         Raises:
             InvalidInput: digits out of range.
@@ -208,11 +208,11 @@ class Twin(Shown, Recorded, kind="twin"):
 
         Args:
             test: any test for the same signals.
-            initial_state: where to start (n_x,), SI units, radians; None: where the test does.
+            initial_state: another start (n_x,), SI units, radians; None: the test's own.
 
         Returns:
-            The predicted run as sensors without noise read it, with the true states beside it, cut where it diverges;
-            with a `band` where a committee stands behind the twin.
+            The predicted run: readings of sensors without noise, and true states, cut where it diverges; with a
+            `band` if the twin has a committee.
 
         Raises:
             InvalidInput: the test is for other signals, or the start for other states.
@@ -230,15 +230,15 @@ class Twin(Shown, Recorded, kind="twin"):
         return dataclasses.replace(run, band=np.stack([mean - half, mean + half]))
 
     def as_flown(self, test: Test | Replay, flown: Trajectory) -> Test | Replay:
-        """A test from where its flight began, to be compared with the flight.
+        """A test with the start of its flight, for a comparison with the flight.
 
         Args:
-            test: that was flown, or the commands of a flight that nobody asked for.
+            test: of the flight, or the commands of an attached flight.
             flown: the flight.
 
         Returns:
-            The same; states that were read further from where they were asked to begin than their sensors explain begin
-            as they were read.
+            The test; a state starts at its first reading if this is further from the test's start than sensor noise
+            explains.
         """
         begun = self.began(flown)
         if isinstance(test, Replay):
@@ -248,7 +248,7 @@ class Twin(Shown, Recorded, kind="twin"):
         return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
 
     def began(self, flown: Trajectory) -> Floats:
-        """Where a flight began, as the twin understands its first reading.
+        """The initial state of a flight, from its first reading.
 
         Args:
             flown: of the same signals.
@@ -262,14 +262,14 @@ class Twin(Shown, Recorded, kind="twin"):
         return began
 
     def spread(self, test: Test | Replay) -> tuple[Floats, Floats] | None:
-        """What members and disturbances, drawn together, make of a test.
+        """Mean and variance of a test's flights over members and disturbances, drawn together.
 
         Args:
             test: any test for the same signals.
 
         Returns:
-            Mean and variance of what is read but for the sensors' noise (n + 1, n_x), over the runs that last; None
-            where no committee stands behind the twin.
+            Mean and variance of the readings without sensor noise (n + 1, n_x), over the runs that do not diverge;
+            None if the twin has no committee.
         """
         drawn = self.drawn(test, DRAWS)
         return None if drawn is None else spread_of(drawn[0], self.signals)
@@ -282,27 +282,27 @@ class Twin(Shown, Recorded, kind="twin"):
             draws: for each member.
 
         Returns:
-            What is read but for the sensors' noise (members × draws, n + 1, n_x), NaN after a run has diverged, and
-            that noise; None where no committee stands behind the twin.
+            Readings without sensor noise (members × draws, n + 1, n_x), NaN after a run has diverged, and that noise;
+            None if the twin has no committee.
         """
         if not self.members or self.noise is None:
             return None
         return committee_runs(self.members, self.noise, test, draws, self.limits, self.seed)
 
     def predict(self, states: ArrayLike, commands: ArrayLike, past: ArrayLike | None = None) -> Floats:
-        """One step.
+        """The state one period later.
 
-        Lags, delays and hidden states make what comes next depend on what was commanded before. Without a `past` each
-        row is the first period of a run.
+        With lags, delays and hidden states it depends on earlier commands. Without a `past` each row is the first
+        period of a run.
 
         Args:
             states: (n_x,) or (rows, n_x), SI units, radians.
             commands: (n_u,) or (rows, n_u), in their units.
-            past: what was commanded since the run began, (p, n_u) or, a run each, (rows, p, n_u), the oldest first, in
-                the commands' units; None: nothing yet.
+            past: earlier commands of the run, (p, n_u) or, one run per row, (rows, p, n_u), the oldest first, in the
+                commands' units; None: none yet.
 
         Returns:
-            The states one period later, in the shape of `states`; not finite where the model is not.
+            The states one period later, in the shape of `states`; not finite if the model's are not.
 
         Raises:
             InvalidInput: shapes that do not fit.
@@ -330,17 +330,17 @@ class Twin(Shown, Recorded, kind="twin"):
         """The twin as an environment of Gymnasium: observations are states, actions are commands, a step is a period.
 
         An episode begins at the initial state, or at `reset(options={"initial_state": …})`; it is truncated after
-        `steps`, and terminates where the twin diverges. Lags, delays and hidden states act as in `simulate`; sensors
-        that are late or early are read as if they were not. Commands are in their own units, not normalised. Each
-        environment is one of its own.
+        `steps`, and terminates if the twin diverges. Lags, delays and hidden states act as in `simulate`; late or
+        early sensors are read as if they were on time. Commands are in their own units, not normalised. Each call
+        makes a new environment.
 
         Args:
-            initial_state: where an episode begins (n_x,), SI units, radians.
+            initial_state: of an episode (n_x,), SI units, radians.
             target_state: for the reward (n_x,), the same units.
             steps: of an episode.
             reward: called with state (n_x,), command (n_u,) and next state (n_x,); by default −dt Σ |next − target| /
                 scale.
-            noisy: whether observations carry the noise of the sensors that the twin estimates.
+            noisy: whether observations have the estimated sensor noise.
 
         Returns:
             A `gymnasium.Env`.
@@ -354,20 +354,20 @@ class Twin(Shown, Recorded, kind="twin"):
     def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
         """The twin around a point, by exact derivatives of its equations.
 
-        Actuators are at rest under the command there, hidden states at 0.
+        Actuators are at rest under the command of the point, hidden states are 0.
 
         Args:
             at: state (n_x,), SI units, radians.
-            command: (n_u,), in the units of the commands; None: under which the state stays as much as it can, near
-                the middle of the bounds or where the actuators rest.
-            discrete: how a period moves on instead of the derivative at an instant.
+            command: (n_u,), in the units of the commands; None: the command that holds the state best, near the
+                middle of the bounds or the rest of the actuators.
+            discrete: whether A and B describe a period instead of the derivative at an instant.
 
         Returns:
-            A and B with the names of their states and commands; delays stand beside them in continuous time.
+            A and B with the names of their states and commands; in continuous time delays are separate.
 
         Raises:
             InvalidInput: shapes that do not fit.
-            NotAvailable: no finite derivatives there, or a twin that only steps and no `discrete=True`.
+            NotAvailable: no finite derivatives there, or a discrete law without `discrete=True`.
         """
         state = floats("State to linearise at", at, (self.signals.n_x,))
         if command is None:
@@ -381,10 +381,10 @@ class Twin(Shown, Recorded, kind="twin"):
 
         Args:
             initial_state: (n_x,), SI units, radians.
-            commands: (n, n_u), in their units, each held for one period; what lies beyond a bound is clipped.
+            commands: (n, n_u), in their units, each held for one period; they are clipped to their bounds.
 
         Returns:
-            The predicted run as sensors without noise read it, with the true states beside it, cut where it diverges.
+            The predicted run: readings of sensors without noise, and true states, cut where it diverges.
 
         Raises:
             InvalidInput: shapes that do not fit.
@@ -428,7 +428,7 @@ def load_twin(path: str | Path) -> Twin:
         The twin, with the same numbers to the bit.
 
     Raises:
-        InvalidInput: no such file, or one that holds no twin.
+        InvalidInput: no such file, or a file without a twin.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from twinloop.trajectory import Trajectory
 class System(Protocol):
     """A simulator, a rig, a robot. Subclass it, or write any class with these two members.
 
-    A system may also offer `default_gains`, a controller that it is safe to begin with, by name.
+    A system may also offer `default_gains`, a safe first controller, by name.
     """
 
     @property
@@ -25,9 +25,9 @@ class System(Protocol):
         """Runs one experiment.
 
         Args:
-            test: the controller to close the loop with, where to start, where to end, for how many steps.
+            test: with the controller, the initial state, the target and the number of steps.
 
         Returns:
-            What was measured; shorter than the test if the run was cut.
+            The measured run; shorter than the test if the run was cut.
         """
         ...

@@ -33,24 +33,25 @@ FATAL = 4
 class FMU(Stepped):
     """Runs tests on an FMU for co-simulation, with FMPy; a new instance for each run.
 
-    **An FMU holds a program for this machine, and running it runs that program with all your rights.** Take one only
-    from people whom you would let do that. A crash of it takes the process with it; a campaign in a store goes on.
+    **An FMU contains a program for this machine, and running it runs that program with all your rights.** Use an FMU
+    only if you would run a program of its author. If it crashes, the process crashes too; a campaign in a store can
+    continue.
 
     Args:
         path: of the file.
         signals: states, commands and the period, which is the communication step.
-        commands: name of the input that is each command, by the command's name; without one, the same name.
-        states: name of the variable that is each state, by the state's name; without one, the same name.
-        start: name of the variable or parameter that is set before initialisation to where a state begins, by the
-            state's name; None: the state's own variable, where it may be set. A state that cannot be set begins where
-            the FMU begins, and is recorded and learnt from there.
+        commands: name of the FMU's input for each command, by the command's name; by default the same name.
+        states: name of the FMU's variable for each state, by the state's name; by default the same name.
+        start: name of the variable or parameter that sets the initial value of a state before initialisation, by the
+            state's name; None: the state's own variable, if it may be set. A state that cannot be set begins at the
+            FMU's own value, and is recorded and learnt from there.
         parameters: values of other variables that are set before initialisation, by name.
         noise: standard deviations of added sensor noise, as in `Simulated`.
         seed: of the noise.
-        default_gains: a controller that it is safe to begin with, by name.
+        default_gains: a safe first controller, by name.
 
     Raises:
-        InvalidInput: no FMU for co-simulation in FMI 2.0 or 3.0, or a variable that it has not.
+        InvalidInput: no FMU for co-simulation in FMI 2.0 or 3.0, or a variable that it does not have.
         NotAvailable: FMPy is not installed.
     """
 

@@ -25,19 +25,18 @@ LONGEST_REASON = 10_000
 class Folder(System):
     """Writes `test-0003.json` and waits for the log of test 3, `flight-0003.csv` or `flight-0003.npz`.
 
-    The sheet holds gains, start, target, steps, period, excitation and what holds that back, by name. The log is as
-    `twinloop.load` reads it, a row for each state; a log that a rig still writes is left alone until it has not changed
-    for `settled` seconds. If the run was stopped, `flight-0003.txt` says why, in a sentence, and is there before the
-    log; then the log may be shorter. Nothing in the folder is ever removed or overwritten: a log that is there when its
-    test is asked for again, after a crash or once it was mended, is read then. A test has one log; to repeat one, make
-    another test of its gains.
+    The sheet has gains, start, target, steps, period, excitation and hold-back, by name. The log has the format of
+    `twinloop.load`, a row for each state; it is read once it has not changed for `settled` seconds. If the run was
+    stopped, the rig writes the reason into `flight-0003.txt`, as a sentence, before the log; then the log may be
+    shorter. Nothing in the folder is ever removed or overwritten: if the log of a test already exists, after a crash
+    or a correction, it is read. A test has one log; to repeat a test, make another one with its gains.
 
     Args:
-        path: of the folder; made if there is none.
+        path: of the folder; made if it does not exist.
         signals: its states, commands and period.
         timeout: seconds to wait for a log; None: for ever.
         settled: seconds for which a log must not have changed.
-        default_gains: a controller that it is safe to begin with, by name.
+        default_gains: a safe first controller, by name.
 
     Raises:
         InvalidInput: a path that is no folder and cannot become one, or times that cannot be used.
@@ -74,13 +73,13 @@ class Folder(System):
         return self._signals
 
     def run(self, test: Test) -> Trajectory:
-        """Asks the rig for one run, and waits for its log.
+        """Writes the sheet of one test, and waits for its log.
 
         Args:
-            test: what it shall fly.
+            test: to fly.
 
         Returns:
-            What it logged.
+            The logged run.
 
         Raises:
             NoAnswer: no log in time, or one that cannot be read; the test still waits, and so does the log.

@@ -22,34 +22,32 @@ from twinloop.trajectory import Trajectory
 class Gymnasium(Stepped):
     """Runs tests in an environment of Gymnasium, version 1.
 
-    Of "Pendulum-v1", "InvertedPendulum-v5" (MuJoCo) and "CartPole-v1" the signals, the states and the way to place them
-    are known; others are described by `signals`, `state` and `place`. A run in which the environment ends the episode
-    is aborted there, and says so; no time limit is put around an environment that is made by its name. Rewards are not
-    looked at.
+    For "Pendulum-v1", "InvertedPendulum-v5" (MuJoCo) and "CartPole-v1" signals, states and start are built in;
+    describe other environments by `signals`, `state` and `place`. If the environment ends the episode, the run is
+    aborted there, with its reason. An environment that is made by its name gets no time limit. Rewards are ignored.
 
-    Actions must be a box of as many numbers as there are commands. A discrete action stands for one of the `levels`:
-    what is sent is the level nearest to the command and what is left of the commands before it, so that on average it
-    is what the controller asked for; what was sent is what is recorded. A twin flies the controller's own commands:
-    it does not know the levels.
+    Actions must be a box with one number per command. A discrete action stands for one of the `levels`. The system
+    sends the level nearest to the command plus the rounding errors so far, so that the mean of the levels follows the
+    controller; the sent levels are recorded. A twin flies the controller's own commands: it does not know the levels.
 
     Args:
         env: name of a registered environment, or an environment that was made.
-        signals: states, commands and the period of `step`; None: the known ones.
-        state: of an observation, the state (n_x,), such as an angle from its cosine and sine; None: the known one, or
-            the observation itself.
-        place: called with the environment after its reset and the state (n_x,) that a test shall begin from; it sets
-            it and returns the observation there. None: the known one; without one, a run begins where `reset` puts it,
-            and is recorded and learnt from there.
-        options: for `reset(options=…)`: a dict, or a function of the state (n_x,) that a test shall begin from.
+        signals: states, commands and the period of `step`; None: the built-in ones.
+        state: function from an observation to the state (n_x,), such as an angle from its cosine and sine; None: the
+            built-in one, or the observation itself.
+        place: called after reset with the environment and the initial state (n_x,) of a test; it sets that state and
+            returns the observation. None: the built-in one; without one, a run begins at the state after `reset`, and
+            is recorded and learnt from there.
+        options: for `reset(options=…)`: a dict, or a function of the initial state (n_x,) of a test.
         levels: command of each discrete action (actions, n_u), in the units of the commands.
         make: arguments for an environment that is made by its name, such as {"g": 9.81}.
         noise: standard deviations of added sensor noise, as in `Simulated`.
         seed: of the noise and of the environment, which is reset with a number drawn from (seed, run).
-        default_gains: a controller that it is safe to begin with, by name.
+        default_gains: a safe first controller, by name.
 
     Raises:
-        InvalidInput: no such environment, one of other actions, or a description that does not fit it.
-        NotAvailable: Gymnasium, or what the environment needs, is not installed.
+        InvalidInput: no such environment, other actions, or a description that does not fit it.
+        NotAvailable: Gymnasium, or a package of the environment, is not installed.
     """
 
     def __init__(

@@ -36,9 +36,8 @@ class Quadrotor(Repeatable, System, kind="quadrotor"):
     The constants are those of the OS4 (S. Bouabdallah, EPFL thesis, 2007); the paper's own are not public.
 
     Args:
-        noise: standard deviation of the sensors, rad on angles and five times as many rad/s on rates. The
-            controller reads the noisy state and the noisy state is recorded; the trajectory's `true_states`
-            keep the other.
+        noise: standard deviation of the sensors, rad on angles and five times as many rad/s on rates. The controller
+            reads the noisy state and the noisy state is recorded; the trajectory's `true_states` has the true one.
         seed: of the noise; run r of this object draws from a stream of (seed, r).
         gyroscopic: signs of the two rotor terms, "physical" (+, −) or "print" (−, −) as in the paper.
         natural_frequency: of the first controller's roll, pitch and yaw, rad/s.
@@ -50,15 +49,15 @@ class Quadrotor(Repeatable, System, kind="quadrotor"):
         thrust_factor: thrust over squared speed, N s².
         drag_factor: torque over squared speed, N m s².
         top_speed: of a rotor, rad/s.
-        drag: torque −drag |rate| rate that brakes the three axes, N m s²: one number, or one an axis.
+        drag: torque −drag |rate| rate that brakes the three axes, N m s²: one number, or one per axis.
         motor_lag: time constant at which a rotor follows its commanded speed, s; the rotors start at hover
             speed, and their speeds are not among the states.
         gusts: standard deviation of a random angular acceleration of each axis, rad/s², correlated over
             0.2 s; run r draws it from another stream of (seed, r).
 
     Raises:
-        InvalidInput: a constant that is not a number above zero, one of the last three or the noise below
-            zero, or an unknown `gyroscopic`.
+        InvalidInput: a constant that is not above zero, a noise, drag, lag or gust below zero, or an unknown
+            `gyroscopic`.
     """
 
     def __init__(
@@ -121,13 +120,12 @@ class Quadrotor(Repeatable, System, kind="quadrotor"):
 
     @classmethod
     def harsh(cls, noise: float = 1e-3, seed: int = 0) -> Quadrotor:
-        """The same vehicle in rougher air with slower motors, to judge a method where its models are wrong.
+        """The same vehicle in rougher air with slower motors, to judge a method with wrong models.
 
-        At the fastest moment of the first controller's flight the drag equals that controller's own damping,
-        so it is felt throughout; |rate| rate is no polynomial. The lag of 30 ms is that of small brushless
-        motors, one and a half periods that no state shows. The gusts of 0.5 rad/s² are a quarter of the
-        acceleration with which the first controller sets out in roll, and bound how well any model can
-        predict a run.
+        At the fastest moment of the first controller's flight the drag equals that controller's own damping, so it
+        matters throughout; |rate| rate is no polynomial. The lag of 30 ms is that of small brushless motors: one and
+        a half periods that no state shows. The gusts of 0.5 rad/s² are a quarter of the first controller's initial
+        acceleration in roll, and limit how well any model can predict a run.
 
         Args:
             noise: standard deviation of the sensors, as in the constructor, rad.
@@ -165,7 +163,7 @@ class Quadrotor(Repeatable, System, kind="quadrotor"):
 
     @property
     def controller(self) -> PID:
-        """One PID an axis in N m, turned into rotor speeds at hover thrust; the box of the gains is ours."""
+        """One PID per axis in N m, converted to rotor speeds at hover thrust; the box of the gains is ours."""
         box = {"kp": (0.0, 0.3), "ki": (0.0, 0.1), "kd": (0.0, 0.1)}
         return PID(
             axes=[(angle, f"{angle}_rate") for angle in ANGLES],
@@ -182,7 +180,7 @@ class Quadrotor(Repeatable, System, kind="quadrotor"):
         """Flies one test; a run that leaves ten times a state's scale is cut there and says so.
 
         Args:
-            test: what to fly.
+            test: to fly.
 
         Returns:
             The measured run, with `true_states`.

@@ -44,8 +44,8 @@ class RotorPy(Repeatable, System, kind="rotorpy"):
 
     Args:
         vehicle: "hummingbird" (0.5 kg, motors of 5 ms) or "crazyflie" (30 g, motors of 72 ms).
-        noise: standard deviation of the sensors, rad on angles and five times as many rad/s on rates; the
-            noisy state is read and recorded, `true_states` keep the other.
+        noise: standard deviation of the sensors, rad on angles and five times as many rad/s on rates; the noisy state
+            is read and recorded, `true_states` has the true one.
         seed: of the noise; run r of this object draws from a stream of (seed, r).
 
     Raises:
@@ -86,7 +86,7 @@ class RotorPy(Repeatable, System, kind="rotorpy"):
 
     @property
     def controller(self) -> PID:
-        """One PID an axis in N m, turned into rotor speeds at hover thrust; the box follows the inertia."""
+        """One PID per axis in N m, converted to rotor speeds at hover thrust; the box follows the inertia."""
         box = {"kp": 400.0, "ki": 100.0, "kd": 60.0}
         gains = {
             f"{angle}.{term}": (0.0, top * moment)
@@ -107,7 +107,7 @@ class RotorPy(Repeatable, System, kind="rotorpy"):
         """Flies one test; a run that tumbles, or leaves ten times a state's scale, is cut there and says so.
 
         Args:
-            test: what to fly.
+            test: to fly.
 
         Returns:
             The measured run, with `true_states`.

@@ -18,16 +18,16 @@ from twinloop.trajectory import Trajectory
 class Simulated(Stepped):
     """Runs tests on `step(state (n_x,), command (n_u,)) -> next state (n_x,)`.
 
-    A run in which a state leaves ten times its scale, or stops being finite, is cut there and says so.
+    A run is cut where a state leaves ten times its scale, or is not finite, and says so.
 
     Args:
         signals: its states, commands and period.
-        step: the state one period later; it may keep no state of its own between runs.
+        step: gives the state one period later; it must have no memory between runs.
         noise: standard deviations of the sensors, in the units of the states: by name, one for each state, or one for
-            all. The noisy state is read and recorded, `true_states` keep the other, which the step function sees.
-        seed: of the noise; run r of this object, and of a campaign that goes on in another process, draws from a stream
-            of (seed, r).
-        default_gains: a controller that it is safe to begin with, by name.
+            all. The noisy state is read and recorded; `true_states` has the true one, which the step function gets.
+        seed: of the noise; run r of this object, or of a campaign that continues in another process, draws from a
+            stream of (seed, r).
+        default_gains: a safe first controller, by name.
 
     Raises:
         InvalidInput: `step` cannot be called, `signals` are none, or a noise or a seed that cannot be used.

@@ -11,15 +11,15 @@ SUBJECTS = ("twin", "controller")
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was checked.
+    """One check of the twin or the controller.
 
     Args:
-        name: of the check, in a word or two that do not change, such as "unseen-flight".
-        subject: "twin" or "controller": what does not hold where it fails.
-        value: what was found; None where it could not be.
-        limit: what it is compared with.
-        passed: whether it holds; what could not be found does not.
-        binding: whether a result that fails it is not to be used; otherwise it is worth a look.
+        name: of the check, a fixed word or two, such as "unseen-flight".
+        subject: "twin" or "controller".
+        value: the measured value; None if it could not be measured.
+        limit: for the value.
+        passed: whether the check passes; without a value it does not.
+        binding: whether a result that fails must not be used; otherwise a failure is a warning.
         sentence: the same for a person, with its numbers.
     """
 
@@ -37,7 +37,7 @@ class Check:
 
     @property
     def verdict(self) -> str:
-        """Passed, failed, or, where it does not bind, look."""
+        """Passed, failed, or look: a failure that is not binding."""
         return "passed" if self.passed else "failed" if self.binding else "look"
 
     def __str__(self) -> str:
@@ -49,17 +49,17 @@ class Checks(tuple[Check, ...]):
 
     @property
     def twin_passed(self) -> bool:
-        """Whether the twin holds: no check of it that binds fails."""
+        """Whether no binding check of the twin fails."""
         return not any(check.binding and not check.passed for check in self if check.subject == "twin")
 
     @property
     def passed(self) -> bool:
-        """Whether twin and controller hold: without that there is no certificate."""
+        """Whether no binding check fails; otherwise there is no certificate."""
         return not self.failed
 
     @property
     def failed(self) -> tuple[Check, ...]:
-        """Those that bind and fail."""
+        """Binding checks that fail."""
         return tuple(check for check in self if check.binding and not check.passed)
 
     def __str__(self) -> str:

@@ -19,13 +19,13 @@ FEWEST = 8
 
 @dataclass(frozen=True, eq=False)
 class Correlations:
-    """Of sequences, by lag.
+    """Correlations of sequences, by lag.
 
     Args:
         lags: in periods (l,).
         values: correlation coefficients (..., l).
-        limit: between − and + of which 99 of 100 coefficients of independent numbers lie.
-        count: of numbers that they were taken from.
+        limit: 99 of 100 coefficients of independent numbers lie between −limit and +limit.
+        count: of numbers in the sequences.
     """
 
     lags: Floats

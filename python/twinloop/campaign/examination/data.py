@@ -17,18 +17,18 @@ LARGE = 3.0
 
 @dataclass(frozen=True)
 class DataQuality:
-    """Of one experiment.
+    """The data quality of one experiment.
 
     Args:
-        number: of the test; None for a run that nobody asked for.
-        seconds: that it lasted.
+        number: of the test; None for an attached run.
+        seconds: its duration.
         ended: "completed", "aborted" or "diverged".
-        moved: the least that a state moved, root mean square about its mean, over its sensor's noise; None where no
-            noise is known.
+        moved: smallest motion of a state: root mean square about its mean, over its sensor's noise; None without a
+            known noise.
         least: name of that state.
         saturated: share of the periods in which a command was at a bound, the most of all commands.
-        large: share of innovations beyond three standard deviations; None where there are none. 0.3 % are expected.
-        usage: the most that its readings used of the envelope; 0 without one.
+        large: share of innovations beyond three standard deviations; None without innovations. 0.3 % are expected.
+        usage: largest usage of the envelope by its readings; 0 without an envelope.
         fingerprint: the first 16 hexadecimal digits of the SHA-256 of times, states and commands, as little-endian
             doubles in this order.
     """

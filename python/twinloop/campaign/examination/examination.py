@@ -67,11 +67,11 @@ class Frequency:
 
     Args:
         input: name of the axis or command.
-        state: that it moves most.
+        state: that this input moves most.
         frequencies: of the twin's response (f,), rad/s.
-        twin: its gains, complex (models, f), the twin's first.
-        flown: what the flights show.
-        place: of the input and the state in that.
+        twin: complex gains (models, f), the twin's first.
+        flown: responses that the flights show.
+        place: of the input and the state in `flown`.
     """
 
     input: str
@@ -83,11 +83,11 @@ class Frequency:
 
 
 class Examination:
-    """What an engineer checks.
+    """The numbers that an engineer checks, each computed on first access.
 
     Args:
-        campaign: with at least one experiment told; it is not changed.
-        earlier: what its method knows beside that.
+        campaign: with at least one run; it is not changed.
+        earlier: further knowledge of its method.
     """
 
     def __init__(self, campaign: Campaign, earlier: Earlier) -> None:
@@ -109,13 +109,13 @@ class Examination:
 
     @property
     def learnt(self) -> int:
-        """How many of the experiments, the first ones, the twin has learnt."""
+        """Number of experiments that the twin has learnt; they are the first ones."""
         history = self.campaign.history
         return len(history[-1].tests) if history else 0
 
     @cached_property
     def unseen(self) -> tuple[Unseen, ...]:
-        """Flights that had not been learnt beside what was predicted of them, in the order told."""
+        """Flights beside their predictions from before learning, in the order of `tell`."""
         return unseen_flights(self.experiments, self.twins_before)
 
     @cached_property
@@ -125,14 +125,14 @@ class Examination:
 
     @cached_property
     def autocorrelation(self) -> Correlations | None:
-        """Of the innovations of each state (n_x, lags); None where there are none, or flights are too short."""
+        """Of the innovations of each state (n_x, lags); None without innovations, or if flights are too short."""
         if self.innovations is None or self._lags == 0:
             return None
         return autocorrelation([found[1:] for found in self.innovations], self._lags)
 
     @cached_property
     def crosscorrelation(self) -> Correlations | None:
-        """Of the innovations of each state with each command before (n_x, n_u, lags); None as for `autocorrelation`."""
+        """Of each state's innovations with each earlier command (n_x, n_u, lags); None as for `autocorrelation`."""
         if self.innovations is None or self._lags == 0:
             return None
         commands = [run.trajectory.commands for run in self.experiments[: len(self.innovations)]]
@@ -140,13 +140,13 @@ class Examination:
 
     @cached_property
     def errors(self) -> ErrorMap:
-        """Error of each twin on each flight, those that it had not learnt among them."""
+        """Error of each twin on each flight, learnt or not."""
         known = {learnt: row for (learnt, _), row in zip(self.twins_before, self._errors, strict=True)}
         return error_map(self.campaign.history, self.experiments, known)
 
     @cached_property
     def open_poles(self) -> tuple[Pole, ...]:
-        """Of the twin at the target; none where it has no slope there."""
+        """Poles of the twin at the target; empty if it cannot be linearised there."""
         try:
             return self._open_poles()
         except NotAvailable:
@@ -160,7 +160,7 @@ class Examination:
 
     @cached_property
     def data(self) -> tuple[DataQuality, ...]:
-        """What each flight is worth as data."""
+        """Data quality of each flight."""
         sensors = None if self.twin.noise is None else self.twin.noise.sensors
         found = []
         for place, run in enumerate(self.experiments):
@@ -175,7 +175,7 @@ class Examination:
 
     @cached_property
     def movement(self) -> tuple[str, float] | None:
-        """The state that moved least, and how much in the flight that moved it most, in noises; None: none is known."""
+        """The state that moved least, and its largest motion in a flight, in sensor noises; None: unknown noise."""
         sensors = None if self.twin.noise is None else self.twin.noise.sensors
         found = [
             movements(continued(flown, self.signals, flown.states[0]).states, sensors)
@@ -192,7 +192,7 @@ class Examination:
 
     @property
     def last_miss(self) -> float | None:
-        """Predicted minus flown quality of the last flight that has both, in the spreads that were told."""
+        """Predicted minus flown quality of the last flight that has both, in predicted spreads."""
         for run in reversed(self.experiments):
             test = run.test
             if test is None or run.quality is None or test.predicted is None or not test.spread:
@@ -211,22 +211,22 @@ class Examination:
 
     @cached_property
     def margins(self) -> Margins | None:
-        """Of the controller to fly, at the target; None where it or the twin has no slope there."""
+        """Of the controller to fly, at the target; None if it or the twin cannot be linearised there."""
         return None if self._loops is None else margins_of(*self._loops, "axes")
 
     @cached_property
     def loops(self) -> tuple[LoopCurves, ...]:
-        """Each loop over frequency; none where there are no margins."""
+        """Each loop over frequency; empty without margins."""
         return () if self._loops is None else loop_curves(*self._loops)
 
     @cached_property
     def closed(self) -> ClosedCurves | None:
-        """What sensors' noise does to commands and disturbances to states; None where there are no margins."""
+        """Effect of sensor noise on commands and of disturbances on states; None without margins."""
         return None if self._loops is None else closed_curves(self._loops[0][0], self.setup, self.twin.noise)
 
     @cached_property
     def closed_poles(self) -> tuple[Pole, ...]:
-        """Of the loops of the twin, closed."""
+        """Poles of the twin's closed loops."""
         return () if self._loops is None else poles(self._loops[0][0].closed_poles(), self.signals.dt)
 
     @cached_property
@@ -278,7 +278,7 @@ class Examination:
 
     @cached_property
     def old(self) -> Trajectory | None:
-        """What the twin makes of the old gains on the campaign's own task, without excitation."""
+        """The twin's flight with the old gains on the campaign's own task, without excitation."""
         if self.first_flown is None or self.first_flown.test is None or self.best is None:
             return None
         return self.twin.simulate(replace(self.best.quiet(), genes=self.first_flown.test.genes))
@@ -298,13 +298,13 @@ class Examination:
 
     @cached_property
     def moved(self) -> tuple[int, ...]:
-        """States whose target is elsewhere than their start; all where none is."""
+        """States whose target differs from their start; all states if none does."""
         scales = [state.scale for state in self.signals.states]
         found = moved_states(self.setup.initial_state, self.setup.final_target, scales)
         return tuple(found) or tuple(range(self.signals.n_x))
 
     def step(self, trajectory: Trajectory) -> tuple[StepAnswer, ...]:
-        """How a flight of the campaign's task answers, each state whose target is elsewhere than its start.
+        """The step response of a flight of the campaign's task, for each state whose target differs from its start.
 
         Args:
             trajectory: flown or predicted.
@@ -325,7 +325,7 @@ class Examination:
         )
 
     def effort(self, trajectory: Trajectory) -> tuple[Effort, ...]:
-        """What a flight asks of each command.
+        """The use of each command by a flight.
 
         Args:
             trajectory: flown or predicted.
@@ -334,12 +334,12 @@ class Examination:
 
     @cached_property
     def slopes(self) -> tuple[GainSlope, ...]:
-        """The quality against each gain, the others held; none where there is no controller."""
+        """The quality against each gain, with the other gains fixed; empty without a controller."""
         return () if self.best is None else gain_slopes(self.twin, self.setup, self.best)
 
     @cached_property
     def beyond(self) -> float | None:
-        """Share of the planned flight that lies beyond all states and commands that were flown."""
+        """Share of the planned flight beyond the range of states and commands that was flown."""
         if self.planned is None or self.planned.steps == 0:
             return None
         flown = np.concatenate(

@@ -19,15 +19,15 @@ FEWEST = 16
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """From inputs to outputs.
+    """Frequency responses from inputs to outputs.
 
     Args:
         frequencies: (f,), rad/s.
         gains: complex (f, outputs, inputs).
-        coherence: share of each output that all inputs together explain (f, outputs), less what as many segments would
-            show by chance, and no more than the sensors' noise leaves room for.
-        needed: coherence from which a response is believed: 0.6 (Tischler and Remple 2012, section 7.5), or what chance
-            would give once in a hundred times.
+        coherence: share of each output that all inputs together explain (f, outputs), minus the value that the same
+            number of segments gives by chance, and at most the share that is not sensor noise.
+        needed: smallest coherence of a response that is accepted: 0.6 (Tischler and Remple 2012, section 7.5), or the
+            value that chance exceeds once in a hundred times.
     """
 
     frequencies: Floats

@@ -21,8 +21,8 @@ class ErrorMap:
 
     Args:
         iterations: number of each identification, the columns.
-        tests: number of each flight, the rows; None for a run that nobody asked for.
-        values: (tests, iterations); NaN where it is not known, infinite where the twin diverged.
+        tests: number of each flight, the rows; None for an attached run.
+        values: (tests, iterations); NaN if unknown, infinite if the twin diverged.
         learnt: whether the twin had learnt the flight (tests, iterations).
     """
 

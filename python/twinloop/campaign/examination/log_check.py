@@ -35,10 +35,10 @@ class Column:
         name: of the state or command.
         unit: of it.
         command: whether it is a command.
-        least: its least value that is a number; None where it has no number.
-        greatest: its greatest.
+        least: its smallest number; None if it has no number.
+        greatest: its largest number.
         missing: rows without a finite number.
-        moved: of a state, root mean square about its mean over the most noise that it can have; None: unknown.
+        moved: of a state, root mean square about its mean over an upper bound of its noise; None: unknown.
         at_bound: of a command, share of the rows at a bound.
         beyond: share of the rows beyond its bounds or its envelope.
     """
@@ -56,17 +56,17 @@ class Column:
 
 @dataclass(frozen=True)
 class LogCheck:
-    """What a log is worth.
+    """The result of checking a log.
 
     Args:
-        rows: of it.
-        seconds: from its first to its last time.
+        rows: number of rows.
+        seconds: from the first to the last time.
         period: the median time between two rows, s; None with fewer than two rows.
-        jitter: the largest departure from the declared period where no row was lost, as a share of it.
-        gaps: pairs of rows between which others were lost.
+        jitter: largest deviation from the declared period without a lost row, as a share of the period.
+        gaps: number of pairs of rows with lost rows between them.
         longest_gap: s; None without a gap.
         columns: states, then commands.
-        remarks: what a person should know; a serious one is to be mended first.
+        remarks: diagnostics; a serious one must be corrected first.
     """
 
     rows: int
@@ -80,18 +80,18 @@ class LogCheck:
 
     @property
     def fit(self) -> bool:
-        """Whether nothing serious speaks against learning from it."""
+        """Whether the log has no serious remark."""
         return not any(remark.serious for remark in self.remarks)
 
 
 def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> LogCheck:
-    """Looks at a log as it was recorded.
+    """Checks a log as it was recorded.
 
     Args:
         t: times of the rows (n + 1,), s.
         states: readings (n + 1, n_x), in the units of the signals.
         commands: as sent (n, n_u).
-        signals: that they should be.
+        signals: declared signals.
     """
     steps = np.diff(t)
     known = steps[np.isfinite(steps)]

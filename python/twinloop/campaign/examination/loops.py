@@ -79,14 +79,14 @@ class LoopCurves:
 
 @dataclass(frozen=True, eq=False)
 class ClosedCurves:
-    """What acts on all loops, closed, over frequency; of the twin.
+    """Transfer functions of the twin's closed loops over frequency.
 
     Args:
         frequencies: (f,), rad/s.
         to_commands: |C S|, from noise on each state, in units of its scale, to each command, in units of its half range
             (n_u, n_x, f).
-        to_states: |P S|, from what is added to each command to each state, in the same units (n_x, n_u, f).
-        noise_of_commands: standard deviation that the sensors' noise causes in each command (n_u,), in its unit.
+        to_states: |P S|, from a disturbance of each command to each state, in the same units (n_x, n_u, f).
+        noise_of_commands: standard deviation of each command due to sensor noise (n_u,), in its unit.
     """
 
     frequencies: Floats

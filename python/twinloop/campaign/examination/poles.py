@@ -13,14 +13,14 @@ FAR = 1e-9
 
 @dataclass(frozen=True)
 class Pole:
-    """A pole s, or a pair of them; exp(s t) is what becomes of it.
+    """A pole s, or a pair of poles; its motion is exp(s t).
 
     Args:
         real: of s, 1/s.
         imaginary: of s, rad/s, 0 or more.
         frequency: |s|, rad/s.
-        damping: −real / |s|; 1 where it does not swing, −1 where it grows without swinging.
-        time: after which 1/e is left, s; infinite where nothing fades, negative where it grows.
+        damping: −real / |s|; 1 without oscillation, −1 if it grows without oscillation.
+        time: time constant, s; infinite without decay, negative if the motion grows.
     """
 
     real: float

@@ -15,14 +15,14 @@ SETTLED = 0.05
 
 @dataclass(frozen=True)
 class StepAnswer:
-    """How one state goes from where it starts to its target.
+    """The step response of one state, from its start to its target.
 
     Args:
         state: its name.
-        rise: time from 10 % to 90 % of the step, s; None where it does not get there.
-        overshoot: share of the step by which it goes beyond.
-        settling: time after which it stays within 5 % of the step, s; None where it does not.
-        steady_state_error: share of the step by which it is off at the end.
+        rise: time from 10 % to 90 % of the step, s; None if it does not reach 90 %.
+        overshoot: as a share of the step.
+        settling: time after which it stays within 5 % of the step, s; None if it does not settle.
+        steady_state_error: error at the end, as a share of the step.
     """
 
     state: str

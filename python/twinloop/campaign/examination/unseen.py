@@ -16,18 +16,18 @@ from twinloop.trajectory import Trajectory, continued
 
 @dataclass(frozen=True, eq=False)
 class Unseen:
-    """A flight and the free run of a twin that had not learnt it.
+    """A flight and the free run of the twin before it learnt this flight.
 
     Args:
         place: of the experiment among all, from 0.
-        number: of the test; None for a run that nobody asked for.
-        learnt: how many experiments the twin had learnt.
+        number: of the test; None for an attached run.
+        learnt: number of experiments that the twin had learnt.
         flown: the flight.
-        predicted: by the twin, from where the flight began, under the test's own controller; with a band where the
-            committee of that time is still known.
-        error: mean squared error over that of a model that never moves; infinite where the free run diverged.
-        rmse: of each state (n_x,), in its unit; infinite where it diverged.
-        fit: FIT % of each state (n_x,); NaN where it never moved.
+        predicted: by the twin, from the start of the flight, under the test's own controller; with a band if the
+            committee of that time is known.
+        error: mean squared error over that of a model that never moves; infinite if the free run diverged.
+        rmse: of each state (n_x,), in its unit; infinite if the free run diverged.
+        fit: FIT % of each state (n_x,); NaN if it never moved.
         inside: share of the readings inside the band; None without one.
     """
 

@@ -22,7 +22,7 @@ SHARES = (0.8, 0.9, 1.0, 1.1, 1.2)
 
 @dataclass(frozen=True, eq=False)
 class Effort:
-    """What one flight asks of one command.
+    """The use of one command by a flight.
 
     Args:
         command: its name.
@@ -63,14 +63,14 @@ def effort(trajectory: Trajectory, signals: Signals) -> tuple[Effort, ...]:
 
 @dataclass(frozen=True)
 class GainSlope:
-    """How the quality hangs on one gain.
+    """The dependence of the quality on one gain.
 
     Args:
         gain: its name.
-        value: that it has, in its unit.
-        factors: on it.
-        qualities: on the twin, without noise, for each factor; infinite where the flight diverges; None where the
-            bounds do not allow it.
+        value: of the gain, in its unit.
+        factors: on the value.
+        qualities: on the twin, without noise, for each factor; infinite if the flight diverges; None beyond the
+            gain's bounds.
         at_bound: "", "lower" or "upper": see `Family.at_bounds`.
     """
 

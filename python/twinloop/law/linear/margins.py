@@ -27,16 +27,16 @@ HALVINGS = 60
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """How far one loop is from instability; a gain of 2 is 6 dB.
+    """Stability margins of one loop; a gain of 2 is 6 dB.
 
     Args:
-        loop: where it is broken: the name of an axis or of a command.
-        stable: whether all loops together are stable; if not, margins mean nothing.
-        gain: factor above 1 by which the loop's gain may grow; infinite where it may grow without end.
-        gain_down: factor below 1 to which it may fall; 0 where it may vanish.
-        phase: what may be lost at the crossover, rad.
-        delay: what may be added to the loop, s.
-        crossover: highest frequency at which the loop's gain is 1, rad/s; 0 where it never is.
+        loop: name of the axis or command at which it is broken.
+        stable: whether all loops together are stable; if not, the margins mean nothing.
+        gain: factor above 1 by which the loop's gain may grow; infinite without a limit.
+        gain_down: factor below 1 to which it may fall; 0 without a limit.
+        phase: phase margin at the crossover, rad.
+        delay: delay that may be added to the loop, s.
+        crossover: highest frequency at which the loop's gain is 1, rad/s; 0 if it is never 1.
         sensitivity: Ms, the largest |1 / (1 + L)|.
         complementary: Mt, the largest |L / (1 + L)|.
     """
@@ -163,10 +163,10 @@ class Margins:
     """Margins of the loops of a controller, by loop, each broken while the others stay closed; printable.
 
     Args:
-        broken_at: "axes", where the law of each axis leaves for the mixer, or "commands".
+        broken_at: "axes", between the law of each axis and the mixer, or "commands".
         nominal: of the twin.
         worst: the worst of each margin over the committee.
-        members: how many models that has.
+        members: number of models in the committee.
     """
 
     broken_at: str

@@ -13,10 +13,10 @@ from twinloop.errors import NotAvailable
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """dx/dt = A x + B u, or x[k+1] = A x[k] + B u[k], for departures x and u from a point; C x is read of them.
+    """dx/dt = A x + B u, or x[k+1] = A x[k] + B u[k], for deviations x and u from a point; C x is the reading.
 
-    Behind the states of the signals stand those that actuators and hidden states bring: the effect of a command that
-    lags, a hidden state and, where time is discrete, commands on their way and states that a late sensor still reads.
+    After the states of the signals come those of actuators and hidden states: the effect of a command with a lag, a
+    hidden state and, in discrete time, delayed commands and earlier states that a late sensor reads.
 
     Args:
         A: (n, n), in the units of the states and s.
@@ -25,12 +25,11 @@ class Linear:
         commands: names of the n_u commands.
         state: the point (n,).
         command: of the point (n_u,).
-        drift: where the law leads from the point: the derivative there, or what a period adds (n,); 0 at an
-            equilibrium.
-        dt: period, s; None where time is continuous.
-        delays: of each command, s, that A and B do not hold (n_u,); where time is discrete they hold all, and it is 0.
-        C: (n, n), what sensors read of each state: the state itself where they are in time or time is continuous.
-        offsets: by how much later each state is read, s, that C does not hold (n,); 0 where time is discrete.
+        drift: the derivative at the point, or the change over a period (n,); 0 at an equilibrium.
+        dt: period, s; None in continuous time.
+        delays: of each command, s, outside A and B (n_u,); 0 in discrete time, where A and B contain them.
+        C: (n, n), from states to readings; the identity in continuous time, or if all sensors are on time.
+        offsets: delay of each state's readings, s, outside C (n,); 0 in discrete time.
     """
 
     A: Floats
@@ -46,10 +45,11 @@ class Linear:
     offsets: Floats
 
     def to_control(self) -> Any:
-        """The same as a state space of python-control, whose outputs are all states.
+        """The same as a state space of python-control.
 
         Returns:
-            A `control.StateSpace` with the names of the states and commands; outputs are what is read of the states.
+            A `control.StateSpace` with the names of the states and commands; its outputs are the readings of the
+            states.
 
         Raises:
             NotAvailable: python-control is missing, or time is continuous and a command or a sensor is delayed.
@@ -76,13 +76,13 @@ class Linear:
         )
 
     def response(self, frequencies: Floats) -> np.ndarray:
-        """From commands to what is read of the states.
+        """The frequency response from commands to the readings of the states.
 
         Args:
             frequencies: (f,), rad/s.
 
         Returns:
-            Complex gains (f, n, n_u), the delays and offsets among them.
+            Complex gains (f, n, n_u), with delays and offsets.
         """
         s = 1j * frequencies
         points = s if self.dt is None else np.exp(s * self.dt)
