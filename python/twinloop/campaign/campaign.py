@@ -18,6 +18,7 @@ from twinloop.campaign.assessment import Advice, advice, controller_to_fly, rmse
 from twinloop.campaign.certificate import Certificate, certificate
 from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.cost import Cost, cost
+from twinloop.campaign.entering import attached_run, flown_test
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Earlier, Examination
@@ -215,7 +216,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
             InvalidInput: a test of another campaign, or a useless trajectory; nothing has changed.
         """
         with self._entering():
-            self._book.tell(test, trajectory, self._error_so_far)
+            own = self._book.own(test)
+            self._book.enter(flown_test(self.setup, own, trajectory, self._error_so_far))
         self.interrupted = False
 
     def tell_failed(self, test: Test, reason: str, partial: Trajectory | None = None) -> None:
@@ -255,7 +257,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
                 ' controllers only; choose preset="default".'
             )
         with self._entering():
-            self._book.attach(trajectory, self._error_so_far)
+            self._book.enter(attached_run(self.setup, trajectory, self._error_so_far))
         self.interrupted = False
 
     def abandon(self, test: Test) -> None:

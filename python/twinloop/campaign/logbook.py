@@ -7,14 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from twinloop.arrays import Floats
-from twinloop.campaign.entering import (
-    Judge,
-    attached_run,
-    flown_test,
-    partial_run,
-    replay_of_record,
-    with_run,
-)
+from twinloop.campaign.entering import Judge, flown_test, partial_run, replay_of_record, with_run
 from twinloop.campaign.history import Experiment, Failure, Planned, TestLoop
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
@@ -85,7 +78,7 @@ class Logbook(Recorded, kind="logbook"):
             replayed = replay_of_record(run, setup) if number is None else book._numbered(number, at)
             read_run = Experiment.from_record(run, replayed)
             check_recorded(read_run.trajectory, setup.limits, replayed.steps, least=1)
-            book._enter(read_run)
+            book.enter(read_run)
         failures = read(list[tuple[int, Any]], found["failures"], f"{where}.failures")
         for i, (number, failure) in enumerate(failures):
             at = f"{where}.failures[{i}]"
@@ -117,7 +110,7 @@ class Logbook(Recorded, kind="logbook"):
         book = self.copied()
         book.experiments, book.selected = [], self.setup.none_selected()
         for run in self.experiments[:told]:
-            book._enter(run)
+            book.enter(run)
         return book
 
     def copied(self) -> Logbook:
@@ -191,30 +184,14 @@ class Logbook(Recorded, kind="logbook"):
         ends = setup.initial_state, setup.target_state
         return Test(setup.family, genes, *ends, setup.steps, number=number, campaign=self.identity)
 
-    def tell(self, test: object, trajectory: object, judge: Judge) -> None:
-        """Enters a run of a test.
+    def enter(self, run: Experiment) -> None:
+        """Enters a run that was checked.
 
         Args:
-            test: that was run.
-            trajectory: what the system answered.
-            judge: the error on it of what is known so far.
-
-        Raises:
-            InvalidInput: a test of another campaign, or a trajectory that cannot be learnt from.
+            run: of a test of this campaign, or one that nobody asked for.
         """
-        self._enter(flown_test(self.setup, self.own(test), trajectory, judge))
-
-    def attach(self, trajectory: object, judge: Judge) -> None:
-        """Enters a run that nobody asked for.
-
-        Args:
-            trajectory: what was recorded, of any length.
-            judge: the error on it of what is known so far.
-
-        Raises:
-            InvalidInput: a trajectory that cannot be learnt from.
-        """
-        self._enter(attached_run(self.setup, trajectory, judge))
+        self.selected = with_run(self.selected, run.replayed, run.trajectory)
+        self.experiments.append(run)
 
     def fail(self, test: object, reason: str, partial: Trajectory | None, judge: Judge) -> None:
         """Enters that a test failed on the system.
@@ -231,7 +208,7 @@ class Logbook(Recorded, kind="logbook"):
         own = self.own(test)
         recorded = partial_run(partial, reason)
         if recorded is not None:
-            self._enter(flown_test(self.setup, own, recorded, judge, least=1))
+            self.enter(flown_test(self.setup, own, recorded, judge, least=1))
         self.failures.append(Failure(own, reason, recorded=recorded is not None))
 
     def abandon(self, test: object) -> None:
@@ -272,10 +249,6 @@ class Logbook(Recorded, kind="logbook"):
         """Tests that were asked for, and neither told nor abandoned, in their order."""
         done = self.flown | set(self.abandoned)
         return [self.tests[entry.test] for _, entry in self.asked if entry.test not in done]
-
-    def _enter(self, run: Experiment) -> None:
-        self.selected = with_run(self.selected, run.replayed, run.trajectory)
-        self.experiments.append(run)
 
     def _numbered(self, number: int, where: str) -> Test:
         if not 0 <= number < len(self.tests):

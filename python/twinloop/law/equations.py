@@ -65,15 +65,20 @@ class _Page:
         self.exact = digits == EXACT
         self.members = () if self.exact else tuple(members)
         self.expressions = law.expressions if self.exact else Expressions()
+
+        def expanded(each: Law) -> list[Polynomial]:
+            expansion = Expansion(each.expressions, self.expressions)
+            return [expansion.polynomial(output) for output in each.outputs]
+
         self.polynomials: list[Polynomial] = []
         if self.exact:
             self.outputs = list(law.outputs)
         else:
             for place in range(law.inputs):
                 self.expressions.input(place)
-            self.polynomials = _expanded(law, self.expressions)
+            self.polynomials = expanded(law)
             self.outputs = [written(self.expressions, polynomial) for polynomial in self.polynomials]
-        self.of_members = [_expanded(member, self.expressions) for member in self.members]
+        self.of_members = [expanded(member) for member in self.members]
         prefix = _unused("t", law.symbols)
         self.writer = Writer(self.expressions, self.outputs, law.symbols, digits, prefix, self.exact)
 
@@ -143,41 +148,31 @@ class _Page:
     # The equations
 
     def body(self) -> list[str]:
-        named = self.writer.names.items()
+        """Parts that have a name, then an equation for each state, then one for each hidden state."""
+        law, names = self.law, self.signals.state_names
         lines = [
             line
-            for node, name in named
+            for node, name in self.writer.names.items()
             for line in _equation(name, [_Piece(self.writer.terms(node, define=True))])
         ]
-        for left, pieces in self._states():
-            lines += _equation(left, pieces)
-        for number, name in enumerate(self.law.hidden_symbols):
+        pieces = [self._pieces(output) for output in range(len(self.outputs))]
+        if law.form == "acceleration":
+            roots, driven = law.derivatives(), self.signals.driven
+            turned = Writer(law.expressions, roots, law.symbols, EXACT, "", False)
+            for place, (name, root) in enumerate(zip(names, roots, strict=True)):
+                given = [_Piece(turned.terms(root))]
+                own = pieces[driven.index(place)] if place in driven else given
+                lines += _equation(f"d {name} / dt", own)
+        else:
+            for name, own in zip(names, pieces, strict=True):
+                if law.form == "increment":
+                    # What is added is summed first, which rounding may show.
+                    itself = ("+", name)
+                    own = [_Piece([*own[0].terms, itself])] if self.exact else [_Piece([itself]), *own]
+                lines += _equation(f"{name}[k+1]", own)
+        for number, name in enumerate(law.hidden_symbols):
             lines += self._filling(name, number)
         return lines
-
-    def _states(self) -> list[tuple[str, list[_Piece]]]:
-        names = self.signals.state_names
-        pieces = [self._pieces(output) for output in range(len(self.outputs))]
-        if self.law.form == "acceleration":
-            roots = self.law.derivatives()
-            turned = Writer(self.law.expressions, roots, self.law.symbols, EXACT, "", False)
-            return [
-                (f"d {name} / dt", pieces[self.signals.driven.index(place)])
-                if place in self.signals.driven
-                else (f"d {name} / dt", [_Piece(turned.terms(root))])
-                for place, (name, root) in enumerate(zip(names, roots, strict=True))
-            ]
-        if self.law.form == "increment":
-            bracket = [self._added(place) for place in range(len(names))]
-            return [(f"{name}[k+1]", piece) for name, piece in zip(names, bracket, strict=True)]
-        return [(f"{name}[k+1]", piece) for name, piece in zip(names, pieces, strict=True)]
-
-    def _added(self, place: int) -> list[_Piece]:
-        """A state, and what is added to it; the sum of that comes first, which rounding may show."""
-        name, pieces = self.signals.state_names[place], self._pieces(place)
-        if not self.exact:
-            return [_Piece([("+", name)]), *pieces]
-        return [_Piece([*pieces[0].terms, ("+", name)])]
 
     def _pieces(self, output: int) -> list[_Piece]:
         """An output, in pieces that share a constant where a committee stands behind it."""
@@ -216,11 +211,6 @@ class _Page:
     def _alike(self, member: Law) -> bool:
         """Whether a member has hidden states like those of the law."""
         return len(member.actuation.hidden) == len(self.law.actuation.hidden)
-
-
-def _expanded(law: Law, target: Expressions) -> list[Polynomial]:
-    expansion = Expansion(law.expressions, target)
-    return [expansion.polynomial(output) for output in law.outputs]
 
 
 def _note(spread: Spread) -> str:

@@ -74,7 +74,10 @@ class Expansion:
         if operation == SHARE:
             operation, parts = "*", [*parts, {(): value}]
         if operation in ("+", "-"):
-            found = _sum(parts[0], parts[1], 1.0 if operation == "+" else -1.0)
+            sum_, sign = dict(parts[0]), 1.0 if operation == "+" else -1.0
+            for monomial, weight in parts[1].items():
+                _enter(sum_, monomial, sign * weight)
+            found: Polynomial = sum_
         elif operation == "*":
             found = self._product(parts[0], parts[1])
         elif operation == POWER:
@@ -184,13 +187,6 @@ def _times(first: Monomial, second: Monomial) -> Monomial:
     for factor, exponent in second:
         exponents[factor] = exponents.get(factor, 0) + exponent
     return tuple(sorted(exponents.items()))
-
-
-def _sum(a: Polynomial, b: Polynomial, sign: float) -> Polynomial:
-    found = dict(a)
-    for monomial, weight in b.items():
-        _enter(found, monomial, sign * weight)
-    return found
 
 
 def _enter(found: dict[Monomial, float], monomial: Monomial, weight: float) -> None:

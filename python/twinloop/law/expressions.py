@@ -93,8 +93,7 @@ class Expressions:
 
     def constant_value(self, number: int) -> float | None:
         """The value of a node that is a constant, None for others."""
-        node = self.nodes[number]
-        return node.value if node.operation == CONSTANT else None
+        return self.nodes[number].value if self.nodes[number].operation == CONSTANT else None
 
     def apply(self, operation: str, first: int, second: int | None = None) -> int:
         """The node of an operation, folded where the result is known; operands stay in their order.

@@ -161,7 +161,13 @@ class Writer:
         if operation == POWER:
             return self.dialect.power.format(self._operand(operands[0], ATOM), int(value)), HIGH
         if operation in ("+", "-"):
-            return self._sum(operation, operands)
+            first, second = self._in_order(operation, operands)
+            if operation == "-" and self.expressions.constant_value(first) == 0.0:
+                text = self._operand(second, PRODUCT)
+                return f"-({text})" if text.startswith("-") else f"-{text}", SUM
+            sign, text = _signed(self._operand(second, PRODUCT))
+            sign = sign if operation == "+" else _opposite(sign)
+            return f"{self._operand(first, SUM, first=True)} {sign} {text}", SUM
         division = self.dialect.division
         if operation == "/" and division is not None and not self._is_plain_divisor(operands[1]):
             return division.format(*(self.text(operand) for operand in operands)), ATOM
@@ -181,15 +187,6 @@ class Writer:
         value = self.expressions.constant_value(number)
         upright = self.expressions[number].operation == UPRIGHT
         return upright or (value is not None and abs(value) > SMALLEST_DIVISOR)
-
-    def _sum(self, operation: str, operands: tuple[int, ...]) -> tuple[str, int]:
-        first, second = self._in_order(operation, operands)
-        if operation == "-" and self.expressions.constant_value(first) == 0.0:
-            text = self._operand(second, PRODUCT)
-            return f"-({text})" if text.startswith("-") else f"-{text}", SUM
-        sign, text = _signed(self._operand(second, PRODUCT))
-        sign = sign if operation == "+" else _opposite(sign)
-        return f"{self._operand(first, SUM, first=True)} {sign} {text}", SUM
 
     def _in_order(self, operation: str, operands: tuple[int, ...]) -> tuple[int, int]:
         """Operands of a sum as they are written: it commutes to the bit, a - b + c for c + (a - b)."""

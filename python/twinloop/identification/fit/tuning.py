@@ -69,7 +69,9 @@ def tune(
                 workers=context.workers,
             )
         model, beyond = bounded_model(tuned, limits)
-        model, endless = _forgetting(model, signals, longest)
+        endless: set[int] = set()
+        if actuation.hidden:
+            model, endless = _forgetting(model, signals, longest)
         if not beyond and not endless:
             break
         held |= beyond
@@ -86,8 +88,7 @@ def _forgetting(model: _core.Model, signals: Signals, longest: float) -> tuple[_
     actuation = Actuation.of(model, signals)
     times = [actuator.lag for actuator in actuation.actuators] + [state.time for state in actuation.hidden]
     endless = {place for place, time in enumerate(times) if place >= signals.n_u and time > longest}
-    if not endless:
-        return model, endless
-    return model.with_constants(
-        model.constants.tolist(), [longest if place in endless else time for place, time in enumerate(times)]
-    ), endless
+    if endless:
+        times = [longest if place in endless else time for place, time in enumerate(times)]
+        model = model.with_constants(model.constants.tolist(), times)
+    return model, endless

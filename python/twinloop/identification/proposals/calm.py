@@ -13,7 +13,6 @@ from twinloop.identification.context import Context
 from twinloop.identification.evidence import CORRELATED
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.noise import floor_of
@@ -29,30 +28,26 @@ def calm(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         return
     context.watch("disturbances")
     problem = posed(context, hypothesis)
-    sums = tuple(_calmed(problem, found) for found in hypothesis.sums)
-    if all(new is old for new, old in zip(sums, hypothesis.sums, strict=True)):
-        return
-    yield fitted(context, replace(hypothesis, sums=sums, fit=None))
 
+    def calmed(found: Sum) -> Sum:
+        """The sum with the most likely noise that does not last; itself where noise that lasts pays."""
+        chain = found.chain
+        if chain.motion.correlated == 0.0:
+            return found
+        regression = problem.regression(chain, problem.values(problem.usable(list(found.weights))))
+        weights = np.array(list(found.weights.values()))
+        before = regression.likelihood(weights, chain.sensors, chain.motion)
+        white = (chain.motion.white, 0.0, chain.motion.correlation_time)
+        floor = floor_of(chain, problem.dt, problem.integration(chain))
+        with engine_input():
+            ((sensors, motion, after),) = _core.most_likely_noises(
+                [(regression, weights, chain.sensors, white, *floor)], problem.workers
+            )
+        if after - before > CORRELATED:
+            return found
+        length = found.description_length + after - before
+        return replace(found, description_length=length, chain=chain.with_noise(sensors, motion))
 
-def _calmed(problem: Problem, found: Sum) -> Sum:
-    """The sum with the most likely noise that does not last; itself where noise that lasts pays."""
-    chain = found.chain
-    if chain.motion.correlated == 0.0:
-        return found
-    regression = problem.regression(chain, problem.values(problem.usable(list(found.weights))))
-    weights = np.array(list(found.weights.values()))
-    before = regression.likelihood(weights, chain.sensors, chain.motion)
-    white = (chain.motion.white, 0.0, chain.motion.correlation_time)
-    floor = floor_of(chain, problem.dt, problem.integration(chain))
-    with engine_input():
-        ((sensors, motion, after),) = _core.most_likely_noises(
-            [(regression, weights, chain.sensors, white, *floor)], problem.workers
-        )
-    if after - before > CORRELATED:
-        return found
-    return replace(
-        found,
-        description_length=found.description_length + after - before,
-        chain=chain.with_noise(sensors, motion),
-    )
+    sums = tuple(calmed(found) for found in hypothesis.sums)
+    if any(new is not old for new, old in zip(sums, hypothesis.sums, strict=True)):
+        yield fitted(context, replace(hypothesis, sums=sums, fit=None))

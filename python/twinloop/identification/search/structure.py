@@ -23,9 +23,9 @@ from twinloop.streams import Purpose, Unit
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
-Walked = Sequence[Sequence[tuple[Sequence[int], float]]]
-"""Subsets with their energies, the best first, for each chain."""
-Walk = Callable[[Sequence[_core.Gram], Sequence[Floats], int], Walked]
+Subsets = Sequence[tuple[Sequence[int], float]]
+"""Subsets of features with their description lengths, the best first."""
+Walk = Callable[[Sequence[_core.Gram], Sequence[Floats], int], Sequence[Subsets]]
 """Annealed walks: from inner products and prices, a pair for each chain, and the number of the walks."""
 NOISE_ROUNDS = 5
 """Times at most that terms are searched and the noise that they leave is estimated."""
@@ -129,7 +129,9 @@ def search(
     columns = problem.values(usable)
     regressions = [problem.regression(chain, columns) for chain in chains]
 
-    def walked(grams: Sequence[_core.Gram], costs: Sequence[Floats], number: int, round_: int) -> Walked:
+    def walked(
+        grams: Sequence[_core.Gram], costs: Sequence[Floats], number: int, round_: int
+    ) -> Sequence[Subsets]:
         """The walks of a number in a round; those of each draw from a stream of their own."""
         share = 1 if round_ == 0 else 2
         return _core.search_subsets(
@@ -153,8 +155,10 @@ def search(
             changed = any(_differ(*pair, problem) for pair in zip(noisy, current, strict=True))
         best = []
         for i, (judged, chain) in enumerate(zip(subsets, noisy, strict=True)):
-            subset, energy, weights = judged[0]
-            others = [(tuple(usable[j] for j in s), max(0.0, e - energy)) for s, e, _ in judged[1:40]]
+            subset, length, weights = judged[0]
+            others = [
+                (tuple(usable[j] for j in s), max(0.0, longer - length)) for s, longer, _ in judged[1:40]
+            ]
             score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
             rung = RUNG * problem.pool.rung(usable[j] for j in subset)
             total = rung + score + float(costs[i][list(subset)].sum())
@@ -183,23 +187,33 @@ def _chosen(
     sums of readings, and what tells the sum of all readings from that of all but the last is the last. Where one is
     found, walks are repeated in which J costs something, and more until they find laws without.
     """
+
+    def best(i: int, gram: _core.Gram, walked: Subsets) -> list[Judged]:
+        """What the walks of a chain have found, and what was known of it, the best first."""
+        subsets, before = [tuple(subset) for subset, _ in walked], known[i]
+        if before is not None and all(term in place for term in before.weights):
+            subsets.append(tuple(sorted(place[term] for term in before.weights)))
+        return sorted(
+            all_judged(gram, subsets, costs[i], problem.limits(chains[i], usable)),
+            key=lambda found: (found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]), found[0]),
+        )
+
     with engine_input():
         walks = walk(grams, costs, 0)
-    posed = list(zip(chains, known, grams, walks, costs, strict=True))
-    subsets = [_best_subsets(problem, usable, place, *of_chain) for of_chain in posed]
-    for i, (chain, sum_, gram, _, cost) in enumerate(posed):
+    subsets = [best(i, gram, walked) for i, (gram, walked) in enumerate(zip(grams, walks, strict=True))]
+    for i, (chain, gram) in enumerate(zip(chains, grams, strict=True)):
         if not chain.integrated or _feedthrough(problem, chain, usable, subsets[i][0]) <= MOST_FEEDTHROUGH:
             continue
         rows = problem.feedthrough(chain, usable)
         for attempt, price in enumerate(FEEDTHROUGH_PRICES):
             with engine_input():
                 dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
-                (walked,) = walk([dear], [cost], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
+                (walked,) = walk([dear], [costs[i]], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
             # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
             found = [
                 law
                 for of in (gram, dear)
-                for law in _best_subsets(problem, usable, place, chain, sum_, of, walked, cost)
+                for law in best(i, of, walked)
                 if _feedthrough(problem, chain, usable, law) <= MOST_FEEDTHROUGH
             ]
             if found:
@@ -215,26 +229,6 @@ def _feedthrough(problem: Problem, chain: Chain, usable: Sequence[int], judged: 
         return 0.0
     shares = problem.feedthrough(chain, [usable[j] for j in subset]).mean(axis=0)
     return float((shares * weights).sum())
-
-
-def _best_subsets(
-    problem: Problem,
-    usable: Sequence[int],
-    place: Mapping[int, int],
-    chain: Chain,
-    known: Sum | None,
-    gram: _core.Gram,
-    walked: Sequence[tuple[Sequence[int], float]],
-    costs: Floats,
-) -> list[Judged]:
-    """What a chain's walks have found, and what was known of it, the best first."""
-    subsets = [tuple(subset) for subset, _ in walked]
-    if known is not None and all(term in place for term in known.weights):
-        subsets.append(tuple(sorted(place[term] for term in known.weights)))
-    return sorted(
-        all_judged(gram, subsets, costs, problem.limits(chain, usable)),
-        key=lambda found: (found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]), found[0]),
-    )
 
 
 def _spread(judged: Judged, features: int) -> Floats:

@@ -11,7 +11,7 @@ from twinloop.arrays import Floats
 from twinloop.identification.terms.bounds import Limits, bounded_solution, excludes_zero
 
 Judged = tuple[tuple[int, ...], float, Floats]
-"""A subset of features, its energy, its coefficients."""
+"""A subset of features, its description length, its coefficients."""
 
 
 def all_judged(
@@ -30,16 +30,27 @@ def all_judged(
     Returns:
         Those that have a solution.
     """
+
+    def judged(subset: tuple[int, ...]) -> Judged | None:
+        solved = bounded_solution(gram, subset, limits)
+        if solved is None:
+            return None
+        weights, chi_squared = solved
+        nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
+        if nothing and len(nothing) < len(subset):
+            # A term that is held at 0 is no term.
+            return judged(tuple(j for j in subset if j not in nothing))
+        return subset, chi_squared + float(costs[list(subset)].sum()), weights
+
     bounded = [i for i, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[i])]
     if must := _distinguishable(gram, bounded):
         subsets = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
         if all(gram.solve(list(subset)) is None for subset in subsets):
             subsets.append(tuple(sorted(must)))
-    found = [_judged(gram, subset, costs, limits) for subset in dict.fromkeys(subsets)]
+    found = [judged(subset) for subset in dict.fromkeys(subsets)]
     if not any(found):
-        parts = dict.fromkeys(_distinguishable(gram, subset) for subset in subsets)
-        found = [_judged(gram, subset, costs, limits) for subset in parts]
-    return [judged for judged in found if judged]
+        found = [judged(part) for part in dict.fromkeys(_distinguishable(gram, each) for each in subsets)]
+    return [each for each in found if each]
 
 
 def _distinguishable(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]:
@@ -49,15 +60,3 @@ def _distinguishable(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]
         if gram.solve([*kept, feature]) is not None:
             kept.append(feature)
     return tuple(kept)
-
-
-def _judged(gram: _core.Gram, subset: tuple[int, ...], costs: Floats, limits: Limits) -> Judged | None:
-    solved = bounded_solution(gram, subset, limits)
-    if solved is None:
-        return None
-    weights, chi_squared = solved
-    nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
-    if nothing and len(nothing) < len(subset):
-        # A term that is held at 0 is no term.
-        return _judged(gram, tuple(j for j in subset if j not in nothing), costs, limits)
-    return subset, chi_squared + float(costs[list(subset)].sum()), weights
