@@ -7,7 +7,7 @@ from small_plants import pendulum_like, swung
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
-from twinloop.identification.identify import PROPOSALS, Found, searched
+from twinloop.identification.identify import PROPOSALS, Found, decided
 from twinloop.identification.proposals.calm import calm
 from twinloop.identification.search.selection import posed
 from twinloop.identification.starts import starts
@@ -39,7 +39,9 @@ def learnt(runs, proposals):
         runs, pendulum_like(), options_of("default", QUICK), Unit(3, (len(runs),)), _core.Workers(1)
     )
     start, *_ = starts(context, "acceleration")
-    *_, found = searched(context, Found(start()), proposals)
+    found = Found(start())
+    for propose in proposals:
+        found = decided(found, propose(context, found.best))
     return context, found.best
 
 

@@ -17,7 +17,6 @@ from twinloop.identification.identify import (
     concluded,
     decided,
     identify_runs,
-    searched,
 )
 from twinloop.identification.proposals import terms as terms_file
 from twinloop.identification.proposals.hidden import hidden
@@ -66,8 +65,8 @@ def start_of(context):
 def end_of(context, start, proposals=PROPOSALS):
     """What a search from a start leaves."""
     found = Found(start)
-    for step in searched(context, found, proposals):
-        found = step
+    for propose in proposals:
+        found = decided(found, propose(context, found.best))
     return found
 
 

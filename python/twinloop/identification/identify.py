@@ -8,7 +8,7 @@ the model has smoothed, and what parts of the only run have taught. What the sea
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from twinloop import _core
@@ -129,8 +129,8 @@ def identify_runs(
             context.watch("noise")
             searches.append(Found(start()))
             keep(replace(under_way, searches=tuple(searches)))
-        for found in searched(context, searches[number]):
-            searches[number] = found
+        for propose in PROPOSALS[searches[number].made :]:
+            searches[number] = decided(searches[number], propose(context, searches[number].best))
             keep(replace(under_way, searches=tuple(searches)))
     first, *others = searches
     found = decided(first, [found for other in others for found in (other.best, *other.rivals)])
@@ -138,21 +138,20 @@ def identify_runs(
     return concluded(context, found, under_way.said)
 
 
-def searched(context: Context, found: Found, proposals: Sequence[Proposal] = PROPOSALS) -> Iterator[Found]:
-    """What is believed after each proposal that is still to be made, each made to what is believed by then."""
-    for propose in proposals[found.made :]:
-        found = replace(decided(found, propose(context, found.best)), made=found.made + 1)
-        yield found
-
-
 def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
-    """What is believed once some hypotheses were proposed, and its rivals: those that last and are not believed."""
+    """What is believed after one more proposal, and its rivals: those that last and are not believed.
+
+    Args:
+        found: before it.
+        proposed: the hypotheses that it gives.
+    """
     several = [found.best, *proposed]
     best = strongest(several)
     others = (other for other in several[1:] if other is not best and other.evidence.stable)
     # What is drawn from here on is nothing that one of those that are not believed has drawn.
     drawn = max(other.searches for other in several if other.start == best.start)
-    return replace(found, best=replace(best, searches=drawn), rivals=(*found.rivals, *others))
+    rivals = (*found.rivals, *others)
+    return replace(found, best=replace(best, searches=drawn), rivals=rivals, made=found.made + 1)
 
 
 def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identified:

@@ -12,7 +12,6 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
-from twinloop.identification.inputs.actuation import groups
 from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import guessed_noise
 from twinloop.identification.search.selection import from_both_sides
@@ -22,7 +21,7 @@ from twinloop.identification.sensors.noise import declared_noise, given_noise, k
 from twinloop.identification.sensors.offsets import moved, search_offsets
 from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.pool import Pool
-from twinloop.law.actuation import Actuation
+from twinloop.law.actuation import Actuation, alike_commands
 
 ANEW, PARTS, RENEWED, FORMS = 0, 1, 10, 100
 """Numbers of starts; each start draws from streams under its own number. In order: whole runs anew, the first part of
@@ -61,7 +60,7 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
         offsets=np.zeros(signals.n_x),
         runs=runs,
         actuation=Actuation.direct(signals),
-        alike=groups(signals),
+        alike=alike_commands(signals),
         candidates=Candidates.of(pool, signals, options, form, seen),
         driven=tuple(declared_noise(chain, signals) for chain in every if chain.output is not None),
         given=tuple(given_noise(chain, signals) for chain in every if chain.output is None),

@@ -89,3 +89,11 @@ class Actuation(Recorded, kind="actuation"):
     def bare(self) -> Actuation:
         """The same without hidden states."""
         return replace(self, hidden=())
+
+
+def alike_commands(signals: Signals) -> tuple[tuple[int, ...], ...]:
+    """Commands that are alike, by unit and bounds: they share an actuator, and fill hidden states together."""
+    found: dict[tuple[object, ...], list[int]] = {}
+    for i, command in enumerate(signals.commands):
+        found.setdefault((command.unit, command.bounds, command.size), []).append(i)
+    return tuple(tuple(group) for group in found.values())

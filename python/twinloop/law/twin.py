@@ -200,8 +200,8 @@ class Twin(Shown, Recorded, kind="twin"):
         Raises:
             InvalidInput: digits out of range.
         """
-        members = [Law.of(member, self.signals) for member in self.members]
-        return equations(self.law, members, digits)
+        law, *members = (Law.of(model, self.signals) for model in (self.model, *self.members))
+        return equations(law, members, digits)
 
     def simulate(self, test: Test | Replay, initial_state: ArrayLike | None = None) -> Trajectory:
         """Flies a test on the twin instead of the system.

@@ -17,13 +17,12 @@ from twinloop.elementary import log
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.inputs.actuation import groups
 from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.directions import Direction, directions, together
 from twinloop.identification.terms.pool import Pool
-from twinloop.law.actuation import HiddenState
+from twinloop.law.actuation import HiddenState, alike_commands
 from twinloop.signals import Signals
 from twinloop.streams import Unit
 
@@ -74,7 +73,7 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
     rests: Sequence[Floats | None] = context.rests or [None]
     states = [
         HiddenState(tuple(group), squared, _mean(signals, group, squared, rest), TIMES[1] * longest)
-        for group in groups(signals)
+        for group in alike_commands(signals)
         for squared in (False, True)
         for rest in rests
     ]

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.identification.inputs.actuation import groups
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.actuation import alike_commands
 from twinloop.signals import Signals
 
 EQUAL = 0.8
@@ -42,7 +42,7 @@ def directions(problem: Problem, sums: Sequence[Sum], signals: Signals) -> list[
     """
     found = []
     middle = problem.stages.start.mean(axis=0)
-    for group in (group for group in groups(signals) if len(group) > 1):
+    for group in (group for group in alike_commands(signals) if len(group) > 1):
         places = [signals.n_x + i for i in group]
         rows = np.repeat(middle[np.newaxis], 2 * len(group), axis=0)
         for row, place in enumerate(places):

@@ -1,1 +1,0 @@
-"""Inputs: what a law sees of commands, through actuators and hidden states."""
