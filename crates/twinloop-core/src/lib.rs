@@ -1,5 +1,29 @@
 //! The engine of Twinloop: models are programs that are evolved on experiments, tests are controllers that are evolved
 //! on models. It knows numbers only: no files, no clock, no Python, no global state.
+//!
+//! The two loops are those of S. Koos, J.-B. Mouret and S. Doncieux, *Automatic system identification based on
+//! coevolution of models and tests*, CEC 2009; "the paper" means this one. Identification by regression follows
+//! A. C. Harvey, *Forecasting, Structural Time Series Models and the Kalman Filter*, 1989, and L. Ljung, *System
+//! Identification: Theory for the User*, 2nd edition, 1999.
+//!
+//! A program, here the acceleration of a pendulum from its angle (r0) and rate (r1), runs without its introns:
+//!
+//! ```
+//! use twinloop_core::{Code, Program, Width, run_rows};
+//!
+//! let program: Program = "program inputs=2 outputs=1 registers=4
+//! page 1
+//!   r2 = sin(r0)
+//!   r3 = r1 * 0.1
+//!   r2 = r2 + r3
+//!   r2 = r2 * -1.0
+//!   r3 = r0 * 2.0
+//! ".parse()?;
+//! let code = Code::new(&program);
+//! assert_eq!(code.len(), 4);
+//! assert_eq!(run_rows(&code, &[&[0.0, 2.0], &[0.0, -2.0]], Width::widest()), [-0.2, 0.2]);
+//! # Ok::<(), twinloop_core::Error>(())
+//! ```
 
 mod actuators;
 mod any_dynamics;
@@ -72,7 +96,10 @@ pub use plants::{Gyroscopic, Quadrotor};
 pub use sensors::Sensors;
 
 // Runs: controllers, the loop, records.
-pub use controller::*;
+pub use controller::{
+    AnyLaw, Axis, Controller, Controllers, Family, ForeignController, ForeignLaw, Gain, Mixer, Outer,
+    Parameters, Pid, StateFeedback,
+};
 pub use excitation::{Excitation, HoldBack};
 pub use look_ahead::{Ahead, Leaving, LookAhead};
 pub use rollout::{Commands, Seen, Start, Watch, rollout};

@@ -1,4 +1,4 @@
-//! Objectives of models and tests.
+//! Objectives of models and tests (paper, sections IV.B and IV.C), as functions of arrays.
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -13,10 +13,14 @@ use crate::selected::PySelectedTests;
 use crate::setting::PySetting;
 use crate::workers::{PyWorkers, or_default};
 
-/// The models that a list of Python objects holds.
+/// The models of a list of Python objects.
 type Models<'py> = Vec<Bound<'py, PyModel>>;
+/// Errors or distances, (models, tests).
+type Errors<'py> = Bound<'py, PyArray2<f64>>;
+/// Numbers of steps, (models, tests).
+type Steps<'py> = Bound<'py, PyArray2<i64>>;
 
-/// One-step-ahead error of each model on each test; infinite where a prediction is not finite.
+/// One-step-ahead errors (models, tests), in the states' units squared; infinite if a prediction is not finite.
 #[pyfunction]
 #[pyo3(signature = (models, selected, workers = None))]
 pub fn open_loop<'py>(
@@ -24,14 +28,14 @@ pub fn open_loop<'py>(
     models: Models<'py>,
     selected: &PySelectedTests,
     workers: Option<&PyWorkers>,
-) -> Result<Bound<'py, PyArray2<f64>>> {
+) -> Result<Errors<'py>> {
     let (workers, selected) = (or_default(workers)?, &selected.0);
     let models = fitting(&models, selected.signals())?;
     let rows = py.detach(|| twinloop_core::open_loops(&models, selected, &workers));
     Ok(to_rows(py, [models.len(), selected.len()], rows.concat()))
 }
 
-/// Error of each model on each test of free runs of some steps from every recorded state.
+/// Errors (models, tests) of free runs of so many `steps` from every recorded state, in the states' units squared.
 #[pyfunction]
 #[pyo3(signature = (models, selected, steps, workers = None))]
 pub fn k_step<'py>(
@@ -40,24 +44,23 @@ pub fn k_step<'py>(
     selected: &PySelectedTests,
     steps: usize,
     workers: Option<&PyWorkers>,
-) -> Result<Bound<'py, PyArray2<f64>>> {
+) -> Result<Errors<'py>> {
     let (workers, selected) = (or_default(workers)?, &selected.0);
     let models = fitting(&models, selected.signals())?;
     let rows = py.detach(|| twinloop_core::k_steps(&models, selected, steps, &workers))?;
     Ok(to_rows(py, [models.len(), selected.len()], rows.concat()))
 }
 
-/// Free-run error of each model on each test, with the controller in the loop, infinite where the run diverged; and the
-/// steps that it lasted.
+/// Errors (models, tests) of free runs with the controller in the loop, in the states' units squared, infinite if the run
+/// diverged; and the steps (models, tests) before it did.
 #[pyfunction]
 #[pyo3(signature = (models, selected, workers = None))]
-#[expect(clippy::type_complexity, reason = "two arrays")]
 pub fn closed_loop<'py>(
     py: Python<'py>,
     models: Models<'py>,
     selected: &PySelectedTests,
     workers: Option<&PyWorkers>,
-) -> Result<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>)> {
+) -> Result<(Errors<'py>, Steps<'py>)> {
     let (workers, selected) = (or_default(workers)?, &selected.0);
     let models = fitting(&models, selected.signals())?;
     let outcomes = flown(py, || twinloop_core::closed_loops(&models, selected, &workers))?;
@@ -70,7 +73,7 @@ pub fn closed_loop<'py>(
     Ok((to_rows(py, shape, errors), to_rows(py, shape, lasted.collect())))
 }
 
-/// Distance of the last state to the target, a row for each model; infinite where the run diverged.
+/// Distances of the last state to the target (models, tests); infinite if the run diverged.
 #[pyfunction]
 #[pyo3(signature = (models, setting, parameters, task, *, workers = None))]
 pub fn final_distances<'py>(
@@ -80,7 +83,7 @@ pub fn final_distances<'py>(
     parameters: Matrix<'py>,
     task: &PyTask,
     workers: Option<&PyWorkers>,
-) -> Result<Bound<'py, PyArray2<f64>>> {
+) -> Result<Errors<'py>> {
     let workers = or_default(workers)?;
     let (setting, task) = (&*setting.0, rollout::fitting(task, &setting.0)?);
     let parameters = rows("parameters", &parameters, setting.family().parameters().len())?;
@@ -91,24 +94,32 @@ pub fn final_distances<'py>(
     Ok(to_rows(py, [models.len(), parameters.len()], distances.concat()))
 }
 
-/// The engine's view of models that are for the signals.
+/// The engine's view of models; refused if one is for other signals.
 pub fn fitting<'a>(models: &'a [Bound<'_, PyModel>], signals: &Signals) -> Result<Vec<Model<'a>>> {
     Ok(twinloop_core::views(models.iter().map(|model| &model.get().0), signals)?)
 }
 
-/// A column of distances for each test, none of them NaN, and at least one row.
+/// The columns of distances (rows, tests), one for each test.
 fn columns(distances: &Matrix<'_>, cap: f64) -> Result<Vec<Vec<f64>>> {
     let distances = distances.as_array();
-    if distances.nrows() == 0 || distances.iter().any(|x| x.is_nan()) || !(cap.is_finite() && cap > 0.0) {
+    if !(cap.is_finite() && cap > 0.0) {
+        return Err(misuse(format!("distances: expected a finite cap above 0, found {cap}")));
+    }
+    if distances.nrows() == 0 {
         return Err(misuse(format!(
-            "distances: expected at least one row of numbers and a cap above 0, found the shape {:?} and {cap}",
+            "distances: expected at least one row, found the shape {:?}",
             distances.shape()
         )));
+    }
+    if distances.iter().any(|x| x.is_nan()) {
+        return Err(misuse(
+            "distances: expected numbers, found NaN; infinity stands for a run that diverged".into(),
+        ));
     }
     Ok(distances.columns().into_iter().map(|column| column.to_vec()).collect())
 }
 
-/// 1 / variance over models of each test's final distances, each capped.
+/// 1 / variance over models (tests,) of final distances (models, tests), each capped.
 #[pyfunction]
 pub fn discrimination<'py>(
     py: Python<'py>,
@@ -119,7 +130,7 @@ pub fn discrimination<'py>(
     Ok(to_vector(py, columns(&distances, cap)?.into_iter().map(of_test).collect()))
 }
 
-/// Variance over mutants of each test's final distances; one at the cap counts as cap squared.
+/// Variance over mutants (tests,) of final distances (mutants, tests); one at the cap counts as cap squared.
 #[pyfunction]
 pub fn instability<'py>(
     py: Python<'py>,

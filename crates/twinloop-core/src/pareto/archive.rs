@@ -1,4 +1,7 @@
-//! The archive: every point that nothing offered so far dominates.
+//! The archive: all offered points that no other offered point dominates (paper, section IV.A, S and footnote 2).
+//!
+//! An offer is compared with all members. That is where a search spends its ranking, so points lie in blocks of lanes
+//! (`blocks.rs`), and a batch of offers is cleared away once.
 
 use super::blocks::{Blocks, Verdict};
 use super::objectives::Objectives;
@@ -6,50 +9,49 @@ use super::pruning::rows_to_drop;
 use crate::error::{Result, invalid};
 use crate::lanes::Width;
 
-/// A non-dominated set with a member of type `T` at each point. Members stand in the order in which they were offered.
+/// A non-dominated set of points, each with a member of type `T`, in the order in which they were offered.
 ///
-/// To offer the members of an archive to an empty one, in order, makes the same archive again.
+/// All objectives are minimised. The members of an archive, offered in order to an empty one, make the same archive.
 #[derive(Clone, Debug)]
 pub struct Archive<T> {
     width: Width,
     points: Blocks,
     members: Vec<T>,
-    /// The block that dominated a candidate last. What comes next is often dominated by it too; never does a result
-    /// depend on it.
+    /// The block that dominated a candidate last; it is compared first. It changes the speed, never a result.
     recent: usize,
-    /// Whether places wait for [`close_ranks`](Self::close_ranks); never between two calls from outside.
+    /// Whether vacant places wait for [`compact`](Self::compact); never between two public calls.
     any_vacant: bool,
 }
 
 impl<T> Archive<T> {
-    /// An empty archive of points with so many `columns`, which compares them with the vector instructions of `width`.
-    /// The width changes the speed and nothing else.
+    /// An empty archive of points with this number of `columns`, compared with the vector instructions of `width`. The
+    /// width changes the speed, never a result.
     pub fn new(columns: usize, width: Width) -> Self {
         Self { width, points: Blocks::new(columns), members: Vec::new(), recent: 0, any_vacant: false }
     }
 
-    /// Offers a point, (columns), and says whether it was taken; only then is its `member` made.
+    /// Offers a point, (columns), and says whether it was accepted; only then is its `member` made.
     ///
-    /// It is not taken if a member is no worse in every objective: of equal points the first stays. If it is taken, the
-    /// members that it dominates leave. A point that could not be a row of [`Objectives`], as it is not finite or has
-    /// not the columns of this archive, is not taken.
+    /// A point is rejected if a member is no worse in every objective, so of equal points the first stays. An accepted
+    /// point removes the members that it dominates. A point with a number that is not finite, or with another number of
+    /// columns, is rejected.
     pub fn offer(&mut self, objectives: &[f64], member: impl FnOnce() -> T) -> bool {
-        let taken = self.take(objectives, member);
-        self.close_ranks();
-        taken
+        let accepted = self.insert(objectives, member);
+        self.compact();
+        accepted
     }
 
-    /// Offers points one after another, as [`offer`](Self::offer) does, but sooner: those that leave are cleared away
-    /// once, at the end.
+    /// Offers points one after another with the result of [`offer`](Self::offer), but faster: the places of removed
+    /// members are cleared once, at the end.
     pub fn offer_all<'a, F: FnOnce() -> T>(&mut self, offers: impl IntoIterator<Item = (&'a [f64], F)>) {
         for (objectives, member) in offers {
-            self.take(objectives, member);
+            self.insert(objectives, member);
         }
-        self.close_ranks();
+        self.compact();
     }
 
-    /// Takes a point or not; the places of those that it dominates are left vacant.
-    fn take(&mut self, objectives: &[f64], member: impl FnOnce() -> T) -> bool {
+    /// Inserts a point unless it is rejected. The places of the members that it dominates become vacant.
+    fn insert(&mut self, objectives: &[f64], member: impl FnOnce() -> T) -> bool {
         let is_row = !objectives.is_empty() && objectives.len() == self.points.columns();
         if !is_row || !objectives.iter().all(|value| value.is_finite()) {
             return false;
@@ -100,11 +102,10 @@ impl<T> Archive<T> {
         (0..self.points.columns()).map(|column| self.points.value(i, column)).collect()
     }
 
-    /// Drops all but `cap` members, those with the most crowding distance, and says whether any was dropped.
+    /// Drops all but the `cap` members with the largest crowding distances, and says whether any was dropped.
     ///
-    /// Never dropped are the best trade-off, by raw and by normalised distance, and the first minimum of each
-    /// objective, even if they are more than `cap`. Distances are computed once, not after each member that is
-    /// dropped. Those that stay keep their order.
+    /// The best trade-offs, by raw and by normalised distance, and the first minimum of each objective always stay, even
+    /// if they are more than `cap`. Distances are computed once, not after each dropped member. The order stays.
     pub fn prune(&mut self, cap: usize) -> bool {
         if self.len() <= cap {
             return false;
@@ -114,8 +115,8 @@ impl<T> Archive<T> {
         !dropped.is_empty()
     }
 
-    /// The same members at other points, (members, columns), as when a column was added: what is dominated now leaves,
-    /// of equal points the first stays, and so does the order.
+    /// The same members at other points, (members, columns), for example with one more column. Members that are now
+    /// dominated leave; of equal points the first stays. The order stays.
     ///
     /// # Errors
     /// When there is not one row for each member.
@@ -135,8 +136,8 @@ impl<T> Archive<T> {
         Ok(archive)
     }
 
-    /// Clears vacant places away.
-    fn close_ranks(&mut self) {
+    /// Clears vacant places.
+    fn compact(&mut self) {
         if std::mem::take(&mut self.any_vacant) {
             let vacant: Vec<usize> = (0..self.len()).filter(|&place| self.points.is_vacant(place)).collect();
             self.remove(&vacant);
@@ -170,6 +171,7 @@ impl<T: PartialEq> PartialEq for Archive<T> {
 mod tests {
     use super::super::dominance::dominates;
     use super::super::examples::{any_objectives, objectives};
+    use super::super::numbered::NumberedArchive;
     use super::*;
     use proptest::prelude::*;
 
@@ -184,13 +186,13 @@ mod tests {
 
     /// Rows that no other dominates, without those equal to an earlier one.
     fn non_dominated(objectives: &Objectives) -> Vec<usize> {
-        let is_kept = |&i: &usize| {
+        let stays = |&i: &usize| {
             let row = objectives.row(i);
             let dominated = objectives.rows().any(|other| dominates(other, row));
             let repeated = (0..i).any(|earlier| objectives.row(earlier) == row);
             !dominated && !repeated
         };
-        (0..objectives.len()).filter(is_kept).collect()
+        (0..objectives.len()).filter(stays).collect()
     }
 
     fn rows_at(objectives: &Objectives, rows: &[usize]) -> Objectives {
@@ -212,13 +214,34 @@ mod tests {
         }
 
         #[test]
-        fn an_offer_says_whether_it_was_taken_and_makes_the_member_only_then(offered in any_objectives(0..60)) {
-            let mut archive = Archive::new(offered.columns(), Width::widest());
-            for row in offered.rows() {
-                let mut made = false;
-                let kept_out = archive.objectives().rows().any(|point| dominates(point, row) || point == row);
-                prop_assert_eq!(archive.offer(row, || made = true), !kept_out);
-                prop_assert_eq!(made, !kept_out);
+        fn an_offer_says_whether_it_was_accepted_and_makes_the_member_only_then(offered in any_objectives(0..60)) {
+            for width in Width::available() {
+                let mut archive = Archive::new(offered.columns(), width);
+                for row in offered.rows() {
+                    let mut made = false;
+                    let rejected = archive.objectives().rows().any(|point| dominates(point, row) || point == row);
+                    prop_assert_eq!(archive.offer(row, || made = true), !rejected);
+                    prop_assert_eq!(made, !rejected);
+                }
+            }
+        }
+
+        #[test]
+        fn offers_in_batches_make_the_archive_of_single_offers(
+            offered in any_objectives(0..150),
+            batch in 1..40_usize,
+        ) {
+            let rows: Vec<(usize, &[f64])> = offered.rows().enumerate().collect();
+            for width in Width::available() {
+                let mut archive = Archive::new(offered.columns(), width);
+                let mut numbered = NumberedArchive::new(offered.columns(), width).unwrap();
+                for part in rows.chunks(batch) {
+                    archive.offer_all(part.iter().map(|&(i, row)| (row, move || i)));
+                    let part: Vec<usize> = part.iter().map(|&(i, _)| i).collect();
+                    numbered.offer(&rows_at(&offered, &part)).unwrap();
+                }
+                prop_assert_eq!(&archive, &archive_of(&offered, width));
+                prop_assert_eq!(numbered.archive(), &archive);
             }
         }
 
@@ -281,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn what_could_not_be_a_row_is_not_taken() {
+    fn what_could_not_be_a_row_is_rejected() {
         for width in Width::available() {
             let mut archive = Archive::new(2, width);
             for bad in [&[f64::NAN, 0.0][..], &[0.0, f64::INFINITY], &[0.0], &[0.0; 3], &[]] {

@@ -1,11 +1,11 @@
-//! An archive whose members are numbers, in the order in which points were offered.
+//! An archive of numbers: each member is the number of its offer.
 
 use super::archive::Archive;
 use super::objectives::Objectives;
 use crate::error::{Result, invalid};
 use crate::lanes::Width;
 
-/// Non-dominated points, each with the number under which it was offered.
+/// Non-dominated points, each with the number of its offer, from 0.
 #[derive(Clone, Debug)]
 pub struct NumberedArchive {
     archive: Archive<usize>,
@@ -17,7 +17,10 @@ impl NumberedArchive {
     /// More objectives than this are refused.
     pub const MOST_COLUMNS: usize = 1_000_000;
 
-    /// An empty one of points with so many columns.
+    /// An empty archive of points with this number of columns.
+    ///
+    /// # Errors
+    /// When there are no columns, or too many.
     pub fn new(columns: usize, width: Width) -> Result<Self> {
         if !(1..=Self::MOST_COLUMNS).contains(&columns) {
             return invalid(format!(
@@ -28,7 +31,10 @@ impl NumberedArchive {
         Ok(Self { archive: Archive::new(columns, width), columns, offered: 0 })
     }
 
-    /// Offers each row in turn.
+    /// Offers each row, (rows, columns), in turn.
+    ///
+    /// # Errors
+    /// When the rows have another number of columns.
     pub fn offer(&mut self, objectives: &Objectives) -> Result<()> {
         if objectives.columns() != self.columns {
             let (expected, found) = (self.columns, objectives.columns());
@@ -45,7 +51,7 @@ impl NumberedArchive {
         &self.archive
     }
 
-    /// Drops members until no more than `cap` are left; whether any had to go.
+    /// Drops members beyond `cap`, as [`Archive::prune`] does, and says whether any was dropped.
     pub fn prune(&mut self, cap: usize) -> bool {
         self.archive.prune(cap)
     }
