@@ -120,15 +120,15 @@ impl<V: Vector> Line<V> {
             Some(times) => numbers(times),
             None => actuation.times().into_iter().flat_map(|time| vec![time; V::LANES]).collect(),
         };
-        let (kept, gains) = fading(&lanes, dt);
-        let (kept, gains): (Vec<V>, Vec<V>) = (vectors(&kept), vectors(&gains));
-        let effects = || zeros(kept.len());
+        let (decays, gains) = fading(&lanes, dt);
+        let (decays, gains): (Vec<V>, Vec<V>) = (vectors(&decays), vectors(&gains));
+        let effects = || zeros(decays.len());
         Self {
             memory: zeros(commands),
             effects: [effects(), effects(), effects()],
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
-            hidden: (commands..).zip(hidden).map(|(i, one)| Filling::new(one, kept[i], gains[i])).collect(),
-            halves: kept,
+            hidden: (commands..).zip(hidden).map(|(i, one)| Filling::new(one, decays[i], gains[i])).collect(),
+            halves: decays,
             factors: factors.to_vec(),
             actuators: actuators.clone(),
             started: false,
@@ -173,10 +173,10 @@ impl<V: Vector> Line<V> {
     }
 }
 
-/// Of each time: e^(−dt / 2 time), 0 where there is none, and what half a period adds to what fades so.
+/// For each time constant: the decay over half a period, e^(−dt / 2 time) or 0 for a time of 0, and the gain of its input.
 fn fading(times: &[f64], dt: f64) -> (Vec<f64>, Vec<f64>) {
-    let kept = |&time: &f64| if time > 0.0 { libm::exp(-0.5 * dt / time) } else { 0.0 };
-    times.iter().map(|time| (kept(time), time * (1.0 - kept(time)))).unzip()
+    let decay = |&time: &f64| if time > 0.0 { libm::exp(-0.5 * dt / time) } else { 0.0 };
+    times.iter().map(|time| (decay(time), time * (1.0 - decay(time)))).unzip()
 }
 
 /// Effects of recorded commands (n × n_u), then the states that they fill, at the start, the middle and the end of each

@@ -16,7 +16,7 @@ pub struct Hidden {
     pub squared: bool,
     /// The mean at which it neither fills nor empties; none: that of the first period.
     pub rest: Option<f64>,
-    /// After which 1/e of it is left, s.
+    /// Its time constant, s.
     pub time: f64,
 }
 
@@ -42,19 +42,19 @@ impl Hidden {
 #[derive(Clone)]
 pub(crate) struct Filling<V> {
     hidden: Hidden,
-    /// What is left of it after half a period.
-    kept: V,
-    /// What half a period adds to it for each unit of what fills it.
+    /// Its decay over half a period, a factor.
+    decay: V,
+    /// What half a period adds to it for each unit of input.
     gain: V,
     rest: Option<V>,
     now: V,
 }
 
 impl<V: Vector> Filling<V> {
-    /// An empty one, of which half a period leaves the share `kept`, and adds `gain` for each unit of what fills it.
-    pub fn new(hidden: &Hidden, kept: V, gain: V) -> Self {
+    /// An empty one. Half a period multiplies it by `decay`, and adds `gain` for each unit of input.
+    pub fn new(hidden: &Hidden, decay: V, gain: V) -> Self {
         let rest = hidden.rest.map(V::splat);
-        Self { hidden: hidden.clone(), kept, gain, rest, now: V::splat(0.0) }
+        Self { hidden: hidden.clone(), decay, gain, rest, now: V::splat(0.0) }
     }
 
     /// Its values at the start, the middle and the end of a period with these commands, in units of 1 / `factors`.
@@ -69,8 +69,8 @@ impl<V: Vector> Filling<V> {
         let rest = *self.rest.get_or_insert(level);
         let added = (level - rest) * self.gain;
         let start = self.now;
-        let middle = start * self.kept + added;
-        self.now = middle * self.kept + added;
+        let middle = start * self.decay + added;
+        self.now = middle * self.decay + added;
         [start, middle, self.now]
     }
 }

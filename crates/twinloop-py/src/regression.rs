@@ -13,7 +13,7 @@ use crate::error::{Result, misuse};
 use crate::rng::Name;
 use crate::workers::{PyWorkers, or_default};
 
-/// Process variance, gust variance, memory in s.
+/// Process variance, gust variance, correlation time in s.
 type Motion = (f64, f64, f64);
 /// Readings, weights, and the features at the start, the middle and the end of each period.
 type RecordArrays<'py> = (Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>);
@@ -74,8 +74,9 @@ impl PyRegression {
 }
 
 impl PyRegression {
-    fn noise(&self, sensors: &Vector<'_>, (process, gust, memory): Motion) -> Result<Noise> {
-        Ok(Noise { sensors: vector(sensors), process, gust, memory }.validated(self.0.chain().states)?)
+    fn noise(&self, sensors: &Vector<'_>, (process, gust, correlation_time): Motion) -> Result<Noise> {
+        Ok(Noise { sensors: vector(sensors), process, gust, correlation_time }
+            .validated(self.0.chain().states)?)
     }
 }
 
@@ -103,10 +104,10 @@ pub fn most_likely_noises<'py>(
         });
     }
     let found = py.detach(|| twinloop_core::most_likely_noises(&leftovers, &workers))?;
-    let told = |(noise, score): (Noise, f64)| {
-        (to_vector(py, noise.sensors), (noise.process, noise.gust, noise.memory), score)
+    let converted = |(noise, score): (Noise, f64)| {
+        (to_vector(py, noise.sensors), (noise.process, noise.gust, noise.correlation_time), score)
     };
-    Ok(found.into_iter().map(told).collect())
+    Ok(found.into_iter().map(converted).collect())
 }
 
 /// Inner products of whitened features and readings.
@@ -137,7 +138,7 @@ impl PyGram {
         Ok(Self(Arc::new(Gram::clone(&self.0).with_rows(&flat))))
     }
 
-    /// Coefficients, their covariance and what is left; none where the features are collinear.
+    /// Coefficients, their covariance and χ²; none if the features are collinear.
     #[pyo3(signature = (subset, ridge = 0.0))]
     #[expect(clippy::type_complexity, reason = "coefficients, covariance, χ²")]
     fn solve<'py>(
@@ -148,7 +149,7 @@ impl PyGram {
     ) -> Result<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64)>> {
         let solved = |found: Solution| {
             let covariance = to_matrix(py, subset.len(), found.covariance);
-            (to_vector(py, found.coefficients), covariance, found.left)
+            (to_vector(py, found.coefficients), covariance, found.chi_squared)
         };
         Ok(self.0.checked_solve(&subset, ridge)?.map(solved))
     }

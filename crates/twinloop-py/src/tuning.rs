@@ -11,7 +11,7 @@ use crate::rng::Name;
 use crate::setting::PyLimits;
 use crate::workers::{PyWorkers, or_default};
 
-/// States, sensor variances, (process variance, gust variance, memory) and whether features are derivatives, for each
+/// States, sensor variances, (process variance, gust variance, correlation time) and whether features are derivatives, for each
 /// chain.
 type Chains = Vec<(Vec<usize>, Vec<f64>, (f64, f64, f64), bool)>;
 /// Readings, weights and commands of each run.
@@ -24,14 +24,14 @@ fn fitting<'a>(model: &PyModel, limits: &'a PyLimits) -> Result<&'a Signals> {
 }
 
 fn observer(chains: Chains, dt: f64) -> Result<Vec<Observed>> {
-    let of_chain = |(states, sensors, (process, gust, memory), integrated): (
+    let of_chain = |(states, sensors, (process, gust, correlation_time), integrated): (
         Vec<usize>,
         Vec<f64>,
         (f64, f64, f64),
         bool,
     )| {
         let chain = Chain { states: states.len(), dt, integrated }.validated()?;
-        let noise = Noise { sensors, process, gust, memory }.validated(states.len())?;
+        let noise = Noise { sensors, process, gust, correlation_time }.validated(states.len())?;
         Ok(Observed { states, chain, noise })
     };
     chains.into_iter().map(of_chain).collect()
@@ -50,8 +50,8 @@ fn recorded(records: &Records<'_>, n_x: usize, n_u: usize) -> Result<Vec<Recorde
         .collect()
 }
 
-/// The model with constants, and lags of its actuators, that leave the least; what is left, readings, covariance of the
-/// free values, and members drawn from it.
+/// The model with the constants and lags of the smallest χ²; that χ², readings, covariance of the free values, and
+/// members drawn from it.
 #[pyfunction]
 #[pyo3(signature = (
     model, limits, chains, records, *, free, lags, iterations, draws = 0, unit = None, workers = None,
@@ -101,7 +101,7 @@ pub fn tune<'py>(
     let members: Vec<_> = drawn.iter().map(varied).collect::<twinloop_core::Result<_>>()?;
     let finished = PyModel(model.0.varied(&tuned.constants, &tuned.lags)?);
     let covariance = to_matrix(py, free.len() + lags.len(), tuned.covariance);
-    Ok((finished, tuned.left, tuned.readings, covariance, members))
+    Ok((finished, tuned.chi_squared, tuned.readings, covariance, members))
 }
 
 /// Whitened prediction errors (n + 1, n_x) and states once each reading was used (n + 1, n_x) of each run; none where

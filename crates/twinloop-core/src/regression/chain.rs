@@ -73,8 +73,8 @@ impl Chain {
             for b in 0..d {
                 let power = a + b + 1;
                 // Not `powi`: how that rounds is the compiler's choice.
-                let lasting: f64 = (0..power).map(|_| self.dt).product();
-                q[a * d + b] = process * lasting / (factorial(a) * factorial(b) * power as f64);
+                let dt_to_power: f64 = (0..power).map(|_| self.dt).product();
+                q[a * d + b] = process * dt_to_power / (factorial(a) * factorial(b) * power as f64);
             }
         }
         q
@@ -94,9 +94,10 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Moves states by a period. Behind them may be a lasting disturbance that drives them, of which a share is `kept`.
+    /// Predicts the states one period ahead. After them there may be a correlated disturbance that drives them, with its
+    /// `correlation` over a period.
     #[inline(always)]
-    pub fn coast(&self, states: &mut [f64], kept: f64) {
+    pub fn predict(&self, states: &mut [f64], correlation: f64) {
         let (states, hidden) = states.split_at_mut(self.states);
         if self.integrated {
             for i in (1..self.states).rev() {
@@ -109,7 +110,7 @@ impl Motion {
             for (state, reach) in states.iter_mut().zip(self.reach) {
                 *state += reach * *gust;
             }
-            *gust *= kept;
+            *gust *= correlation;
         }
     }
 }

@@ -89,7 +89,7 @@ impl Record {
         let mut residual = self.measured.clone();
         let mut state = [0.0; D];
         for (k, reading) in residual.as_chunks_mut::<D>().0.iter_mut().skip(1).enumerate() {
-            motion.coast(&mut state, 1.0);
+            motion.predict(&mut state, 1.0);
             for (c, increment) in coefficients.iter().zip(&increments[k * coefficients.len()..]) {
                 state.iter_mut().zip(increment).for_each(|(state, by)| *state += c * by);
             }
@@ -115,10 +115,10 @@ pub struct Gram {
 pub struct Solution {
     /// Of the subset's features, in its order.
     pub coefficients: Vec<f64>,
-    /// Covariance of them, where the noise is what whitening took it for (k × k).
+    /// Their covariance under the noise of the whitening (k × k).
     pub covariance: Vec<f64>,
-    /// Sum of squares that is left, χ².
-    pub left: f64,
+    /// Residual sum of squares, χ².
+    pub chi_squared: f64,
 }
 
 /// Rows that are multiplied into the products at once.
@@ -156,7 +156,7 @@ impl Gram {
         let width = p + 1;
         let mut products = vec![0.0; width * width];
         let inner = whitening.inner;
-        // What the filter has not explained yet, column after column; that of the readings is their prediction.
+        // The filter's state for each column: the response to each feature, then the prediction of the readings.
         let mut state = vec![0.0; inner * width];
         let mut rows: Vec<f64> = Vec::with_capacity(BLOCK * width);
         let steps = record.steps(chain);
@@ -178,7 +178,7 @@ impl Gram {
                     rows[first + i * width + j] = white[i];
                 }
                 column.iter_mut().zip(&correction).for_each(|(state, by)| *state += sign * by);
-                motion.coast(column, whitening.kept);
+                motion.predict(column, whitening.correlation);
                 if j < p && k < steps {
                     let increments = &record.increments[(k * p + j) * d..][..d];
                     column.iter_mut().zip(increments).for_each(|(a, b)| *a += b);
@@ -256,7 +256,7 @@ impl Gram {
         Some(Solution {
             coefficients: scaled.iter().zip(&lengths).map(|(c, length)| c / length).collect(),
             covariance: (0..k * k).map(|ab| inverse[ab] / (lengths[ab / k] * lengths[ab % k])).collect(),
-            left: (self.total() - explained).max(0.0),
+            chi_squared: (self.total() - explained).max(0.0),
         })
     }
 

@@ -37,7 +37,7 @@ fn squares<const D: usize>(chain: &Chain, whitening: &Whitening, residual: &[f64
             total += white * white;
         }
         state.iter_mut().zip(correction).for_each(|(state, by)| *state += by);
-        motion.coast(&mut state, whitening.kept);
+        motion.predict(&mut state, whitening.correlation);
     }
     total
 }
@@ -65,7 +65,7 @@ pub fn most_likely_noise(
         for step in STEPS {
             for _ in 0..8 {
                 let mut moved = false;
-                // Sensors, process, and where there are any the size and the memory of gusts.
+                // Sensors, process, and where there are any the variance and the correlation time of gusts.
                 for which in 0..=d + 2 * best.hidden() {
                     for factor in [step, 1.0 / step] {
                         let mut tried = best.clone();
@@ -78,7 +78,8 @@ pub fn most_likely_noise(
                             tried.gust = (tried.gust * factor).max(smallest.gust);
                         } else {
                             // Shorter than a few periods it is white, longer than this it is a constant.
-                            tried.memory = (tried.memory * factor).clamp(3.0 * chain.dt, 300.0 * chain.dt);
+                            tried.correlation_time =
+                                (tried.correlation_time * factor).clamp(3.0 * chain.dt, 300.0 * chain.dt);
                         }
                         if tried == best {
                             continue;

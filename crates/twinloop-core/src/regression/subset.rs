@@ -110,7 +110,7 @@ struct Walk<'a, V> {
     inside: Vec<bool>,
     inverse: Inverse<V>,
     coefficients: Vec<f64>,
-    left: f64,
+    chi_squared: f64,
     price: f64,
     /// Rounding that updates have let in since the last inversion from scratch, in the inverse's own terms.
     doubt: f64,
@@ -127,7 +127,7 @@ impl<'a, V: Vector> Walk<'a, V> {
             members: vec![],
             inside: vec![false; choices.len()],
             coefficients: vec![],
-            left: choices.total,
+            chi_squared: choices.total,
             price: 0.0,
             doubt: 0.0,
             products: inverse.empty_row(),
@@ -137,7 +137,7 @@ impl<'a, V: Vector> Walk<'a, V> {
     }
 
     fn energy(&self) -> f64 {
-        self.left + self.price
+        self.chi_squared + self.price
     }
 
     /// Inverse, coefficients and χ² of the members from scratch.
@@ -152,7 +152,7 @@ impl<'a, V: Vector> Walk<'a, V> {
         self.coefficients.clear();
         self.coefficients.extend_from_slice(&self.images[..k]);
         self.doubt = 0.0;
-        self.left = (choices.total - dot(&self.coefficients, &self.products)).max(0.0);
+        self.chi_squared = (choices.total - dot(&self.coefficients, &self.products)).max(0.0);
         self.price = members.iter().map(|&j| choices.prices[j]).sum();
         true
     }
@@ -183,7 +183,7 @@ impl<'a, V: Vector> Walk<'a, V> {
         let new = gain / outside;
         self.coefficients.iter_mut().zip(&self.images).for_each(|(c, image)| *c -= image * new);
         self.coefficients.push(new);
-        self.left = (self.left - gain * gain / outside).max(0.0);
+        self.chi_squared = (self.chi_squared - gain * gain / outside).max(0.0);
         self.price += self.choices.prices[j];
     }
 
@@ -195,7 +195,7 @@ impl<'a, V: Vector> Walk<'a, V> {
         self.inverse.shrink(at, &mut self.images);
         self.coefficients.iter_mut().zip(&self.images).for_each(|(c, image)| *c -= image * old / pivot);
         self.coefficients.remove(at);
-        self.left += old * old / pivot;
+        self.chi_squared += old * old / pivot;
         let j = self.members.remove(at);
         self.price -= self.choices.prices[j];
         self.inside[j] = false;

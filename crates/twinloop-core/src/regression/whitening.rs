@@ -13,10 +13,10 @@ use crate::linear_algebra::{Small, congruent, inverse_root};
 /// Gains and whitening matrices of each reading of a record.
 #[derive(Clone, Debug)]
 pub(crate) struct Whitening {
-    /// States of the filter: those of the chain, and the lasting disturbance.
+    /// States of the filter: those of the chain, and the correlated disturbance.
     pub inner: usize,
-    /// Share of the lasting disturbance that is left after a period.
-    pub kept: f64,
+    /// Correlation of that disturbance with itself one period later.
+    pub correlation: f64,
     /// K of each reading (inner × states).
     gains: Vec<f64>,
     /// L⁻¹ of each reading with L Lᵀ the covariance of its innovation (states × states).
@@ -55,14 +55,14 @@ impl Whitening {
         weights: &[f64],
         spread: &[f64],
     ) -> Self {
-        let kept = noise.kept(chain.dt);
+        let correlation = noise.correlation(chain.dt);
         let disturbance = chain.disturbance(noise.process);
         let motion = chain.motion();
         let mut transition: Small<I> = [[0.0; I]; I];
         for j in 0..I {
             let mut column = [0.0; I];
             column[j] = 1.0;
-            motion.coast(&mut column, kept);
+            motion.predict(&mut column, correlation);
             (0..I).for_each(|i| transition[i][j] = column[i]);
         }
         let mut covariance: Small<I> = [[0.0; I]; I];
@@ -72,7 +72,7 @@ impl Whitening {
         let (weights, _) = weights.as_chunks::<D>();
         let mut whitening = Self {
             inner: I,
-            kept,
+            correlation,
             gains: Vec::with_capacity(weights.len() * I * D),
             roots: Vec::with_capacity(weights.len() * D * D),
             log_determinant: 0.0,
@@ -87,7 +87,7 @@ impl Whitening {
                 }
             }
             for (i, row) in covariance.iter_mut().enumerate().skip(D) {
-                row[i] += noise.gust * (1.0 - kept * kept);
+                row[i] += noise.gust * (1.0 - correlation * correlation);
             }
         }
         whitening
@@ -110,18 +110,18 @@ impl Whitening {
         }
         let root = inverse_root(&innovation);
         // W = P Hᵀ L⁻ᵀ: the gain K is W L⁻¹.
-        let mut told: Small<I, D> = [[0.0; D]; I];
+        let mut projected: Small<I, D> = [[0.0; D]; I];
         for i in 0..I {
             for j in 0..D {
-                told[i][j] = (0..D).map(|k| covariance[i][k] * root[j][k]).sum();
+                projected[i][j] = (0..D).map(|k| covariance[i][k] * root[j][k]).sum();
             }
         }
         let mut gain: Small<I, D> = [[0.0; D]; I];
-        for (gain, told) in gain.iter_mut().zip(&told) {
-            *gain = std::array::from_fn(|j| (0..D).map(|k| told[k] * root[k][j]).sum());
+        for (gain, projected) in gain.iter_mut().zip(&projected) {
+            *gain = std::array::from_fn(|j| (0..D).map(|k| projected[k] * root[k][j]).sum());
             self.gains.extend(gain.iter());
         }
-        *covariance = unknown(covariance, &gain, &noise);
+        *covariance = updated(covariance, &gain, &noise);
         for i in 0..D {
             // A reading that is ignored adds nothing to the sum of squares.
             let counts = weights[i] > 0.0;
@@ -177,29 +177,29 @@ fn product<T: Linear>(row: &[f64], column: &[T]) -> T {
     sum
 }
 
-/// What is not known yet once a reading was used, (1 − K H) P (1 − K H)ᵀ + K R Kᵀ (Joseph 1968): P − W Wᵀ loses what
-/// rounding leaves of P, which is more than a sensor leaves that is better than 1e-8 of its readings.
-fn unknown<const D: usize, const I: usize>(
+/// The covariance after a reading, (1 − K H) P (1 − K H)ᵀ + K R Kᵀ (Joseph 1968). The shorter P − W Wᵀ loses P to rounding
+/// if a sensor is better than 1e-8 of its readings.
+fn updated<const D: usize, const I: usize>(
     covariance: &Small<I>,
     gain: &Small<I, D>,
     noise: &[f64; D],
 ) -> Small<I> {
     // K H has the columns of the readings alone, so beyond those 1 − K H is the unit matrix.
-    let mut left: Small<I, D> = [[0.0; D]; I];
+    let mut reduction: Small<I, D> = [[0.0; D]; I];
     let mut half = *covariance;
     for i in 0..I {
-        left[i] = std::array::from_fn(|k| if i == k { 1.0 - gain[i][k] } else { 0.0 - gain[i][k] });
+        reduction[i] = std::array::from_fn(|k| if i == k { 1.0 - gain[i][k] } else { 0.0 - gain[i][k] });
         for j in 0..I {
-            let read: f64 = (0..D).map(|k| left[i][k] * covariance[k][j]).sum();
+            let read: f64 = (0..D).map(|k| reduction[i][k] * covariance[k][j]).sum();
             half[i][j] = if i < D { read } else { read + covariance[i][j] };
         }
     }
     let mut next: Small<I> = [[0.0; I]; I];
     for i in 0..I {
         for j in 0..=i {
-            let read: f64 = (0..D).map(|k| half[i][k] * left[j][k]).sum();
-            let told: f64 = (0..D).map(|k| gain[i][k] * noise[k] * gain[j][k]).sum();
-            next[i][j] = if j < D { read } else { read + half[i][j] } + told;
+            let read: f64 = (0..D).map(|k| half[i][k] * reduction[j][k]).sum();
+            let noisy: f64 = (0..D).map(|k| gain[i][k] * noise[k] * gain[j][k]).sum();
+            next[i][j] = if j < D { read } else { read + half[i][j] } + noisy;
             next[j][i] = next[i][j];
         }
     }

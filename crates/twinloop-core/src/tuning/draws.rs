@@ -1,4 +1,4 @@
-//! Draws: models whose constants and times differ by what the runs leave open.
+//! Draws: models with other constants and times, from the uncertainty that the runs leave.
 
 use super::variant::Variant;
 use super::{Tuned, Tuning};
@@ -9,14 +9,13 @@ use crate::workers::Workers;
 
 /// More models at once than this are refused.
 const MOST_DRAWS: usize = 1_000_000;
-/// How often a draw is taken back by half, and one more.
+/// Lengths at which a draw is tried: the whole step, then halves of it.
 const HALVES: usize = 16;
 
 impl Tuning<'_> {
-    /// Tuned models with their free values drawn from what the runs leave open, each from a stream of its own.
+    /// Tuned models with free values drawn from a normal distribution of the tuned covariance, each from its own stream.
     ///
-    /// What is left is known where χ² is a parabola; a draw that leaves the place where it is one is taken back by
-    /// halves until the runs bear it.
+    /// The covariance describes χ² only where it is a parabola. So a draw is halved until its χ² agrees with the runs.
     pub fn drawn(
         &self,
         tuned: &Tuned,
@@ -49,7 +48,7 @@ impl Tuning<'_> {
             })
             .collect();
         let costs = self.costs(&self.whitenings(), &tries, workers);
-        let bearable = tuned.left + size as f64 + 3.0 * (2.0 * size as f64).sqrt();
+        let bearable = tuned.chi_squared + size as f64 + 3.0 * (2.0 * size as f64).sqrt();
         let borne = |(tries, costs): (&[Variant], &[f64])| {
             let found = tries.iter().zip(costs).find(|(_, cost)| **cost <= bearable);
             let one = found.map_or(&start, |(one, _)| one);

@@ -1,4 +1,4 @@
-//! Levenberg's and Marquardt's method: damped steps until χ² gains no more.
+//! The method of Levenberg and Marquardt: damped Gauss-Newton steps until χ² no longer falls (Marquardt 1963).
 
 use super::variant::Variant;
 use super::{Tuned, Tuning};
@@ -9,15 +9,15 @@ use crate::workers::Workers;
 const DAMPINGS: [f64; 8] = [1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e6];
 
 impl Tuning<'_> {
-    /// The model with constants and times that leave least, after at most `iterations` steps.
+    /// The model with the constants and times of the smallest χ², after at most `iterations` steps.
     pub fn tune(&self, iterations: usize, workers: &Workers) -> Tuned {
         let whitenings = self.whitenings();
         let mut best = self.start();
         let mut damping = 1e-3;
-        let mut left = self.costs(&whitenings, std::slice::from_ref(&best), workers)[0];
+        let mut chi_squared = self.costs(&whitenings, std::slice::from_ref(&best), workers)[0];
         let mut open = vec![];
         for _ in 0..iterations {
-            if !left.is_finite() {
+            if !chi_squared.is_finite() {
                 break;
             }
             let Some((gradient, curvature)) = self.normal(&whitenings, &best, workers) else { break };
@@ -31,21 +31,21 @@ impl Tuning<'_> {
             let variants: Vec<_> = tried.iter().map(|(_, variant)| variant.clone()).collect();
             let costs = self.costs(&whitenings, &variants, workers);
             let found = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-            let Some(found) = found.filter(|&found| costs[found] < left) else { break };
-            let gained = left - costs[found];
+            let Some(found) = found.filter(|&found| costs[found] < chi_squared) else { break };
+            let gained = chi_squared - costs[found];
             (damping, best) = tried[found].clone();
-            left = costs[found];
+            chi_squared = costs[found];
             if gained < 1e-3 {
                 break;
             }
         }
-        if left.is_finite()
+        if chi_squared.is_finite()
             && let Some((_, curvature)) = self.normal(&whitenings, &best, workers)
         {
             open = covariance(&curvature, &self.values(&best)).unwrap_or_default();
         }
         let readings =
             self.records.iter().map(|record| record.weights.iter().filter(|&&w| w > 0.0).count()).sum();
-        Tuned { constants: best.constants, lags: best.lags, left, readings, covariance: open }
+        Tuned { constants: best.constants, lags: best.lags, chi_squared, readings, covariance: open }
     }
 }

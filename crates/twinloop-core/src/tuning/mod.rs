@@ -1,4 +1,4 @@
-//! Tuning: moves a model's constants, and the times of its actuation, until its predictions leave white noise only.
+//! Tuning: fits a model's constants, and the times of its actuation, so that its prediction errors are white noise.
 //!
 //! A prediction-error method with an observer of fixed gains (Ljung 1999, chapter 7). With little process noise the
 //! gains fade and it is an output-error fit over whole runs; with much of it they stay and it is one of single steps.
@@ -21,7 +21,7 @@ use crate::setting::Limits;
 pub struct Observed {
     /// The states, the driven one first, then its integral, and so on.
     pub states: Vec<usize>,
-    /// How they move on where nothing is known.
+    /// Their motion without the model.
     pub chain: Chain,
     /// Variances.
     pub noise: Noise,
@@ -65,11 +65,11 @@ pub struct Tuned {
     /// Lag of every command, then time of every hidden state, s.
     pub lags: Vec<f64>,
     /// Sum of squares of the whitened prediction errors, χ²; infinite if the model diverges on the runs.
-    pub left: f64,
+    pub chi_squared: f64,
     /// Readings that counted.
     pub readings: usize,
-    /// Covariance of the free constants, then of the free lags, each known to its own size beforehand; empty if it
-    /// could not be had.
+    /// Covariance of the free constants, then of the free lags, with a prior of standard deviation |value| on each; empty
+    /// where a small change makes the model diverge.
     pub covariance: Vec<f64>,
 }
 

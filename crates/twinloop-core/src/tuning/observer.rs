@@ -180,7 +180,7 @@ impl Part<'_> {
                     for (&at, reach) in observed.states.iter().zip(observed.chain.motion().reach) {
                         state[at] = state[at] + *gust * reach;
                     }
-                    *gust = *gust * whitening.kept;
+                    *gust = *gust * whitening.correlation;
                 }
             }
             for (state, &limit) in state.iter().zip(limits.magnitudes()) {

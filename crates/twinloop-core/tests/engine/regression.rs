@@ -59,7 +59,7 @@ impl Case {
             }
         }
         if self.hidden() > 0 {
-            phi[d][d] = (-dt / self.noise.memory).exp();
+            phi[d][d] = (-dt / self.noise.correlation_time).exp();
         }
         phi
     }
@@ -83,7 +83,7 @@ impl Case {
             }
         }
         if self.hidden() > 0 {
-            q[d][d] = self.noise.gust * (1.0 - (-2.0 * dt / self.noise.memory).exp());
+            q[d][d] = self.noise.gust * (1.0 - (-2.0 * dt / self.noise.correlation_time).exp());
         }
         q
     }
@@ -178,9 +178,14 @@ fn case() -> impl Strategy<Value = Case> {
                 noise,
             )
                 .prop_map(
-                    move |(measured, weights, features, (sensors, process, gust, memory))| Case {
+                    move |(measured, weights, features, (sensors, process, gust, correlation_time))| Case {
                         chain: Chain { states, dt: 0.1, integrated }.validated().unwrap(),
-                        noise: Noise { sensors, process, gust: if gusts { gust } else { 0.0 }, memory },
+                        noise: Noise {
+                            sensors,
+                            process,
+                            gust: if gusts { gust } else { 0.0 },
+                            correlation_time,
+                        },
                         measured,
                         weights,
                         features,
@@ -248,7 +253,7 @@ proptest! {
             }
         }
         let explained: f64 = (0..FEATURES).map(|i| expected[i][0] * right[i][0]).sum();
-        prop_assert!(near(found.left, gram.total() - explained, gram.total()));
+        prop_assert!(near(found.chi_squared, gram.total() - explained, gram.total()));
     }
 
     #[test]
@@ -260,7 +265,7 @@ proptest! {
         let found = search(&choices, &annealing, &mut stream, Width::widest());
         let energy = |subset: &[usize]| {
             let price: f64 = subset.iter().map(|&j| [price, 0.5 * price, 2.0 * price][j]).sum();
-            gram.solve(subset, 0.0).map_or(f64::INFINITY, |solution| solution.left + price)
+            gram.solve(subset, 0.0).map_or(f64::INFINITY, |solution| solution.chi_squared + price)
         };
         let subsets = (0..1 << FEATURES).map(|set: usize| (0..FEATURES).filter(|j| set >> j & 1 == 1).collect::<Vec<_>>());
         let best = subsets.map(|subset| energy(&subset)).fold(f64::INFINITY, f64::min);

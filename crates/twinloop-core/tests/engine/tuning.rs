@@ -84,7 +84,7 @@ fn by_least_squares(noise: &Noise, runs: &[(Vec<f64>, Vec<f64>)]) -> (Vec<f64>, 
                     let apart = i.abs_diff(j);
                     let white = [noise.process + 2.0 * noise.sensors[0], -noise.sensors[0]];
                     white.get(apart).copied().unwrap_or(0.0)
-                        + noise.gust * (-(apart as f64) * DT / noise.memory).exp()
+                        + noise.gust * (-(apart as f64) * DT / noise.correlation_time).exp()
                 };
                 (0..n).map(entry).collect()
             })
@@ -124,8 +124,14 @@ fn runs() -> impl Strategy<Value = Vec<(Vec<f64>, Vec<f64>)>> {
 }
 
 fn noise() -> impl Strategy<Value = Noise> {
-    (1e-3..0.1_f64, 1e-3..0.1_f64, prop_oneof![Just(0.0), 1e-3..0.05_f64], 0.1..1.0_f64)
-        .prop_map(|(sensor, process, gust, memory)| Noise { sensors: vec![sensor], process, gust, memory })
+    (1e-3..0.1_f64, 1e-3..0.1_f64, prop_oneof![Just(0.0), 1e-3..0.05_f64], 0.1..1.0_f64).prop_map(
+        |(sensor, process, gust, correlation_time)| Noise {
+            sensors: vec![sensor],
+            process,
+            gust,
+            correlation_time,
+        },
+    )
 }
 
 proptest! {
@@ -137,9 +143,9 @@ proptest! {
         // Constants are known to their own size beforehand.
         prop_assume!(expected.iter().all(|c| c.abs() > 0.05));
         let line = Line::new(start, noise, &runs);
-        let Tuned { constants, left, readings, covariance, .. } = line.tuning().tune(60, &one_worker());
+        let Tuned { constants, chi_squared, readings, covariance, .. } = line.tuning().tune(60, &one_worker());
         prop_assert_eq!(readings, runs.iter().map(|(states, _)| states.len()).sum::<usize>());
-        prop_assert!((left - least).abs() < 1e-2 + 1e-5 * least, "{} {}", left, least);
+        prop_assert!((chi_squared - least).abs() < 1e-2 + 1e-5 * least, "{} {}", chi_squared, least);
         for i in 0..2 {
             curvature[i][i] += 1.0 / (constants[i] * constants[i]);
         }
@@ -157,10 +163,10 @@ proptest! {
     #[test]
     fn squares_of_predictions_are_what_is_left(runs in runs(), noise in noise(), start in [0.1..1.0_f64, -1.0..-0.1_f64]) {
         let line = Line::new(start, noise, &runs);
-        let left = line.tuning().tune(0, &one_worker()).left;
+        let chi_squared = line.tuning().tune(0, &one_worker()).chi_squared;
         let found = line.tuning().predictions(&one_worker()).expect("no divergence");
         let squares: f64 = found.iter().flat_map(|(errors, _)| errors).map(|error| error * error).sum();
-        prop_assert!((squares - left).abs() < 1e-9 * left);
+        prop_assert!((squares - chi_squared).abs() < 1e-9 * chi_squared);
         for ((errors, states), (readings, _)) in found.iter().zip(&runs) {
             prop_assert_eq!((errors.len(), states.len()), (readings.len(), readings.len()));
             prop_assert_eq!((errors[0], states[0]), (0.0, readings[0]));
@@ -175,7 +181,7 @@ fn draws_scatter_by_the_covariance() {
     for (k, u) in commands.iter().enumerate() {
         states.push(states[k] + 0.7 * u - 0.4 * u * u + 0.1 * (1.3 * k as f64).cos());
     }
-    let noise = Noise { sensors: vec![1e-2], process: 1e-2, gust: 0.0, memory: 1.0 };
+    let noise = Noise { sensors: vec![1e-2], process: 1e-2, gust: 0.0, correlation_time: 1.0 };
     let line = Line::new([0.5, -0.5], noise, &[(states, commands)]);
     let tuned = line.tuning().tune(60, &one_worker());
     let count = 4000;
@@ -206,7 +212,7 @@ fn a_lag_is_found_from_a_step_response() {
     let actuation = Actuation { actuators: vec![actuator], hidden: vec![] };
     let frame = Frame::new(Form::Acceleration, limits.signals()).with_actuation(actuation).unwrap();
     let record = Recorded { weights: vec![1.0; states.len()], commands: vec![1.0; steps as usize], states };
-    let noise = Noise { sensors: vec![1e-8], process: 1e-12, gust: 0.0, memory: 1.0 };
+    let noise = Noise { sensors: vec![1e-8], process: 1e-12, gust: 0.0, correlation_time: 1.0 };
     let code = code("r2 = r1 * 1.0\n");
     let tuning = Tuning {
         code: &code,
@@ -224,16 +230,19 @@ fn a_lag_is_found_from_a_step_response() {
 
 #[test]
 fn a_model_that_diverges_is_left_as_it_is() {
-    let noise = Noise { sensors: vec![1e-2], process: 1e-9, gust: 0.0, memory: 1.0 };
+    let noise = Noise { sensors: vec![1e-2], process: 1e-9, gust: 0.0, correlation_time: 1.0 };
     let line = Line::new([1e6, 1.0], noise, &[(vec![500.0; 4], vec![1.0; 3])]);
     let tuned = line.tuning().tune(10, &one_worker());
-    assert_eq!((tuned.left, tuned.constants, tuned.covariance), (f64::INFINITY, vec![1e6, 1.0], vec![]));
+    assert_eq!(
+        (tuned.chi_squared, tuned.constants, tuned.covariance),
+        (f64::INFINITY, vec![1e6, 1.0], vec![])
+    );
     assert!(line.tuning().predictions(&one_worker()).is_none());
 }
 
 #[test]
 fn parts_that_do_not_fit_are_refused() {
-    let noise = Noise { sensors: vec![1e-2], process: 1e-2, gust: 0.0, memory: 1.0 };
+    let noise = Noise { sensors: vec![1e-2], process: 1e-2, gust: 0.0, correlation_time: 1.0 };
     let line = Line::new([1.0, 1.0], noise, &[(vec![0.0; 4], vec![1.0; 3])]);
     assert!(line.tuning().check().is_ok());
     let short = [Recorded { commands: vec![1.0; 2], ..line.records[0].clone() }];
