@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import ClassVar
@@ -63,7 +63,12 @@ class Sum(Recorded, kind="sum"):
 
 
 def prices(
-    pool: Pool, terms: Sequence[int], readings: int, runs: int, favoured: Mapping[int, float] | None = None
+    pool: Pool,
+    terms: Sequence[int],
+    readings: int,
+    runs: int,
+    favoured: Mapping[int, float] | None = None,
+    forbidden: Container[int] = (),
 ) -> Floats:
     """What each term costs, in units of χ²: a coefficient, and the description of its expression.
 
@@ -74,13 +79,16 @@ def prices(
         runs: that they are of. Many resemble one another: what a law that is not quite right leaves on one it leaves on
             all, and what explains it gains with each without being any truer. So prices rise with their number.
         favoured: description lengths in nats of terms that are known from elsewhere.
+        forbidden: terms that nothing can pay for.
 
     Returns:
         Prices (terms,).
     """
     lengths = [(favoured or {}).get(term, pool.length(term)) for term in terms]
     costs: Floats = log(max(readings, 2)) + 2.0 * np.array(lengths)
-    return costs * power(max(1.0, runs / FEW_RUNS), RESEMBLANCE)
+    return np.where(
+        [term in forbidden for term in terms], np.inf, costs * power(max(1.0, runs / FEW_RUNS), RESEMBLANCE)
+    )
 
 
 def search(
@@ -118,14 +126,12 @@ def search(
         A sum for each chain.
     """
     usable = problem.usable(list(dict.fromkeys([*terms, *(t for s in known if s for t in s.weights)])))
-    known_elsewhere = favoured or [{}] * len(chains)
     costs = [
-        prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere)
-        for chain, elsewhere in zip(chains, known_elsewhere, strict=True)
+        prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere, out)
+        for chain, elsewhere, out in zip(
+            chains, favoured or [{}] * len(chains), forbidden or [set()] * len(chains), strict=True
+        )
     ]
-    place = {term: i for i, term in enumerate(usable)}
-    for cost, terms_out in zip(costs, forbidden or [set()] * len(costs), strict=True):
-        cost[[place[term] for term in terms_out if term in place]] = np.inf
     columns = problem.values(usable)
     regressions = [problem.regression(chain, columns) for chain in chains]
 
@@ -139,41 +145,34 @@ def search(
             unit=unit.part(number * NOISE_ROUNDS + round_).named(purpose), workers=problem.workers,
         )  # fmt: skip
 
-    best: list[Sum] = []
     current = list(chains)
     for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
         grams = [
             r.gram(c.sensors, c.motion, problem.workers) for r, c in zip(regressions, current, strict=True)
         ]
-        walk = partial(walked, round_=round_)
-        subsets = _chosen(problem, usable, place, chains, known, grams, costs, walk)
+        subsets = _chosen(problem, usable, chains, known, grams, costs, partial(walked, round_=round_))
         coefficients = [_spread(judged[0], len(usable)) for judged in subsets]
-        noisy, changed = current, False
-        if not fixed_noise:
-            used = [len(judged[0][0]) for judged in subsets]
-            noisy = _noisy(problem, regressions, coefficients, current, used)
-            changed = any(_differ(*pair, problem) for pair in zip(noisy, current, strict=True))
-        best = []
-        for i, (judged, chain) in enumerate(zip(subsets, noisy, strict=True)):
-            subset, length, weights = judged[0]
-            others = [
-                (tuple(usable[j] for j in s), max(0.0, longer - length)) for s, longer, _ in judged[1:40]
-            ]
-            score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
-            rung = RUNG * problem.pool.rung(usable[j] for j in subset)
-            total = rung + score + float(costs[i][list(subset)].sum())
-            chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}
-            best.append(Sum(chosen, total, chain, others))
-        current = noisy
-        if not changed:
+        if fixed_noise:
             break
-    return best
+        before, used = current, [len(judged[0][0]) for judged in subsets]
+        current = _noisy(problem, regressions, coefficients, before, used)
+        if not any(_differ(*pair, problem) for pair in zip(current, before, strict=True)):
+            break
+    sums = []
+    for i, (judged, chain) in enumerate(zip(subsets, current, strict=True)):
+        subset, length, weights = judged[0]
+        others = [(tuple(usable[j] for j in s), max(0.0, longer - length)) for s, longer, _ in judged[1:40]]
+        score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
+        rung = RUNG * problem.pool.rung(usable[j] for j in subset)
+        total = rung + score + float(costs[i][list(subset)].sum())
+        chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}
+        sums.append(Sum(chosen, total, chain, others))
+    return sums
 
 
 def _chosen(
     problem: Problem,
     usable: Sequence[int],
-    place: Mapping[int, int],
     chains: Sequence[Chain],
     known: Sequence[Sum | None],
     grams: Sequence[_core.Gram],
@@ -187,6 +186,7 @@ def _chosen(
     sums of readings, and what tells the sum of all readings from that of all but the last is the last. Where one is
     found, walks are repeated in which J costs something, and more until they find laws without.
     """
+    place = {term: i for i, term in enumerate(usable)}
 
     def best(i: int, gram: _core.Gram, walked: Subsets) -> list[Judged]:
         """What the walks of a chain have found, and what was known of it, the best first."""
