@@ -1,4 +1,4 @@
-"""Remarks: what a person should know of data or a twin, as values with a code, a severity and a sentence."""
+"""Remarks: diagnostics of data or a twin, as values with a code, a severity and a sentence."""
 
 from __future__ import annotations
 

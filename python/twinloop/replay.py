@@ -1,4 +1,4 @@
-"""Commands as they were recorded: what a twin flies to be compared with a run that nobody asked for."""
+"""Recorded commands: a twin flies them for the comparison with an attached run."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
     Args:
         trajectory: what a system answered.
         limits: of a run, with the signals that it should consist of.
-        steps: how many steps the test asked for; None where nobody asked.
+        steps: number of steps of the test; None for an attached run.
         least: steps that it must have.
 
     Returns:

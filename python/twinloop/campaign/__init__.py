@@ -1,4 +1,4 @@
-"""The campaign: ask and tell, what was told, and the two ways of learning from it."""
+"""The campaign: ask and tell, its runs, and the two ways of learning from them."""
 
 from twinloop.campaign.assessment import controller_to_fly
 from twinloop.campaign.campaign import Campaign

@@ -83,7 +83,7 @@ def predicted_quality(best: Test, experiments: Sequence[Experiment]) -> tuple[fl
 
     Args:
         best: test of the controller.
-        experiments: in the order told.
+        experiments: in the order of `tell`.
 
     Returns:
         Both; None where nobody knows.

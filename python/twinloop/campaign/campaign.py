@@ -650,7 +650,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             warn(latest.remarks, stacklevel=3)
 
     def _error_so_far(self, alone: _core.SelectedTests) -> float | None:
-        """On a run that is being told, of the model that the last `ask` knew: a look must not change it."""
+        """On a new run, of the model at the last `ask`: a look must not change it."""
         model = self._method.asked_model
         return None if model is None else float(closed_loop([model], alone, self._workers)[0, 0])
 

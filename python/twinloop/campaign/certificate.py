@@ -84,7 +84,7 @@ def certificate(campaign: Campaign) -> Certificate:
     """The certificate of a campaign's controller.
 
     Args:
-        campaign: with at least one experiment told.
+        campaign: with at least one run.
 
     Raises:
         NotAvailable: nothing was told.

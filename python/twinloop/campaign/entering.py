@@ -50,7 +50,7 @@ def flown_test(setup: Setup, test: Test, trajectory: object, judge: Judge, least
 
 
 def attached_run(setup: Setup, trajectory: object, judge: Judge) -> Experiment:
-    """The experiment of a run that nobody asked for.
+    """The experiment of an attached run.
 
     Args:
         setup: of the campaign.
@@ -89,7 +89,7 @@ def partial_run(partial: Trajectory | None, reason: str) -> Trajectory | None:
 
 
 def replay_of_record(record: object, setup: Setup) -> Replay:
-    """What a twin flies to be compared with a run that nobody asked for, from the record of the experiment.
+    """What a twin flies for the comparison with an attached run, from the record of the experiment.
 
     Args:
         record: of an experiment, from anywhere.

@@ -23,7 +23,7 @@ def checked_budget(campaign: Campaign, system: object, experiments: int) -> int:
     Args:
         campaign: that shall fly.
         system: to be flown.
-        experiments: runs on it in all, those told before included.
+        experiments: total number of runs on it, earlier ones included.
 
     Raises:
         InvalidInput: no system, or fewer experiments than were told already.
@@ -66,7 +66,7 @@ def fly(
     """Flies and tells one test after another until the budget is spent.
 
     Args:
-        campaign: that asks and is told.
+        campaign: that asks and learns.
         system: to be flown.
         budget: runs on it in all.
         timeout: seconds that it may take for a test; None: as long as it wants.
@@ -118,7 +118,7 @@ def _made(campaign: Campaign) -> Test | None:
 
 
 def _flown(campaign: Campaign, system: System, test: Test, timeout: float | None, again: bool) -> bool:
-    """One run, told as what became of it: whether the system failed, which it may not do `again`."""
+    """One run, entered with its result: whether the system failed, which it may not do `again`."""
     try:
         trajectory = run_within(system, test, timeout)
     except NoAnswer:

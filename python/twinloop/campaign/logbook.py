@@ -1,4 +1,4 @@
-"""What a campaign asked for and what it was told; a bad record is refused and leaves the book as it was."""
+"""The tests of a campaign and their runs; a bad record is refused and leaves the book as it was."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from twinloop.trajectory import Trajectory, check_recorded
 
 
 class Logbook(Recorded, kind="logbook"):
-    """Tests by number, experiments in the order they were told.
+    """Tests by number, experiments in the order of `tell`.
 
     Args:
         setup: of the campaign.
@@ -188,7 +188,7 @@ class Logbook(Recorded, kind="logbook"):
         """Enters a run that was checked.
 
         Args:
-            run: of a test of this campaign, or one that nobody asked for.
+            run: of a test of this campaign, or an attached run.
         """
         self.selected = with_run(self.selected, run.replayed, run.trajectory)
         self.experiments.append(run)
@@ -246,7 +246,7 @@ class Logbook(Recorded, kind="logbook"):
         return told + sum(not failure.recorded for failure in self.failures)
 
     def waiting(self) -> list[Test]:
-        """Tests that were asked for, and neither told nor abandoned, in their order."""
+        """Tests from `ask` that wait for their run: neither told nor abandoned, in order."""
         done = self.flown | set(self.abandoned)
         return [self.tests[entry.test] for _, entry in self.asked if entry.test not in done]
 

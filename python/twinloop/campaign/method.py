@@ -1,4 +1,4 @@
-"""What a campaign needs of a method: to learn what was told, to pick the next test, to name the controller to fly."""
+"""The parts of a method: it learns from the runs, plans the next test, and names the controller to fly."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Method(Protocol):
 
         Args:
             record: such as `to_record` gives, or JSON gives back.
-            book: with all that was told when it was written.
+            book: with the runs at the time when it was written.
 
         Raises:
             InvalidInput: no such record, or one of another campaign; what was remembered is so still.
@@ -44,7 +44,7 @@ class Method(Protocol):
         ...
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
-        """Learns all that was told, beginning with what was known when the last test was asked for.
+        """Learns all runs, starting from the state at the last `ask`.
 
         What is learnt is thus a function of what was asked and told, not of who looked at it in between.
 
@@ -58,7 +58,7 @@ class Method(Protocol):
         ...
 
     def ask(self, book: Logbook, last: bool) -> Test:
-        """Picks a test and enters it; everything told is learnt.
+        """Plans a test and enters it; all runs are learnt.
 
         Args:
             book: where it is entered.
@@ -67,7 +67,7 @@ class Method(Protocol):
         ...
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
-        """The controller to fly; everything told is learnt.
+        """The controller to fly; all runs are learnt.
 
         Args:
             book: with at least one experiment.
@@ -86,7 +86,7 @@ class Method(Protocol):
         ...
 
     def twin(self, book: Logbook) -> Twin:
-        """The best model with its errors; everything told is learnt."""
+        """The best model with its errors; all runs are learnt."""
         ...
 
     @property

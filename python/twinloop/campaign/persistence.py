@@ -74,7 +74,7 @@ class Persistent(Recorded):
         return "setup", "logbook", "memory"
 
     def to_record(self) -> Record:
-        """The campaign as numbers, texts, lists and dicts: its setup, all that was told, all that was learnt.
+        """The campaign as numbers, texts, lists and dicts: its setup, all runs, all that was learnt.
 
         Raises:
             NotAvailable: its controllers have no plain form.

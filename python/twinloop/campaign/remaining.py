@@ -1,4 +1,4 @@
-"""How much time a campaign has left, from how long its work has taken so far."""
+"""The remaining time of a campaign, from the time that its work has taken so far."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ USUAL: dict[str, tuple[str, float]] = {
 
 
 class Remaining(Protocol):
-    """Estimates the time that is left."""
+    """Estimates the remaining time."""
 
     experiments: int
     """That each campaign will make."""
@@ -35,12 +35,12 @@ class Remaining(Protocol):
     """Campaigns that are still to come."""
 
     def remaining(self, progress: Progress) -> float | None:
-        """Seconds that are left; None as long as nothing is known."""
+        """Remaining seconds; None as long as they are unknown."""
         ...
 
 
 class Estimate:
-    """Time left of a campaign of the preset `paper`, from the work done so far.
+    """Remaining time of a campaign of the preset `paper`, from the work so far.
 
     Args:
         options: of the campaign.
@@ -58,7 +58,7 @@ class Estimate:
         self._clock = time.monotonic()
 
     def remaining(self, progress: Progress) -> float | None:
-        """Seconds that are left; None as long as nothing is known.
+        """Remaining seconds; None as long as they are unknown.
 
         Args:
             progress: where the campaign is.
@@ -104,10 +104,10 @@ class Estimate:
 
 
 class StepEstimate:
-    """Time left of a campaign of the preset `default`, from how long each step took so far.
+    """Remaining time of a campaign of the preset `default`, from the time of each step so far.
 
-    A step takes longer the more experiments are learnt; one that was not seen yet is believed to have its usual share,
-    and none once it was passed over.
+    A step takes longer with more experiments. A step that has not run yet is assumed to have its usual share, or none
+    if it was skipped.
 
     Args:
         experiments: that the campaign will make.
@@ -124,7 +124,7 @@ class StepEstimate:
         self._since = time.monotonic()
 
     def remaining(self, progress: Progress) -> float | None:
-        """Seconds that are left; None as long as nothing is known.
+        """Remaining seconds; None as long as they are unknown.
 
         Args:
             progress: where the campaign is.
@@ -175,7 +175,7 @@ def _work(experiments: int) -> float:
 
 
 def estimate(options: AnyOptions, experiments: int, later: int = 0) -> Remaining:
-    """What estimates the time that is left of campaigns.
+    """The estimate of the remaining time of campaigns.
 
     Args:
         options: of the campaigns.

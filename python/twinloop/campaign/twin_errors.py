@@ -1,4 +1,4 @@
-"""Errors of a model on all that was told, a row a run."""
+"""Errors of a model on all runs, one row per run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def errors_of(model: _core.Model, book: Logbook, workers: _core.Workers) -> list
         workers: how the work is carried out.
 
     Returns:
-        A row for each experiment, in the order they were told.
+        A row for each experiment, in the order of `tell`.
     """
     steps, runs = (objective([model], book.selected, workers)[0] for objective in (open_loop, closed_loop))
     return [

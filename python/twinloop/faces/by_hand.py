@@ -153,7 +153,7 @@ def tell(
 def _told(
     store: str, test: int, flight: Path | None, failed: str | None, aborted: Path | None, reason: str | None
 ) -> Path | None:
-    """The log that is told, once what is said of it fits together."""
+    """The log of a run, once the arguments fit together."""
     if failed is not None and aborted is not None:
         raise InvalidInput("tell: expected --failed or --aborted, found both; leave one out.")
     if flight is not None and aborted is not None:

@@ -1,4 +1,4 @@
-"""`twinloop check`: whether a log can be learnt from, before it is told."""
+"""`twinloop check`: whether a log can be learnt, before it is told."""
 
 from __future__ import annotations
 

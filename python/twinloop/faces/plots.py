@@ -62,7 +62,7 @@ def campaign_picture(campaign: Campaign, path: Path, quality: str = "quality") -
     Where a committee stands behind the twin, its 90 % band is drawn too, and the predicted beside the flown quality.
 
     Args:
-        campaign: with at least one experiment told.
+        campaign: with at least one run.
         path: where to write; its suffix is .svg or .png.
         quality: what is minimised, with its unit, for a person.
 

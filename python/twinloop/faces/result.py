@@ -12,6 +12,7 @@ import numpy as np
 
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.campaign.assessment import disturbances, expected_quality, predicted_quality
+from twinloop.campaign.cost import Cost
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
 from twinloop.law.accuracy import TestErrors
@@ -28,7 +29,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
     """What a campaign found.
 
     Args:
-        campaign: with at least one experiment told; what it has not learnt yet is learnt now.
+        campaign: with at least one run; what it has not learnt yet is learnt now.
         system: what was experimented on: its name and settings.
         run_info: all that may differ between equal runs: times, threads, host, command line, versions.
 
@@ -80,7 +81,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             {"test": failure.test.number, "gains": failure.test.parameters, "reason": failure.reason}
             for failure in campaign.failures
         ],
-        "cost": dataclasses.asdict(campaign.cost),
+        "cost": _cost(campaign.cost),
         "controller": None if best is None else _controller(campaign, best, identified),
         "no_controller": why or None,
         "first_controller": _first_controller(campaign, twin, identified),
@@ -89,6 +90,12 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
     if identified:
         _add_identified(result, campaign)
     return plain_dict(result)
+
+
+def _cost(cost: Cost) -> dict[str, Any]:
+    """The cost by name; "left" is a key that other programs read."""
+    found = dataclasses.asdict(cost)
+    return {"left" if key == "left_envelope" else key: value for key, value in found.items()}
 
 
 def _quality(quality: Quality) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""The test sheet: gains to set, where to begin and end, what is added to the commands, and what is foretold."""
+"""The test sheet: gains to set, start and target, the excitation, and the prediction."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def reason(test: Test, flown: bool) -> str:
 
     Args:
         test: to be flown.
-        flown: whether anything was told yet, or attached.
+        flown: whether there is any run yet.
     """
     if test.reason:
         return test.reason
@@ -115,7 +115,7 @@ def facts(test: Test, file: Path, flown: bool) -> dict[str, object]:
     Args:
         test: to be flown.
         file: where its columns are.
-        flown: whether anything was told yet, or attached.
+        flown: whether there is any run yet.
     """
     signals = test.family.signals
     return {

@@ -110,7 +110,7 @@ def show(store: str, name: str | None, as_json: bool) -> None:
 
 
 def _result(campaign: Campaign, held: Stored) -> dict[str, Any]:
-    """What was learnt when the store was written last; `interrupted` where that is not all that was told."""
+    """The twin when the store was written last; `interrupted` if it has not learnt all runs."""
     result: dict[str, Any] = summary(campaign, _named(held), Stopwatch(campaign.threads).info())
     last = campaign.history[-1]
     running = isinstance(last, Iteration) and last.generations < held.setup["options"]["model_generations"]

@@ -72,7 +72,7 @@ def tell(
 
 
 def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> None:
-    """Adds a flight that nobody asked for.
+    """Attaches a flight without a test.
 
     Args:
         campaign: that is to learn it.

@@ -234,7 +234,7 @@ class Guard:
         return now - before
 
     def _believed(self, reading: Floats) -> Floats:
-        """The reading, with what the twin makes of the one before where a sensor cannot be believed."""
+        """The reading, with the twin's prediction from the one before instead of readings that cannot be trusted."""
         wrong = self._broken | ~np.isfinite(reading)
         if not wrong.any():
             return reading

@@ -16,7 +16,7 @@ FEWEST = 5
 
 
 class SensorWatch:
-    """Says which states cannot be believed.
+    """The states whose readings cannot be trusted.
 
     Args:
         n_x: number of states.

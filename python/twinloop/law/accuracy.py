@@ -36,7 +36,7 @@ class TestErrors(Recorded, kind="test_errors"):
 
 
 class ErrorTable(tuple[TestErrors, ...]):
-    """Errors of a twin, one row for each selected test in the order they were told; printable."""
+    """Errors of a twin, one row for each selected test in the order of `tell`; printable."""
 
     def __str__(self) -> str:
         """A table as text."""

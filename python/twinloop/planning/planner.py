@@ -65,7 +65,7 @@ class Planner(Judge):
         Args:
             committee: that judges.
             starts: genes to start from.
-            number: of runs told, for its streams.
+            number: of runs, for its streams.
             scored: what was judged of the same before it was cut, and who keeps what is judged; None: it begins.
         """
         options = self.options

@@ -1,4 +1,4 @@
-"""The durable store: campaigns in a database, so that nothing that was told is ever lost."""
+"""The durable store: campaigns in a database, so that no run is ever lost."""
 
 from twinloop.store.approvals import approve, approved
 from twinloop.store.database import Store, is_address, opened, shown_name

@@ -1,4 +1,4 @@
-"""A database of campaigns: opened, checked, brought up to date; its failures told in a sentence."""
+"""A database of campaigns: opened, checked, brought up to date; its failures are sentences."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ def _only_name(connection: Connection, store: Store) -> str:
 
 
 def begun(store: Store, name: str | None) -> tuple[str, Record] | None:
-    """Name and setup of a campaign, without what was told.
+    """Name and setup of a campaign, without its runs.
 
     Args:
         store: open.

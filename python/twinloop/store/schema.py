@@ -51,7 +51,7 @@ experiments = _entries(
     Column("sha256", String(64), nullable=False),
     Column("runs", Integer),
 )
-"""What was told, behind the number of its test; its hash, and how many runs the system had made."""
+"""The runs, each with the number of its test, its hash, and the number of runs that the system had made."""
 failures = _entries("failures")
 """Tests that failed, behind their number."""
 abandoned = _entries("abandoned")

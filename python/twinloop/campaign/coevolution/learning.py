@@ -94,7 +94,7 @@ class Learner:
         """The random population; its non-dominated set is iteration 0.
 
         Args:
-            selected: what was told so far.
+            selected: the runs so far.
             experiments: the same, with what is known about each.
         """
         models = start_models(self.options, self.signals, self.seed, selected, self.workers)
@@ -110,7 +110,7 @@ class Learner:
 
         Args:
             known: the iterations before.
-            selected: what was told so far.
+            selected: the runs so far.
             experiments: the same, with what is known about each.
         """
         models = known.models.learn(selected, self.workers)

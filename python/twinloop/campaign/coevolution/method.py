@@ -86,7 +86,7 @@ class Coevolution:
         return 0 if latest is None else latest.iteration
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
-        """One iteration on all that was told since the last test was asked for."""
+        """One iteration on all runs since the last `ask`."""
         self._experiments = told = len(book.experiments)
         latest = self.memory.latest
         if at_once and latest is not None:
@@ -101,7 +101,7 @@ class Coevolution:
             self._watch_models(moved)
 
     def _begun(self, book: Logbook) -> Learning:
-        """The iteration that learns all that was told, at its beginning."""
+        """The iteration that learns all runs, at its beginning."""
         known = self.memory.asked
         if known is None:
             return self.learner.started(book.selected, book.experiments)

@@ -133,7 +133,7 @@ def start_models(
         options: of the campaign.
         signals: of the system.
         seed: of the campaign.
-        selected: the tests told so far.
+        selected: the tests with runs so far.
         workers: how the work is carried out.
 
     Returns:

@@ -56,7 +56,7 @@ class WrittenLearning(Recorded, kind="model_loop"):
         """The iteration that was written down.
 
         Args:
-            book: with all that was told.
+            book: with all runs.
             learner: that made it.
 
         Raises:
@@ -150,7 +150,7 @@ class WrittenMemory(Recorded, kind="memory_of_paper"):
         """What was learnt, as it was.
 
         Args:
-            book: with all that was told.
+            book: with all runs.
             learner: that made them.
 
         Raises:

@@ -1,4 +1,4 @@
-"""The checks of a campaign: whether its twin may be believed, and its controller flown."""
+"""The checks of a campaign: whether its twin can be trusted, and its controller flown."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def data_quality(
     """Of one experiment.
 
     Args:
-        run: that was told.
+        run: an experiment.
         sensors: standard deviation of each state's readings (n_x,); None where unknown.
         innovations: of it (n + 1, n_x), the first row aside; None where there are none.
         saturated: share of the periods with a command at a bound.
@@ -96,7 +96,7 @@ def fingerprint(run: Experiment) -> str:
     """The first 16 hexadecimal digits of the SHA-256 of an experiment's data.
 
     Args:
-        run: that was told.
+        run: an experiment.
     """
     digest = hashlib.sha256()
     for values in (run.trajectory.t, run.trajectory.states, run.trajectory.commands):

@@ -12,7 +12,7 @@ from twinloop.arrays import Floats
 MOST = 128
 """Periods of a segment at most."""
 BELIEVED = 0.6
-"""Coherence from which a response is believed."""
+"""Smallest coherence of a response that is accepted."""
 FEWEST = 16
 """Periods that a segment must have."""
 

@@ -41,7 +41,7 @@ def error_map(
 
     Args:
         history: of it.
-        experiments: in the order told.
+        experiments: in the order of `tell`.
         earlier: errors of earlier twins on all experiments, SI units squared, by how many they had learnt.
     """
     shown: Sequence[Iteration | Lesson] = history[-MOST:]

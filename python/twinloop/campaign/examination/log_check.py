@@ -1,4 +1,4 @@
-"""A log looked at before it is told or learnt: its clock, its gaps, and what its columns give away."""
+"""Checks of a log before it is told or learnt: its clock, its gaps, and its columns."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def unseen_flights(
     """Each flight beside the free run of the latest twin that had not learnt it.
 
     Args:
-        experiments: in the order told.
+        experiments: in the order of `tell`.
         twins: with how many of the first experiments each had learnt.
 
     Returns:

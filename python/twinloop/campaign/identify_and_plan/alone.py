@@ -26,7 +26,7 @@ def best_alone(planner: Planner, committee: Committee, book: Logbook, draws: int
     Args:
         planner: of the campaign.
         committee: that judges.
-        book: what was told.
+        book: of the campaign.
         draws: of the sensors' noise.
 
     Returns:

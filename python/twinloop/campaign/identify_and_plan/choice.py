@@ -35,7 +35,7 @@ class Choice:
     Args:
         planner: of the campaign.
         committee: that judges.
-        book: what was told.
+        book: of the campaign.
         draws: of the sensors' noise.
         confidence: share of members and draws that must find tuned gains better than the best flown.
     """
@@ -189,7 +189,7 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
     """Whether the last flight that something was predicted of came out as predicted; so where none was.
 
     Args:
-        experiments: in the order told.
+        experiments: in the order of `tell`.
     """
     for run in reversed(experiments):
         test = run.test
@@ -205,7 +205,7 @@ def off_start(book: Logbook) -> Floats | None:
     """How far flights began from where they were asked to, root mean square of the first readings (n_x,).
 
     Args:
-        book: what was told.
+        book: of the campaign.
 
     Returns:
         None where no test was flown.

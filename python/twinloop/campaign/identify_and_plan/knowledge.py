@@ -73,7 +73,7 @@ class Knowledge:
         if found.exact:
             # What follows exact readings to rounding is the law: its members are too sure of nothing.
             residuals = residuals_of_flights(
-                found.model, self.book.experiments[: learnt.told], self.setup.limits
+                found.model, self.book.experiments[: learnt.experiments], self.setup.limits
             )
             noise, inflation = replace(noise, sensors=residuals), 1.0
         return Ensemble(tuple(learnt.believed), noise, inflation)
@@ -89,7 +89,8 @@ class Knowledge:
             return learnt.needed
         twin = self.twin(learnt, [])
         needed = [
-            needed_factor(twin, run.replayed, run.trajectory) for run in self.book.experiments[learnt.told :]
+            needed_factor(twin, run.replayed, run.trajectory)
+            for run in self.book.experiments[learnt.experiments :]
         ]
         return (*learnt.needed, *(found for found in needed if found is not None))
 
@@ -113,9 +114,9 @@ class Knowledge:
                 members=ensemble.members, noise=ensemble.noise, seed=seed, inflation=ensemble.inflation,
             )  # fmt: skip
         if asked is not None:
-            found[asked.told] = self.twin(asked, [])
+            found[asked.experiments] = self.twin(asked, [])
         # Of today it is where flights were told that nobody has learnt yet.
-        found[latest.told] = self.twin(latest, [])
+        found[latest.experiments] = self.twin(latest, [])
         return tuple(
             (learnt, found[learnt]) for learnt in sorted(found) if learnt < len(self.book.experiments)
         )
@@ -131,7 +132,7 @@ class Knowledge:
             return None
         runs = [
             Run.of(run.trajectory.states, run.trajectory.commands).continued(self.setup.signals)
-            for run in self.book.experiments[: learnt.told]
+            for run in self.book.experiments[: learnt.experiments]
         ]
         runs = moved(runs, self.setup.signals, learnt.identified.offsets)
         with engine_input():

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -35,7 +36,7 @@ class Learnt(Recorded, kind="learnt"):
     """What was learnt from the first experiments of a campaign.
 
     Args:
-        told: how many they were.
+        experiments: number of these experiments.
         identified: the model, its committee and how they were found.
         believed: members of the committee that follow the flights, the best first.
         follows: whether the best model, flown by itself, follows at least half of them.
@@ -47,7 +48,7 @@ class Learnt(Recorded, kind="learnt"):
         ensembles: what the bands of those twins are made of; what an older version wrote has none.
     """
 
-    told: int
+    experiments: int
     identified: Identified
     believed: Sequence[_core.Model]
     follows: bool
@@ -56,6 +57,9 @@ class Learnt(Recorded, kind="learnt"):
     gains: Floats | None = None
     models: tuple[_core.Model, ...] = ()
     ensembles: tuple[Ensemble, ...] = ()
+
+    VERSION = 2
+    RENAMED: ClassVar[Mapping[str, str]] = {"told": "experiments"}
 
 
 @dataclass(frozen=True, eq=False)

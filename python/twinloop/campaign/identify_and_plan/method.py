@@ -61,7 +61,7 @@ class IdentifyAndPlan:
         self.report = report
         self.memory = Memory()
         self.learner = Learner(setup, options, workers, self._watch)
-        self._told: tuple[int | None, ...] = ()
+        self._tests: tuple[int | None, ...] = ()
         task = Task(setup.initial_state, setup.target_state, setup.steps)
         self.planner = Planner(
             setup.family,
@@ -83,20 +83,20 @@ class IdentifyAndPlan:
         memory = Memory.from_record(record, self.setup.signals, self.setup.family)
         for learnt in (memory.asked, memory.latest):
             if learnt is not None:
-                book.first(learnt.told)
+                book.first(learnt.experiments)
         self.memory = memory
 
     @property
     def iteration(self) -> int:
         """Number of experiments that are learnt."""
-        return 0 if self.memory.latest is None else self.memory.latest.told
+        return 0 if self.memory.latest is None else self.memory.latest.experiments
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
         """Identifies from all that was told, beginning with what was known at the last `ask`."""
         latest = self.memory.latest
-        if latest is not None and (at_once or latest.told == len(book.experiments)):
+        if latest is not None and (at_once or latest.experiments == len(book.experiments)):
             return
-        self._told = tuple(run.number for run in book.experiments)
+        self._tests = tuple(run.number for run in book.experiments)
         told, asked, begun = len(book.experiments), self.memory.asked, self.memory.under_way
         under_way = begun[1] if begun is not None and begun[0] == told else None
         learnt = self.learner.learnt(book, asked, under_way, partial(self._keep, told))
@@ -246,14 +246,14 @@ class IdentifyAndPlan:
         if committee.trusted:
             genes = self.planner.tune(committee, starts, told, self._scored(book))
         # What an interruption has left unlearnt must not show in what is tuned afterwards.
-        if self._latest().told == told:
+        if self._latest().experiments == told:
             self.memory = replace(self.memory, gains=(book.outcomes, genes), scores=None)
         return genes
 
     def _scored(self, book: Logbook) -> Scored:
         """Scores of a tuning that was cut; what is judged from here on is remembered."""
         outcomes, before = book.outcomes, self.memory.scores
-        if self._latest().told != len(book.experiments):
+        if self._latest().experiments != len(book.experiments):
             return Scored()
 
         def keep(scores: tuple[Floats, ...]) -> None:
@@ -270,7 +270,7 @@ class IdentifyAndPlan:
                 iteration=max(1, self.iteration),
                 generation=STEPS.index(step) + 1,
                 generations=len(STEPS),
-                experiments=len(self._told),
+                experiments=len(self._tests),
                 tests=() if lesson is None else lesson.tests,
                 open_loop=(),
                 closed_loop=() if lesson is None else lesson.closed_loop,

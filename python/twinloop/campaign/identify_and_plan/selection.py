@@ -12,7 +12,7 @@ def distinct(experiments: Sequence[Experiment]) -> list[Experiment]:
     """Experiments without those whose record is an earlier one's to the last bit: they tell nothing new.
 
     Args:
-        experiments: in the order told.
+        experiments: in the order of `tell`.
     """
     first: dict[tuple[bytes, bytes], Experiment] = {}
     for run in experiments:

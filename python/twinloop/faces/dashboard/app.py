@@ -152,7 +152,7 @@ class Pages:
             return await self._done(self.desk.tell, name, number, log, called, reason)
 
     async def attach(self, request: Request) -> Response:
-        """Adds a log that nobody asked for."""
+        """Attaches a log without a test."""
         name = await self._named(request)
         with tempfile.TemporaryDirectory() as folder:
             return await self._done(self.desk.attach, name, *(await _received(request, Path(folder))))

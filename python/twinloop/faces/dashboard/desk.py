@@ -115,7 +115,7 @@ class Desk:
             return f"Test {number} told: {len(campaign.experiments)} experiments are kept."
 
     def attach(self, name: str, log: Path, called: str) -> str:
-        """Adds a flight that nobody asked for.
+        """Attaches a flight without a test.
 
         Args:
             name: of the campaign.

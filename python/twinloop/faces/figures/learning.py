@@ -1,4 +1,4 @@
-"""How the campaign learnt: errors before and after, qualities foretold and met, equations that were considered."""
+"""How the campaign learnt: errors before and after, predicted and flown qualities, equations that were considered."""
 
 from __future__ import annotations
 

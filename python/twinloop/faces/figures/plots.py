@@ -15,7 +15,7 @@ class Plots:
     """Figures of a campaign: `campaign.plot.unseen()`, `campaign.plot.bode().save("bode.pdf")`.
 
     Args:
-        campaign: with at least one experiment told, when a figure is asked for.
+        campaign: with at least one run, when a figure is asked for.
     """
 
     def __init__(self, campaign: Campaign) -> None:

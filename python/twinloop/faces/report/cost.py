@@ -14,14 +14,14 @@ def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
 
     Args:
         result: of the campaign.
-        elapsed: seconds on the clock until the last flight was told; None where nobody knows.
+        elapsed: seconds until the last `tell`; None if unknown.
     """
     cost, unit = result["cost"], result["quality"]["unit"]
     rows = [
         ["runs on the system", str(cost["runs"])],
         ["of these cut, failed", f"{cost['cut']}, {cost['failed']}"],
         ["flight that was recorded", f"{cost['seconds']:.4g} s"],
-        ["runs that left the envelope", str(cost["left_envelope"])],
+        ["runs that left the envelope", str(cost["left"])],
         [
             "most of the envelope that any used",
             f"{100.0 * cost['usage']:.3g} %" if cost["usage"] else "none declared",

@@ -67,7 +67,7 @@ def report_page(
     """The report of a campaign.
 
     Args:
-        campaign: with at least one experiment told.
+        campaign: with at least one run.
         name: of the campaign, for its title.
         system: what was experimented on.
         run_info: of the process that makes the report.

@@ -31,7 +31,7 @@ class Source:
         name: of it.
         system: what it experimented on, in a few words.
         sessions: that have worked on it, as texts: begun, command, versions, machine.
-        elapsed: seconds on the clock from its beginning to the last flight told; None where no store knows.
+        elapsed: seconds from its beginning to the last `tell`; None without a store.
     """
 
     campaign: Campaign

@@ -282,7 +282,7 @@ def effort(found: Examination) -> Table | None:
 
 
 def envelope(found: Examination) -> Table | None:
-    """The most that is used of the envelope, foretold and met."""
+    """The largest usage of the envelope, predicted and flown."""
     if found.planned is None:
         return None
     planned = envelope_use(found.planned.states, found.signals)

@@ -116,7 +116,7 @@ def _scope(found: Examination) -> str:
 
 
 def _unseen(found: Examination) -> str:
-    """How well it foretold the last flight that it had not learnt."""
+    """How well it predicted the last flight before learning it."""
     if not found.unseen:
         return ""
     last = found.unseen[-1]

@@ -144,7 +144,7 @@ def check_controller(
     def difference(flight: Trajectory) -> Floats:
         states = flight.states[: flight.steps]
         goals = target
-        if target.ndim == 2:  # a flight that nobody asked for may be longer
+        if target.ndim == 2:  # an attached flight may be longer
             goals = target[np.minimum(np.arange(len(states)), len(target) - 1)]
         off: Floats = np.abs(found(states, goals) - own(states, goals)) / sizes
         return off

@@ -69,7 +69,7 @@ class TwinEnv(gymnasium.Env):
 
 @dataclass(frozen=True)
 class Episode:
-    """What an environment begins with unless it is told otherwise.
+    """Default start, target and length of an environment.
 
     Args:
         initial_state: (n_x,), SI units, radians.
