@@ -1,5 +1,7 @@
 """Disturbances that last are believed where they explain more than they cost."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,3 +84,15 @@ def test_what_is_left_of_a_description_is_its_likelihood_and_its_terms():
     weights = np.array(list(old.weights.values()))
     gained = [regression.likelihood(weights, found.chain.sensors, found.chain.motion) for found in (old, new)]
     assert new.description_length - old.description_length == pytest.approx(gained[1] - gained[0], abs=1e-9)
+
+
+def test_noise_under_which_tuned_weights_are_no_regression_s_makes_nothing_shorter():
+    """Weights that are tuned on predictions fit no noise that is next to none; dropping a disturbance gains nothing."""
+    runs = [swung(gravity, seed, noise=1e-3) for seed in range(2)]
+    context, before = learnt(runs, WITHOUT)
+    (found,) = before.sums
+    quiet = found.chain.with_noise(found.chain.sensors, (1e-13, 1e-11, found.chain.motion.correlation_time))
+    tuned = {term: 1.01 * weight for term, weight in found.weights.items()}
+    (old,) = sums = (replace(found, weights=tuned, chain=quiet),)
+    for after in calm(context, replace(before, sums=sums)):
+        assert after.sums[0].description_length >= old.description_length - 1e-6

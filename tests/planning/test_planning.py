@@ -13,6 +13,7 @@ from twinloop.campaign.history import Experiment
 from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
 from twinloop.limits import Limits
+from twinloop.planning.candidates import candidates as drawn
 from twinloop.planning.excitation import SHARE, answered, binary, chirps, first_chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee, Task
@@ -450,3 +451,15 @@ def test_no_flight_is_planned_that_is_worse_than_the_best_one_flown():
     assert cost(planner, committee, found) <= 0.05 and "again" not in found.reason
     # Where nothing that the twin promises is as good as what was flown, that flies again.
     assert "again" in proposed(planner, committee, np.array([0.1, 0.0, 3.0]), best=TUNED, good=quality).reason
+
+
+def test_gains_that_fly_again_are_excited_more_each_time_up_to_a_limit():
+    planner, amplitudes = planner_of(signals(), excitation=0.01), []
+    for times in (1, 2, 3, 9):
+        flown = Flown(TUNED, True, [1.0], 1.0, times=times)
+        drafts = drawn(planner, planner.options, TUNED, flown, "both", 3)
+        repeated = drafts.excitation[drafts.repeats :]
+        assert same_bits(drafts.genes[drafts.repeats :], np.tile(TUNED, (len(repeated), 1)))
+        amplitudes.append(float(np.abs(repeated).max()))
+    most = planner.options.excitation_most
+    assert amplitudes == pytest.approx([0.02, 0.04, most, most], rel=0.05)

@@ -117,6 +117,17 @@ def unfit(book: Logbook) -> list[Floats]:
     return [book.tests[number].genes for number in sorted(book.flown) if not finishes(book, number)]
 
 
+def times_flown(book: Logbook, genes: Floats) -> int:
+    """How often some gains have flown, with any excitation.
+
+    Args:
+        book: of the campaign.
+        genes: of them (size,).
+    """
+    tests = (run.test for run in book.experiments if run.test is not None)
+    return sum(test.genes.tobytes() == genes.tobytes() for test in tests)
+
+
 def on_task(book: Logbook, test: Test) -> bool:
     """Whether a test begins and leads where the campaign does.
 

@@ -21,6 +21,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
 from twinloop.identification.outliers import cleaned
 from twinloop.identification.proposals.calm import calm
+from twinloop.identification.proposals.contacts import contacts
 from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
 from twinloop.identification.proposals.parts import parts
@@ -38,7 +39,7 @@ from twinloop.streams import Unit
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
-PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, second_look, parts, calm)
+PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, contacts, second_look, parts, calm)
 """In the order in which they are made."""
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.planning.excitation import chirps
 from twinloop.planning.judging import Ends, Judge
+from twinloop.planning.proposal import Flown
 from twinloop.planning.settings import PlanningOptions
 
 
@@ -40,7 +41,7 @@ class Candidates:
 
 
 def candidates(
-    judge: Judge, options: PlanningOptions, tuned: Floats, flown: Floats, goal: str, number: int
+    judge: Judge, options: PlanningOptions, tuned: Floats, flown: Flown, goal: str, number: int
 ) -> Candidates:
     """Draws candidates; the first one is the tuned gains as they are.
 
@@ -48,7 +49,7 @@ def candidates(
         judge: of the campaign: family, task and seed.
         options: of the planning.
         tuned: gains that are best on the committee (size,).
-        flown: the best gains flown (size,).
+        flown: so far.
         goal: "both", "model" or "control".
         number: of the test, for its streams.
 
@@ -66,16 +67,16 @@ def candidates(
         places[count // 2 :] = stream.uniforms(count - count // 2, family.size)
     genes = family.from_unit(places)
     genes[0] = tuned
-    genes[count - again :] = flown
+    genes[count - again :] = flown.best
     if options.excitation <= 0.0:
         # The same flight once more would tell nothing: gains close by.
-        near = family.to_unit(flown) + 0.3 * options.nearness * stream.normals(again, family.size)
+        near = family.to_unit(flown.best) + 0.3 * options.nearness * stream.normals(again, family.size)
         genes[count - again :] = family.from_unit(near)
     excitation = np.zeros((count, steps, judge.signals.n_u))
     most = options.excitation_most
     if most > 0.0 and options.excitation > 0.0:
-        # Gains that have flown bear more of it than at first, and once more the same would tell little.
-        stronger = min(2.0 * options.excitation, most)
+        # Gains that have flown bear more of it than before, and once more the same would tell little.
+        stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
         for i in range(1, count):
             amplitude = stronger if i >= count - again else most * stream.uniform()
             excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)

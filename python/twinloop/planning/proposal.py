@@ -19,6 +19,7 @@ class Flown:
         good: quality of the best flight that kept the envelope; infinite where none has: one that keeps it may then be
             worse.
         failed: genes of tests that failed on the system, or were cut.
+        times: how often the best gains have flown.
     """
 
     best: Floats
@@ -26,6 +27,7 @@ class Flown:
     usages: Sequence[float]
     good: float
     failed: Sequence[Floats] = ()
+    times: int = 1
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
+from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 MOVED = 20.0
@@ -26,6 +27,10 @@ OTHER = 0.5
 """Share of what commands do that may differ from what their controller gives, squared."""
 LITTLE = 0.02
 """Share of their bounds by which commands may differ whatever they do."""
+LEVELS = 5
+"""Values that commands have at most that are sent in pulses."""
+PULSES = 2.0
+"""Times the span of a command that pulses may be behind or ahead of it."""
 
 
 def diagnostics_of(
@@ -115,20 +120,52 @@ def other_commands(experiments: Sequence[Experiment]) -> list[int]:
     Args:
         experiments: that were learnt from; controllers are run on the readings.
     """
-    found = []
+    return [run.number for run in _unlike(experiments) if run.number is not None and not _pulses(run)]
+
+
+def in_pulses(experiments: Sequence[Experiment]) -> list[int]:
+    """Numbers of the tests whose commands were sent in pulses, as a relay sends them: right in their sum alone.
+
+    Args:
+        experiments: that were learnt from; controllers are run on the readings.
+    """
+    return [run.number for run in _unlike(experiments) if run.number is not None and _pulses(run)]
+
+
+def _unlike(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """Flights, each test once, on which what was sent is not what the controller gives."""
+    found: dict[int, Experiment] = {}
     for run in experiments:
-        if run.test is None or run.number in found:
+        if run.test is None or run.test.number in found:
             continue
-        controller, given = run.test.controller(), []
-        controller.reset()
-        for k, state in enumerate(run.trajectory.states[:-1]):
-            given.append(controller.command(state, run.test.target(k)))
-        low, high = np.array([command.bounds for command in run.test.family.signals.commands]).T
-        size = np.square((np.array(given) - np.mean(given, axis=0)) / (high - low)).mean()
-        off = np.square((run.trajectory.commands - np.array(given)) / (high - low)).mean()
+        given, span = _given(run.test, run.trajectory.states), _span(run.test)
+        size = np.square((given - given.mean(axis=0)) / span).mean()
+        off = np.square((run.trajectory.commands - given) / span).mean()
         if off > OTHER * size and off > LITTLE * LITTLE:
-            found.append(run.test.number)
-    return found
+            found[run.test.number] = run
+    return list(found.values())
+
+
+def _pulses(run: Experiment) -> bool:
+    """Whether few levels were sent, and until any time as much as the controller gives, up to a pulse or two."""
+    assert run.test is not None  # `_unlike` names no others
+    if any(len(np.unique(sent)) > LEVELS for sent in run.trajectory.commands.T):
+        return False
+    owed = np.cumsum(run.trajectory.commands - _given(run.test, run.trajectory.states), axis=0)
+    return bool((np.abs(owed) <= PULSES * _span(run.test)).all())
+
+
+def _given(test: Test, states: Floats) -> Floats:
+    """What a test's controller gives on some readings, without an excitation (n, n_u)."""
+    controller = test.controller()
+    controller.reset()
+    return np.array([controller.command(state, test.target(k)) for k, state in enumerate(states[:-1])])
+
+
+def _span(test: Test) -> Floats:
+    """From the smallest to the largest value of each command (n_u,)."""
+    low, high = np.array([command.bounds for command in test.family.signals.commands]).T
+    return np.asarray(high - low)
 
 
 def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]:

@@ -23,6 +23,8 @@ DRAWS = 8
 """Of noise and disturbances, by which it is said how far these take a flight."""
 TIMES = 3.0
 """Times further from a flight than these that a free run is no more explained by them."""
+PIECES = 5
+"""Of a flight, each of which is followed from its own first reading where commands were sent in pulses."""
 RELEVANT = 0.03
 """Misses below this share of how far a flight went do not matter."""
 
@@ -82,6 +84,40 @@ def following(
             misses = np.square(signals.difference(runs.read[0, 1:], states[1:]) / scales)
             free[i, j] = misses.mean() if lasted[i, j] == 1.0 else np.inf
     return Following(free, lasted, frozen)
+
+
+def in_pieces(
+    model: _core.Model, flights: Sequence[Experiment], limits: Limits, workers: _core.Workers
+) -> Floats:
+    """How well a model follows flights under the commands that were sent, begun again at the reading of each piece.
+
+    An unstable system leaves any free run under recorded commands after a while, however right its model is.
+
+    Args:
+        model: that is flown.
+        flights: N of them, at least one.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+
+    Returns:
+        Mean squares over those of a model that never moves from where a piece begins (N,), infinite where one diverges.
+    """
+    signals, found = limits.signals, np.empty(len(flights))
+    scales = np.array([state.scale for state in signals.states])
+    for j, flight in enumerate(flights):
+        states, commands = flight.trajectory.states, flight.trajectory.commands
+        length, missed, moved = -(-len(commands) // PIECES), 0.0, 0.0
+        for first in range(0, len(commands), length):
+            piece = commands[first : first + length]
+            read = states[first + 1 : first + 1 + len(piece)]
+            with engine_input():
+                start = model.states_of(states[first : first + 1])[0]
+            runs = drawn_runs(model, Replay(signals, start, piece), limits, workers=workers)
+            off = np.square(signals.difference(runs.read[0, 1:], read) / scales).sum()
+            missed += float(off) if runs.lasted[0] == len(piece) else np.inf
+            moved += float(np.square(signals.difference(read, states[first]) / scales).sum())
+        found[j] = missed / moved if moved > 0.0 else np.inf
+    return found
 
 
 def expected_misses(

@@ -10,8 +10,14 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Lesson
-from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, other_commands
-from twinloop.campaign.identify_and_plan.following import Following, expected_misses, following, unexplained
+from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, in_pulses, other_commands
+from twinloop.campaign.identify_and_plan.following import (
+    Following,
+    expected_misses,
+    following,
+    in_pieces,
+    unexplained,
+)
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.selection import learnt_from
@@ -80,7 +86,7 @@ class Learner:
         )
         followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
         believed = [identified.members[i] for i in believed_members(followed)]
-        follows = self._can_follow(identified, followed)
+        follows = self._can_follow(identified, book, followed)
         lesson = self._lesson(identified, follows, book, followed)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -96,13 +102,23 @@ class Learner:
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
 
-    def _can_follow(self, identified: Identified, followed: Following) -> bool:
-        """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from."""
+    def _can_follow(self, identified: Identified, book: Logbook, followed: Following) -> bool:
+        """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from.
+
+        Where commands were sent in pulses, under those.
+        """
+        if not np.isfinite(identified.chi_squared):
+            return False
         scales = np.array([state.scale for state in self.setup.signals.states])
         noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
         free, frozen = followed.free[0], followed.frozen
         lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
-        return bool(np.isfinite(identified.chi_squared)) and 2 * int(lost.sum()) <= len(lost)
+        flights, pulsed = book.experiments, in_pulses(book.experiments)
+        again = [j for j in np.flatnonzero(lost) if flights[j].number in pulsed]
+        if again:
+            model, limits = identified.members[0], self.setup.limits
+            lost[again] = in_pieces(model, [flights[j] for j in again], limits, self.workers) > WRONG
+        return 2 * int(lost.sum()) <= len(lost)
 
     def _unexplained(self, identified: Identified, book: Logbook, followed: Following) -> list[float]:
         """By how much more than noise and disturbances the best model misses each flight; none where it diverges."""

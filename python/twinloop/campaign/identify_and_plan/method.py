@@ -135,10 +135,17 @@ class IdentifyAndPlan:
             reason=found.reason,
             initial_state=found.initial_state,
             target_state=found.target_state,
+            hold_back=None if committee.trusted else self._held_back(found),
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
         return test
+
+    def _held_back(self, found: Proposal) -> HoldBack | None:
+        """What holds back an excitation of which no model can say where it leads, as in a first flight."""
+        if found.excitation is None or not self.options.hold_back:
+            return None
+        return HoldBack.between(self.setup.signals, found.initial_state, found.target_state)
 
     def _asked_of_nobody(self, book: Logbook) -> Test:
         """A test that no committee chose."""
@@ -163,6 +170,7 @@ class IdentifyAndPlan:
             [run.usage for run in book.experiments],
             float("inf") if good is None else good,
             standing.unfit(book),
+            1 if best is None else standing.times_flown(book, best.genes),
         )
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:

@@ -10,6 +10,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.bounds import Limits
+from twinloop.identification.terms.pool import Pool
 from twinloop.law.expressions import SHARE
 from twinloop.signals import Bounds
 
@@ -41,7 +42,11 @@ def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:
     held = pool.held([*used, *known])
     kept = {pool.one, *pool.needed(known)}
     # The scale of a share says what the same expression times a weight says: to tune both would be one too many.
-    free = [place for place, node in enumerate(held) if node not in kept and pool[node].operation != SHARE]
+    free = [
+        place
+        for place, node in enumerate(held)
+        if node not in kept and pool[node].operation != SHARE and not _at_zero(pool, node)
+    ]
     place, weights = len(held), []
     for output, found in enumerate(hypothesis.sums):
         place += len(_fixed(hypothesis, found))
@@ -69,6 +74,12 @@ def limits_of(hypothesis: Hypothesis) -> dict[int, Bounds]:
 def bounds_of(hypothesis: Hypothesis, found: Sum) -> Limits:
     """Bounds of a sum's coefficients, by node."""
     return hypothesis.candidates.priors.bounds.get(found.chain.states[0], {})
+
+
+def _at_zero(pool: Pool, node: int) -> bool:
+    """Whether a node takes the larger or the smaller of something and 0: that 0 is no constant of a law."""
+    operation, operands, _ = pool[node]
+    return operation in ("min", "max") and any(pool.constant_value(operand) == 0.0 for operand in operands)
 
 
 def _fixed(hypothesis: Hypothesis, found: Sum) -> Sequence[int]:

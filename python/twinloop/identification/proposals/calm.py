@@ -36,16 +36,17 @@ def calm(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
             return found
         regression = problem.regression(chain, problem.values(problem.usable(list(found.weights))))
         weights = np.array(list(found.weights.values()))
-        before = regression.likelihood(weights, chain.sensors, chain.motion)
         white = (chain.motion.white, 0.0, chain.motion.correlation_time)
         floor = floor_of(chain, problem.dt, problem.integration(chain))
+        # Tuned weights are not those of the regression: each noise is compared where it is most likely.
         with engine_input():
-            ((sensors, motion, after),) = _core.most_likely_noises(
-                [(regression, weights, chain.sensors, white, *floor)], problem.workers
+            (_, _, lasting), (sensors, motion, still) = _core.most_likely_noises(
+                [(regression, weights, chain.sensors, begun, *floor) for begun in (chain.motion, white)],
+                problem.workers,
             )
-        if after - before > CORRELATED:
+        if still - lasting > CORRELATED:
             return found
-        length = found.description_length + after - before
+        length = found.description_length + still - lasting
         return replace(found, description_length=length, chain=chain.with_noise(sensors, motion))
 
     sums = tuple(calmed(found) for found in hypothesis.sums)

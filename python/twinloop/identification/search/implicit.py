@@ -35,6 +35,8 @@ POWERS = ((1, 2), (2,), (4,))
 """Powers of states to which denominators are also restricted: all together they stand in for each other."""
 NEAREST = 1e-3
 """Share of its largest value that a denominator has at least wherever the runs were."""
+SINGULAR = 0.05
+"""What a denominator's least value is above: nearer to a pole it stands in for what no quotient is, such as a stop."""
 VARIES = 1.5
 """Times that a denominator's largest value is its least at least: by less it is a series, and a plain term as good."""
 LARGE = 100.0
@@ -147,7 +149,7 @@ def matters(problem: Problem, denominator: Denominator) -> bool:
     values = problem.values([node for node, _ in denominator])
     total = 1.0 + (values * np.array([weight for _, weight in denominator])).sum(axis=2)
     least, most = float(total.min()), float(total.max())
-    return least > NEAREST * most and most > VARIES * least and least < LARGE
+    return least > max(NEAREST * most, SINGULAR) and most > VARIES * least and least < LARGE
 
 
 def _masks(pool: Pool, signals: Signals, lower: Sequence[int]) -> list[Floats]:

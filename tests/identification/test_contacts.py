@@ -1,0 +1,173 @@
+"""What begins at a place: the force of a stop, the torque behind a gear's play, a valve that opens late."""
+
+import re
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from twinloop.identification.fit.models import layout
+from twinloop.identification.search.structure import Sum
+from twinloop.identification.terms.hinges import hinges
+from twinloop.identification.terms.pool import Pool
+
+DT = 0.02
+RAIL = tl.Signals(
+    [tl.State("position", "m", 1.0), tl.State("velocity", "m/s", 3.0, derivative_of="position")],
+    [tl.Command("force", "N", (-8.0, 8.0))],
+    DT,
+)
+STOP, STIFFNESS = 0.6, 900.0
+SHAFT = tl.Signals(
+    [
+        tl.State("motor", "rad", 2.0),
+        tl.State("load", "rad", 2.0),
+        tl.State("motor_rate", "rad/s", 10.0, derivative_of="motor"),
+        tl.State("load_rate", "rad/s", 10.0, derivative_of="load"),
+    ],
+    [tl.Command("torque", "N m", (-0.6, 0.6))],
+    DT,
+)
+PLAY = 0.06
+
+
+def flown(derivative, start, commands, signals, noise, seed):
+    """A run in forty steps of Runge and Kutta's method a period."""
+    x, states, h = np.array(start), [np.array(start)], DT / 40
+    for u in commands:
+        for _ in range(40):
+            k1 = derivative(x, u)
+            k2 = derivative(x + 0.5 * h * k1, u)
+            k3 = derivative(x + 0.5 * h * k2, u)
+            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + derivative(x + h * k3, u))
+        states.append(x)
+    readings = np.array(states) + noise * np.random.default_rng(seed).standard_normal(
+        (len(states), len(start))
+    )
+    return tl.Trajectory(DT * np.arange(len(states)), readings, np.array(commands)[:, None])
+
+
+def on_the_rail(x, u):
+    depth = max(0.0, x[0] - STOP)
+    return np.array([x[1], u - 0.8 * x[1] - STIFFNESS * depth])
+
+
+def behind_play(x, u):
+    twist = x[0] - x[1]
+    torque = 20.0 * (max(0.0, twist - PLAY) - max(0.0, -twist - PLAY)) + 0.05 * (x[2] - x[3]) * (
+        abs(twist) > PLAY
+    )
+    return np.array([x[2], x[3], (u - torque - 0.05 * x[2]) / 0.02, (torque - 0.04 * x[3]) / 0.03])
+
+
+def pushed(amplitude, seed, steps=150, held=10):
+    stream = np.random.default_rng(seed)
+    return np.repeat(stream.uniform(-amplitude, amplitude, steps // held), held)
+
+
+def places(twin):
+    return [float(text) for text in re.findall(r"Max\([^,]*? [-+] ([0-9.]+), 0\)", twin.equations(4))]
+
+
+def free_run_error(twin, derivative, start, commands, signals):
+    """Mean square over that of standing still, on a run that nobody has learnt."""
+    truth = flown(derivative, start, commands, signals, 0.0, 0)
+    free = twin.simulate_commands(truth.states[0], truth.commands)
+    scales = np.array([state.scale for state in signals.states])
+    off = np.square((free.states - truth.states) / scales).mean()
+    return off / np.square((truth.states - truth.states[0]) / scales).mean()
+
+
+def test_a_stop_is_found_where_it_is():
+    runs = [
+        flown(on_the_rail, (0.0, 0.0), pushed(6.0, seed) + 1.5, RAIL, [1e-3, 1e-2], seed) for seed in (1, 2)
+    ]
+    assert all(run.states[:, 0].max() > STOP + 0.01 for run in runs)
+
+    twin = tl.identify(runs, RAIL, seed=0)
+    without = tl.identify(runs, RAIL, seed=0, options={"contacts": False})
+
+    assert min(abs(place - STOP) for place in places(twin)) < 0.01
+    unseen = pushed(6.0, 3) + 1.5
+    error = free_run_error(twin, on_the_rail, (0.0, 0.0), unseen, RAIL)
+    assert error < 0.01
+    assert error < 0.1 * free_run_error(without, on_the_rail, (0.0, 0.0), unseen, RAIL)
+
+
+def test_play_is_found_between_two_states():
+    runs = [
+        flown(behind_play, (0.0,) * 4, pushed(0.4, seed), SHAFT, [1e-3, 1e-3, 1e-2, 1e-2], seed)
+        for seed in (1, 2)
+    ]
+
+    twin = tl.identify(runs, SHAFT, seed=0)
+
+    # In units of the angles' scale, which is 2 rad.
+    assert min(abs(2.0 * place - PLAY) for place in places(twin)) < 0.01
+    assert free_run_error(twin, behind_play, (0.0,) * 4, pushed(0.4, 3), SHAFT) < 0.02
+
+
+def test_a_linear_plant_has_no_hinge():
+    def slope(x, u):
+        return np.array([x[1], u - 0.8 * x[1] - 3.0 * x[0]])
+
+    runs = [flown(slope, (0.0, 0.0), pushed(6.0, seed), RAIL, [1e-3, 1e-2], seed) for seed in (1, 2)]
+    assert "Max" not in tl.identify(runs, RAIL, seed=0).equations(4)
+
+
+def test_a_hinge_is_nothing_on_one_side_and_grows_on_the_other():
+    pool, inputs = Pool(3), np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3))
+    terms = hinges(pool, RAIL, inputs)
+    values = pool.values(terms, inputs)
+
+    assert len(terms) == len(set(terms)) > 0
+    position = inputs[:, 0]
+    of_position = [i for i, term in enumerate(terms) if set(pool.leaves(term)) <= {0, None}]
+    assert of_position
+    for i in of_position:
+        column = values[:, i]
+        assert (column >= 0.0).all() and (column == 0.0).any()
+        beyond = column > 0.0
+        # With the position, or against it, one for one.
+        slope = np.polyfit(position[beyond], column[beyond], 1)[0] if beyond.sum() > 1 else 1.0
+        assert abs(slope) == pytest.approx(1.0)
+    # A command of two signs has one that is alike on both sides.
+    (of_force, *_) = [term for term in terms if set(pool.leaves(term)) <= {2, None}]
+    mirrored = inputs * [1.0, 1.0, -1.0]
+    np.testing.assert_array_equal(pool.values([of_force], mirrored), -pool.values([of_force], inputs))
+
+
+@pytest.mark.parametrize("factor", [2.0**20, 2.0**-7])
+def test_hinges_do_not_depend_on_units(factor):
+    inputs = np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3))
+    other = tl.Signals(
+        [
+            tl.State("position", "m", factor),
+            tl.State("velocity", "m/s", 3.0 * factor, derivative_of="position"),
+        ],
+        RAIL.commands,
+        DT,
+    )
+    values = []
+    for signals, scale in ((RAIL, 1.0), (other, factor)):
+        pool, seen = Pool(3), inputs * [scale, scale, 1.0]
+        terms = hinges(pool, signals, seen)
+        rated = [1 in pool.leaves(term) for term in terms]
+        values.append(pool.values(terms, seen) / np.where(rated, scale, 1.0))
+    np.testing.assert_array_equal(*values)
+
+
+def test_the_zero_of_a_hinge_is_no_constant_to_be_tuned():
+    class Held:
+        def __init__(self, pool, term):
+            self.pool, self.form = pool, "acceleration"
+            chain = type("Chain", (), {"states": (1,)})
+            self.sums = (Sum({term: 1.0}, 0.0, chain),)
+            self.candidates = type("C", (), {"priors": type("P", (), {"fixed": {}})})
+
+    pool = Pool(3)
+    term = pool.add("max", pool.add("-", 0, 0.6), 0.0)
+    free, weights = layout(Held(pool, term))
+
+    # Of 0.6, 0 and the weight, the first and the last may move.
+    assert free == [0, 2] and weights == [range(2, 3)]
