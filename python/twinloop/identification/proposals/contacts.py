@@ -16,7 +16,8 @@ from twinloop.law.actuation import Actuation
 
 def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with hinges among its terms, fitted; none where its terms leave nothing but noise."""
-    if not context.options.contacts or hypothesis.fit is None:
+    options = context.options
+    if not (options.contacts and options.libraries) or hypothesis.fit is None:
         return
     problem = posed(context, hypothesis)
     still = all(calm(problem, found.chain) is found.chain for found in hypothesis.sums)
