@@ -55,6 +55,7 @@ def learnt(monkeypatch, **options):
         "moves": 2000,
         "committee_size": 2,
         "lags": False,
+        "contacts": False,
         "form": "acceleration",
     }
     settings = IdentificationOptions(**{**few, **options})

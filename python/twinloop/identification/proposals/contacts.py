@@ -9,9 +9,13 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import from_both_sides, posed
-from twinloop.identification.sensors.noise import calm
+from twinloop.identification.search.structure import search
+from twinloop.identification.sensors.noise import calm, first_noise
 from twinloop.identification.terms.hinges import hinges
 from twinloop.law.actuation import Actuation
+
+NEAR = 10.0
+"""Units of χ² by which a subset may be worse than the best whose hinges are looked at more closely."""
 
 
 def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -25,17 +29,39 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         return
     context.watch("terms")
     grown = hypothesis.candidates.growing()
-    terms = hinges(grown.pool, context.signals, problem.stages.start[:, : grown.pool.inputs])
-    if not terms:
-        return
+    terms = set(hinges(grown.pool, context.signals, problem.stages.start[:, : grown.pool.inputs]))
     offered = replace(hypothesis, candidates=grown.with_terms(terms), fit=None)
     for tried in (offered, *_without_lags(context, offered)):
-        found = from_both_sides(context, tried, tried.sums)
-        used = {term for sum_ in found.sums for term in sum_.weights}
-        if not used.isdisjoint(terms):
-            # What was tried and not used is no term of the ladder from here on.
-            kept = grown.with_terms(term for term in terms if term in used)
-            yield fitted(context, replace(found, candidates=kept))
+        screened = _screened(context, tried)
+        seen = terms & _used(screened)
+        if not seen:
+            continue
+        # Both sides are looked at among the few that a short search has come across.
+        few = replace(screened, candidates=grown.with_terms(sorted(seen)))
+        found = from_both_sides(context, few, few.sums)
+        if not terms.isdisjoint(_used(found, others=False)):
+            yield fitted(context, found)
+
+
+def _screened(context: Context, hypothesis: Hypothesis) -> Hypothesis:
+    """What a short search finds among all terms, with the noise that these leave if all are used."""
+    options, problem = context.options, posed(context, hypothesis)
+    terms = hypothesis.candidates.ladder[0]
+    usable = problem.usable(terms)
+    low = [first_noise(problem, found.chain, usable, options.gusts) for found in hypothesis.sums]
+    return hypothesis.searched(
+        search(
+            problem, low, terms, hypothesis.sums,
+            moves=options.moves // 4, starts=1, largest=options.largest, unit=hypothesis.next_unit(context.unit),
+        )
+    )  # fmt: skip
+
+
+def _used(hypothesis: Hypothesis, others: bool = True) -> set[int]:
+    """Terms of the sums, and of the subsets that are nearly as good."""
+    used = {term for found in hypothesis.sums for term in found.weights}
+    near = (subset for found in hypothesis.sums for subset, above in found.others if above < NEAR)
+    return used.union(*near) if others else used
 
 
 def _without_lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
