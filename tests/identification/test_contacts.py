@@ -8,7 +8,7 @@ import pytest
 import twinloop as tl
 from twinloop.identification.fit.models import layout
 from twinloop.identification.search.structure import Sum
-from twinloop.identification.terms.hinges import hinges
+from twinloop.identification.terms.hinges import entered, hinges
 from twinloop.identification.terms.pool import Pool
 
 DT = 0.02
@@ -117,7 +117,7 @@ def test_a_linear_plant_has_no_hinge():
 
 def test_a_hinge_is_nothing_on_one_side_and_grows_on_the_other():
     pool, inputs = Pool(3), np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3))
-    terms = hinges(pool, RAIL, inputs)
+    terms = [entered(pool, hinge, 100) for hinge in hinges(RAIL, inputs)]
     values = pool.values(terms, inputs)
 
     assert len(terms) == len(set(terms)) > 0
@@ -151,7 +151,7 @@ def test_hinges_do_not_depend_on_units(factor):
     values = []
     for signals, scale in ((RAIL, 1.0), (other, factor)):
         pool, seen = Pool(3), inputs * [scale, scale, 1.0]
-        terms = hinges(pool, signals, seen)
+        terms = [entered(pool, hinge, 100) for hinge in hinges(signals, seen)]
         rated = [1 in pool.leaves(term) for term in terms]
         values.append(pool.values(terms, seen) / np.where(rated, scale, 1.0))
     np.testing.assert_array_equal(*values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.identification.context import Context
@@ -11,7 +11,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import search
 from twinloop.identification.sensors.noise import calm, first_noise
-from twinloop.identification.terms.hinges import hinges
+from twinloop.identification.terms.hinges import Hinge, entered, hinges
 from twinloop.law.actuation import Actuation
 
 NEAR = 10.0
@@ -28,40 +28,44 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if still and hypothesis.fit.stable:
         return
     context.watch("terms")
-    grown = hypothesis.candidates.growing()
-    terms = set(hinges(grown.pool, context.signals, problem.stages.start[:, : grown.pool.inputs]))
-    offered = replace(hypothesis, candidates=grown.with_terms(terms), fit=None)
-    for tried in (offered, *_without_lags(context, offered)):
-        screened = _screened(context, tried)
-        seen = terms & _used(screened)
-        if not seen:
+    every = hinges(context.signals, problem.stages.start)
+    searches = hypothesis.searches
+    for variant in (hypothesis, *_without_lags(context, hypothesis)):
+        tried = replace(variant, searches=searches)
+        few, searches = _screened(context, tried, every), searches + 1
+        if not few:
             continue
         # Both sides are looked at among the few that a short search has come across.
-        few = replace(screened, candidates=grown.with_terms(sorted(seen)))
-        found = from_both_sides(context, few, few.sums)
-        if not terms.isdisjoint(_used(found, others=False)):
+        grown = tried.candidates.growing()
+        terms = [entered(grown.pool, hinge, len(every)) for hinge in few]
+        found = replace(tried, candidates=grown.with_terms(terms), fit=None, searches=searches)
+        found = from_both_sides(context, found, found.sums)
+        searches = found.searches
+        if any(term in sum_.weights for sum_ in found.sums for term in terms):
             yield fitted(context, found)
 
 
-def _screened(context: Context, hypothesis: Hypothesis) -> Hypothesis:
-    """What a short search finds among all terms, with the noise that these leave if all are used."""
-    options, problem = context.options, posed(context, hypothesis)
-    terms = hypothesis.candidates.ladder[0]
+def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) -> list[Hinge]:
+    """Hinges that a short search finds among all terms, with the noise that these leave if all are used."""
+    options, grown = context.options, hypothesis.candidates.growing()
+    places = {entered(grown.pool, hinge, len(every)): hinge for hinge in every}
+    tried = replace(hypothesis, candidates=grown.with_terms(places), fit=None)
+    problem, terms = posed(context, tried), tried.candidates.ladder[0]
     usable = problem.usable(terms)
-    low = [first_noise(problem, found.chain, usable, options.gusts) for found in hypothesis.sums]
-    return hypothesis.searched(
-        search(
-            problem, low, terms, hypothesis.sums,
-            moves=options.moves // 4, starts=1, largest=options.largest, unit=hypothesis.next_unit(context.unit),
-        )
+    low = [first_noise(problem, found.chain, usable, options.gusts) for found in tried.sums]
+    sums = search(
+        problem, low, terms, tried.sums,
+        moves=options.moves // 4, starts=1, largest=options.largest, unit=tried.next_unit(context.unit),
     )  # fmt: skip
-
-
-def _used(hypothesis: Hypothesis, others: bool = True) -> set[int]:
-    """Terms of the sums, and of the subsets that are nearly as good."""
-    used = {term for found in hypothesis.sums for term in found.weights}
-    near = (subset for found in hypothesis.sums for subset, above in found.others if above < NEAR)
-    return used.union(*near) if others else used
+    near = (
+        subset
+        for found in sums
+        for subset, above in ((tuple(found.weights), 0.0), *found.others)
+        if above < NEAR
+    )
+    return [
+        places[term] for term in dict.fromkeys(term for subset in near for term in subset) if term in places
+    ]
 
 
 def _without_lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:

@@ -8,8 +8,8 @@ a contact loses (Hunt and Crossley 1975).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,79 +27,88 @@ WORTH = 10.0
 """Nats that a hinge must gain beside its description: with a few of them anything can be drawn."""
 
 
-def hinges(pool: Pool, signals: Signals, inputs: Floats) -> list[int]:
-    """Enters hinges where the runs have been, with their prices.
+@dataclass(frozen=True)
+class Hinge:
+    """A place of a coordinate z at which something begins.
 
     Args:
-        pool: that they are entered in; nobody else's.
+        inputs: the input that z is, or two of which z is the difference.
+        scale: that z is in units of.
+        rates: the inputs that are the derivatives of those; none where there are none, or the term is without them.
+        side: 1 if it grows above the place, -1 below it, 0 on both sides of 0 alike.
+        place: c, in units of the scale.
+    """
+
+    inputs: tuple[int, ...]
+    scale: float
+    rates: tuple[int, ...]
+    side: int
+    place: float = 0.0
+
+
+def hinges(signals: Signals, inputs: Floats) -> list[Hinge]:
+    """Hinges where the runs have been.
+
+    Args:
         signals: of the system.
-        inputs: of the model (rows, inputs).
+        inputs: of the model (rows, inputs), states first.
 
     Returns:
-        Their nodes: of states that are no rates and do not wrap, and of commands of one sign, to either side; of
-        differences of two states of one unit, and of commands of two signs, to both sides alike. Those of states and of
-        differences also times their rate.
+        Of states that are no rates and do not wrap, and of commands of one sign, to either side; of differences of two
+        states of one unit, and of commands of two signs, to both sides alike. Those of states and of differences also
+        times their rate.
     """
-    found = list(_coordinates(pool, signals))
-    kinds = sum((1 if each.alike else 2) * (1 if each.rate is None else 2) for each in found)
-    places = min(PLACES, MOST // (2 * kinds)) if kinds else 0
-    terms: list[int] = []
-    for each in found:
-        share = pool.share(each.node, each.scale)
-        values = pool.values([each.node], inputs)[:, 0] / each.scale
-        for place in _places(np.abs(values) if each.alike else values, places):
-            above, below = (
-                _beyond(pool, share, place),
-                _beyond(pool, share, -place if each.alike else place, -1),
-            )
-            if each.alike:
-                forces = [(pool.add("-", above, below), pool.add("+", above, below))]
-            else:
-                forces = [(above, above), (below, below)]
-            for force, depth in forces:
-                terms += [force] if each.rate is None else [force, pool.product(depth, each.rate)]
-    terms = list(dict.fromkeys(terms))
-    price = WORTH + float(log(max(1, len(terms))))
-    for term in terms:
-        pool.found.setdefault(term, price)
-    return terms
+    kinds = list(_kinds(signals))
+    count = min(PLACES, MOST // (2 * max(1, len(kinds))))
+    found = []
+    for kind in kinds:
+        first, *second = (inputs[:, i] for i in kind.inputs)
+        values = (first - second[0] if second else first) / kind.scale
+        places = _places(values if kind.side else np.abs(values), count)
+        found += [replace(kind, place=place) for place in places]
+    return found
 
 
-class _Coordinate(NamedTuple):
-    """What may have a place at which something begins.
+def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
+    """The node of a hinge, with its price.
 
     Args:
-        node: of it.
-        scale: of its unit.
-        rate: node of its derivative; None: it has none.
-        alike: whether the same begins on both sides of 0, as in a gear with play.
+        pool: that it is entered in.
+        hinge: of the same inputs.
+        tried: hinges that it is chosen from.
     """
+    first, *second = hinge.inputs
+    coordinate = pool.share(pool.add("-", first, second[0]) if second else first, hinge.scale)
+    above = pool.add("max", pool.add("-", coordinate, hinge.place), 0.0)
+    place = hinge.place if hinge.side else -hinge.place
+    below = pool.add("max", pool.add("-", pool.constant(place), coordinate), 0.0)
+    if hinge.side:
+        force = depth = above if hinge.side > 0 else below
+    else:
+        force, depth = pool.add("-", above, below), pool.add("+", above, below)
+    if hinge.rates:
+        first, *second = hinge.rates
+        force = pool.product(depth, pool.add("-", first, second[0]) if second else first)
+    pool.found.setdefault(force, WORTH + float(log(tried)))
+    return force
 
-    node: int
-    scale: float
-    rate: int | None
-    alike: bool
 
-
-def _coordinates(pool: Pool, signals: Signals) -> Iterator[_Coordinate]:
+def _kinds(signals: Signals) -> Iterator[Hinge]:
+    """Coordinates, sides and rates of hinges; their places are still to be found."""
     states, moving = signals.states, rates(signals)
     of = {state.derivative_of: i for i, state in enumerate(states) if state.derivative_of is not None}
     resting = [i for i in range(signals.n_x) if i not in moving and i not in periodic(signals)]
-    for i in resting:
-        yield _Coordinate(i, states[i].scale, of.get(states[i].name), alike=False)
-    for i, j in combinations(resting, 2):
-        if states[i].unit == states[j].unit:
-            both = of.get(states[i].name), of.get(states[j].name)
-            rate = None if both[0] is None or both[1] is None else pool.add("-", both[0], both[1])
-            yield _Coordinate(pool.add("-", i, j), states[i].scale, rate, alike=True)
-    for command, place in zip(signals.commands, range(signals.n_x, pool.inputs), strict=True):
-        yield _Coordinate(place, 1.0, None, alike=command.bounds[0] < 0.0 < command.bounds[1])
-
-
-def _beyond(pool: Pool, share: int, place: float, side: int = 1) -> int:
-    """By how much a coordinate is above a place, or below it (side -1); 0 on the other side."""
-    away = pool.add("-", share, place) if side > 0 else pool.add("-", pool.constant(place), share)
-    return pool.add("max", away, 0.0)
+    alone = [((i,), (1, -1)) for i in resting]
+    between = [((i, j), (0,)) for i, j in combinations(resting, 2) if states[i].unit == states[j].unit]
+    for inputs, sides in (*alone, *between):
+        names = [states[i].name for i in inputs]
+        own = tuple(of[name] for name in names) if all(name in of for name in names) else ()
+        for side in sides:
+            for moved in dict.fromkeys(((), own)):
+                yield Hinge(inputs, states[inputs[0]].scale, moved, side)
+    for place, command in enumerate(signals.commands, signals.n_x):
+        for side in (0,) if command.bounds[0] < 0.0 < command.bounds[1] else (1, -1):
+            yield Hinge((place,), 1.0, (), side)
 
 
 def _places(values: Floats, count: int) -> list[float]:
