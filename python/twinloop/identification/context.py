@@ -11,6 +11,7 @@ from twinloop.arrays import Floats
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.terms.pool import Pool
 from twinloop.limits import Limits
 from twinloop.signals import Signals
 from twinloop.steps import Watch, unwatched
@@ -66,6 +67,17 @@ class Context:
     def may_hide(self) -> bool:
         """Whether a hidden state is looked for: in one run it is a function of time, and that may be anything."""
         return self.options.hidden and len(self.runs) > 1
+
+    @property
+    def known_terms(self) -> list[int]:
+        """Terms of what was learnt earlier."""
+        return [] if self.earlier is None else [node for found in self.earlier.sums for node in found.weights]
+
+    def first_pool(self) -> Pool:
+        """A pool to begin with, nobody else's: what is entered in it does not change what was learnt earlier."""
+        if self.earlier is not None:
+            return self.earlier.pool.copy()
+        return Pool(self.signals.n_x + self.signals.n_u, len(self.options.operators))
 
     def under(self, form: str) -> Context:
         """The same once a form is believed: what was known under another one is no help."""

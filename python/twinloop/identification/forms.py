@@ -18,7 +18,6 @@ from twinloop.identification.records import Run
 from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import FORMS, begun
-from twinloop.identification.terms.pool import Pool
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
 
@@ -107,9 +106,8 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
 def brief_look(context: Context, form: str, start: int) -> Hypothesis:
     """What a short search finds under a form, with what disturbs explained by terms as far as they can."""
     brief = replace(context.brief(context.runs), as_integrated=True)
-    signals = context.signals
-    pool = Pool(signals.n_x + signals.n_u, len(context.options.operators))
-    return undisturbed(brief, climbed(brief, from_both_sides(brief, begun(brief, form, pool, start))))
+    first = from_both_sides(brief, begun(brief, form, brief.first_pool(), start))
+    return undisturbed(brief, climbed(brief, first))
 
 
 def _said(best: Hypothesis, other: Hypothesis) -> Remark:

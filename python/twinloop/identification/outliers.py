@@ -20,7 +20,6 @@ from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.search.description import shorter
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.starts import begun
-from twinloop.identification.terms.pool import Pool
 
 STANDS_OUT = 5.0
 """Standard deviations of the sensor's noise from which a reading is suspected."""
@@ -123,10 +122,8 @@ def cleaned(context: Context) -> Context:
 
 def _length(context: Context, runs: Sequence[Run], start: int) -> float:
     """Description length of what a short search finds."""
-    brief, signals = context.brief(runs), context.signals
-    pool = Pool(signals.n_x + signals.n_u, len(context.options.operators))
-    form = candidates(context.options, signals, runs)[0]
-    return from_both_sides(brief, begun(brief, form, pool, start)).length
+    brief, form = context.brief(runs), candidates(context.options, context.signals, runs)[0]
+    return from_both_sides(brief, begun(brief, form, brief.first_pool(), start)).length
 
 
 def _ignoring(run: Run, suspect: Suspect) -> Run:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -35,7 +35,7 @@ def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:
         context: of the identification.
         form: what outputs mean.
     """
-    aligned = cache(lambda: with_offsets(context, begun(context, form, _first_pool(context), ANEW)))
+    aligned = cache(lambda: with_offsets(context, begun(context, form, context.first_pool(), ANEW)))
     known = context.earlier
     if known is None or not known.actuation.hidden:
         return (lambda: anew(context, aligned()),)
@@ -54,7 +54,7 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
     """
     signals, options, runs = context.signals, context.options, tuple(context.runs)
     every = chains(signals, form, guessed_noise(runs, np.array([state.scale for state in signals.states])))
-    seen = [node for node in _known_terms(context) if not pool.is_hidden(node)]
+    seen = [node for node in context.known_terms if not pool.is_hidden(node)]
     return Hypothesis(
         form=form,
         offsets=np.zeros(signals.n_x),
@@ -102,20 +102,6 @@ def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothe
         start=RENEWED,
     )
     return fitted(context, begins)
-
-
-def _first_pool(context: Context) -> Pool:
-    """A pool of the search's own: what it enters must not change what was known."""
-    signals = context.signals
-    if context.earlier is not None:
-        return context.earlier.pool.copy()
-    return Pool(signals.n_x + signals.n_u, len(context.options.operators))
-
-
-def _known_terms(context: Context) -> Sequence[int]:
-    return (
-        [] if context.earlier is None else [node for found in context.earlier.sums for node in found.weights]
-    )
 
 
 def _without_hidden(found: Sum, pool: Pool) -> Sum | None:

@@ -93,10 +93,8 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
 def with_hidden(context: Context, candidates: Candidates) -> Candidates:
     """The candidates with terms of a hidden state on the first rung, and with those that were known of it."""
     grown = candidates.growing()
-    known = (
-        [] if context.earlier is None else [node for found in context.earlier.sums for node in found.weights]
-    )
-    return grown.with_terms([*filled(grown.pool), *(node for node in known if grown.pool.is_hidden(node))])
+    known = [node for node in context.known_terms if grown.pool.is_hidden(node)]
+    return grown.with_terms([*filled(grown.pool), *known])
 
 
 def filled(pool: Pool) -> list[int]:
