@@ -126,7 +126,7 @@ impl CmaEs {
         })
     }
 
-    /// Number of generations told.
+    /// Number of generations so far.
     pub fn generation(&self) -> u64 {
         self.generation
     }

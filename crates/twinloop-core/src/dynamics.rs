@@ -4,14 +4,14 @@ use crate::lanes::{Apart, Scalar, Vector, scalars};
 
 /// A discrete-time system, stepped on several lanes at once.
 pub trait Dynamics {
-    /// Scratch of a run, and whatever the dynamics remember from step to step.
+    /// Scratch of a run, and the memory of the dynamics from step to step.
     type Workspace<V: Vector>;
 
     /// A workspace as it is at the start of a run.
     fn workspace<V: Vector>(&self) -> Self::Workspace<V>;
 
-    /// Moves what is remembered of commands on by a period of one (n_u lanes), whatever the states were. To be told all
-    /// that was sent since a run began puts a workspace where the run is.
+    /// Moves the memory of commands on by a period of one (n_u lanes); it does not depend on the states. After all
+    /// commands of a run so far, in order, a workspace is where the run is.
     fn remember<V: Vector>(&self, workspace: &mut Self::Workspace<V>, command: &[V]);
 
     /// Replaces the state (n_x lanes) by the one a period later, under the command (n_u lanes) held for that period.

@@ -89,7 +89,7 @@ impl Sensors {
         }
     }
 
-    /// What is read late or early of one run that has come to a state.
+    /// The late and early readings of one run at its present state, by the number of the state.
     fn read_lane(&self, lane: &mut Lane, state: Vec<Scalar>) -> Vec<(usize, Scalar)> {
         lane.keep(state, self.reach());
         let now = lane.seen - 1;
@@ -97,16 +97,16 @@ impl Sensors {
         for (periods, states) in &self.groups {
             let at = now as f64 - periods;
             let found = if at < 0.0 {
-                self.coasted(&lane.states[0], None, at * self.dt)
+                self.extrapolated(&lane.states[0], None, at * self.dt)
             } else if at > now as f64 {
-                self.coasted(&lane.states[lane.states.len() - 1], lane.back(1), -periods * self.dt)
+                self.extrapolated(&lane.states[lane.states.len() - 1], lane.back(1), -periods * self.dt)
             } else {
                 let back = libm::ceil(*periods) as usize;
                 let share = back as f64 - periods;
                 match (lane.back(back), lane.back(back - 1)) {
                     (Some(before), Some(after)) if share > 0.0 => self.between(before, after, share),
                     (Some(there), _) => there.to_vec(),
-                    (None, _) => unreachable!("as far back as sensors reach all states are kept"),
+                    (None, _) => unreachable!("all states that sensors need are stored"),
                 }
             };
             read.extend(states.iter().map(|&state| (state, found[state])));
@@ -134,7 +134,7 @@ impl Sensors {
         let longest = (0..found.len()).map(order).max().unwrap_or(0);
         for depth in 0..=longest {
             for (periods, states) in &self.groups {
-                let moved = self.coasted(&found, None, periods * self.dt);
+                let moved = self.extrapolated(&found, None, periods * self.dt);
                 for &state in states.iter().filter(|&&state| order(state) == depth) {
                     found[state] = moved[state];
                 }
@@ -143,14 +143,14 @@ impl Sensors {
         found
     }
 
-    /// Periods before now that are kept.
+    /// Number of earlier states that sensors need.
     fn reach(&self) -> usize {
         self.groups.iter().fold(1, |most, (periods, _)| most.max(libm::ceil(*periods) as usize))
     }
 
-    /// A state some time later (s; before 0: earlier) by kinematics alone, the states that are driven going on as they
-    /// did from the one a period before.
-    fn coasted(&self, state: &[Scalar], before: Option<&[Scalar]>, time: f64) -> Vec<Scalar> {
+    /// A state (n_x) extrapolated by `time` (s; below 0: back) with kinematics alone. Driven states change as they did
+    /// from the state one period `before`, or stay.
+    fn extrapolated(&self, state: &[Scalar], before: Option<&[Scalar]>, time: f64) -> Vec<Scalar> {
         let mut rates = state.to_vec();
         if let Some(before) = before {
             // Their mean over the time.

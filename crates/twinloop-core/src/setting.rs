@@ -1,5 +1,5 @@
-//! The setting of runs: the signals, the limits that states may not leave, and the family that closes the loop; made
-//! once, and from then on known to fit each other.
+//! The setting of runs: the signals, the limits that states may not leave, and the family that closes the loop. It is
+//! checked once, when it is made.
 
 use std::sync::Arc;
 

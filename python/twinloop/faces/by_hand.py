@@ -190,7 +190,7 @@ def _aborted(store: str, test: int, log: Path, why: str) -> str:
 @click.argument("flight", type=Path)
 @json_option
 def attach(store: str, flight: Path, as_json: bool) -> None:
-    """Add a FLIGHT that nobody asked for, as CSV or .npz, to what is learnt."""
+    """Attach a FLIGHT without a test, as CSV or .npz: it is learnt, too."""
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
         text = f"Kept: {flight}; {_count(campaign)} in {shown_name(store)}."

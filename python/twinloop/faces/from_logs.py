@@ -56,7 +56,7 @@ def identify(
     as_json: bool,
     force: bool,
 ) -> None:
-    """Learn a twin from LOGs alone, as CSV, .npz or .ulg: nobody asks for a flight, and no controller is tuned.
+    """Learn a twin from LOGs alone, as CSV, .npz or .ulg: no flight is planned, and no controller is tuned.
 
     FILE.toml says dt, states and commands, as for a campaign; [options] counts, and other sections need not be there.
     """

@@ -19,8 +19,8 @@ pub(crate) fn damped_step(gradient: &[f64], curvature: &[f64], damping: f64) -> 
     Some(scaled.iter().zip(&scales).map(|(x, s)| x * s).collect())
 }
 
-/// Covariance of values that are known to their own size beforehand: where two of them do the same, no data tell them
-/// apart.
+/// Covariance of values from the curvature and a prior, a normal distribution with |value| as its standard deviation: if
+/// two values do the same, no data separate them.
 pub(crate) fn covariance(curvature: &[f64], values: &[f64]) -> Option<Vec<f64>> {
     let size = values.len();
     let scales = scales(curvature, size);
@@ -29,8 +29,8 @@ pub(crate) fn covariance(curvature: &[f64], values: &[f64]) -> Option<Vec<f64>> 
         for j in 0..size {
             matrix[i * size + j] = curvature[i * size + j] * scales[i] * scales[j];
         }
-        let known = scales[i] / values[i].abs().max(f64::MIN_POSITIVE.sqrt());
-        matrix[i * size + i] += 1e-9 + (known * known).min(1e12);
+        let prior = scales[i] / values[i].abs().max(f64::MIN_POSITIVE.sqrt());
+        matrix[i * size + i] += 1e-9 + (prior * prior).min(1e12);
     }
     let inverse = Cholesky::new(&matrix, size, 0.0)?.inverse();
     Some((0..size * size).map(|ij| inverse[ij] * scales[ij / size] * scales[ij % size]).collect())

@@ -227,7 +227,7 @@ mod tests {
     fn followed<V: Vector>(numbers: &[f64], steps: &[(u8, usize)]) -> Vec<(Vec<usize>, Vec<f64>)> {
         let products = Products { numbers, features: FEATURES };
         let mut inverse = Inverse::<V>::new(FEATURES);
-        let (mut members, mut told): (Vec<usize>, _) = (vec![], vec![]);
+        let (mut members, mut steps_seen): (Vec<usize>, _) = (vec![], vec![]);
         let (mut row, mut images) = (inverse.empty_row(), inverse.empty_row());
         for &(kind, pick) in steps {
             let feature = pick % FEATURES;
@@ -246,9 +246,9 @@ mod tests {
                     members.push(feature);
                 }
             }
-            told.push((members.clone(), entries(&inverse)));
+            steps_seen.push((members.clone(), entries(&inverse)));
         }
-        told
+        steps_seen
     }
 
     proptest! {
@@ -258,10 +258,10 @@ mod tests {
             steps in prop::collection::vec((0..4_u8, 0..FEATURES), 1..40),
         ) {
             let numbers = products(&columns);
-            let told = followed::<Wide<f64, 4>>(&numbers, &steps);
-            prop_assert_eq!(&told, &followed::<Scalar>(&numbers, &steps));
-            prop_assert_eq!(&told, &followed::<Wide<f64, 8>>(&numbers, &steps));
-            for (members, found) in told {
+            let steps_seen = followed::<Wide<f64, 4>>(&numbers, &steps);
+            prop_assert_eq!(&steps_seen, &followed::<Scalar>(&numbers, &steps));
+            prop_assert_eq!(&steps_seen, &followed::<Wide<f64, 8>>(&numbers, &steps));
+            for (members, found) in steps_seen {
                 let gram: Vec<f64> =
                     members.iter().flat_map(|&i| members.iter().map(move |&j| (i, j))).map(|(i, j)| numbers[i * FEATURES + j]).collect();
                 let expected = Cholesky::new(&gram, members.len(), 1e-12).expect("positive definite").inverse();

@@ -1,4 +1,4 @@
-//! Regression: which sums of features explain what the sensors saw, with sensor noise and process noise told apart.
+//! Regression: which sums of features explain what the sensors saw, with sensor noise separated from process noise.
 
 mod chain;
 mod gram;

@@ -1,4 +1,4 @@
-//! A regression: records of one chain and the features that may drive it, known to fit each other.
+//! A regression: records of one chain and the features that may drive it, checked to fit each other.
 
 use super::chain::Chain;
 use super::gram::{Gram, Record};

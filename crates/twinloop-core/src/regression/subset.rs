@@ -47,8 +47,8 @@ pub struct Found {
 
 /// A column whose part outside the others' span is shorter than this share (squared) is the same column.
 const COLLINEAR: f64 = 1e-8;
-/// Sum of 1 / (share outside the span) over the updates since the last inversion from scratch at which the next is due.
-const DOUBT: f64 = 1e4;
+/// Sum of 1 / (share outside the span) over the updates at which the next inversion from scratch is due.
+const MOST_ROUNDING: f64 = 1e4;
 /// Distinct subsets that are kept of a walk.
 const KEPT: usize = 64;
 /// Energy above the best at which a subset is not worth keeping.
@@ -112,8 +112,8 @@ struct Walk<'a, V> {
     coefficients: Vec<f64>,
     chi_squared: f64,
     price: f64,
-    /// Rounding that updates have let in since the last inversion from scratch, in the inverse's own terms.
-    doubt: f64,
+    /// Rounding of the updates since the last inversion from scratch: the sum that [`MOST_ROUNDING`] limits.
+    rounding: f64,
     /// Inner products of a feature with the members, and the inverse times them.
     products: Vec<f64>,
     images: Vec<f64>,
@@ -129,7 +129,7 @@ impl<'a, V: Vector> Walk<'a, V> {
             coefficients: vec![],
             chi_squared: choices.total,
             price: 0.0,
-            doubt: 0.0,
+            rounding: 0.0,
             products: inverse.empty_row(),
             images: inverse.empty_row(),
             inverse,
@@ -151,7 +151,7 @@ impl<'a, V: Vector> Walk<'a, V> {
         self.inverse.times(&self.products, &mut self.images);
         self.coefficients.clear();
         self.coefficients.extend_from_slice(&self.images[..k]);
-        self.doubt = 0.0;
+        self.rounding = 0.0;
         self.chi_squared = (choices.total - dot(&self.coefficients, &self.products)).max(0.0);
         self.price = members.iter().map(|&j| choices.prices[j]).sum();
         true
@@ -173,10 +173,10 @@ impl<'a, V: Vector> Walk<'a, V> {
     /// Adds the feature that was last looked at; no more than that where all is computed from scratch afterwards.
     #[inline(always)]
     fn insert(&mut self, j: usize, outside: f64, gain: f64) {
-        self.doubt += 1.0 / outside;
+        self.rounding += 1.0 / outside;
         self.members.push(j);
         self.inside[j] = true;
-        if self.doubt > DOUBT {
+        if self.rounding > MOST_ROUNDING {
             return;
         }
         self.inverse.grow(&self.images, outside);
@@ -190,7 +190,7 @@ impl<'a, V: Vector> Walk<'a, V> {
     #[inline(always)]
     fn remove(&mut self, at: usize) {
         let pivot = self.inverse.diagonal(at);
-        self.doubt += pivot;
+        self.rounding += pivot;
         let old = self.coefficients[at];
         self.inverse.shrink(at, &mut self.images);
         self.coefficients.iter_mut().zip(&self.images).for_each(|(c, image)| *c -= image * old / pivot);
@@ -256,7 +256,7 @@ impl<'a, V: Vector> Walk<'a, V> {
                 }
             }
         }
-        if self.doubt > DOUBT {
+        if self.rounding > MOST_ROUNDING {
             // Where rounding has let a collinear column in, the latest ones go until the rest has an inverse.
             while !self.refresh() {
                 let Some(j) = self.members.pop() else { break };
