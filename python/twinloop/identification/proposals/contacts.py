@@ -11,6 +11,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import search
 from twinloop.identification.sensors.noise import calm, first_noise
+from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, entered, hinges
 from twinloop.law.actuation import Actuation
 
@@ -29,9 +30,9 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         return
     context.watch("terms")
     every = hinges(context.signals, problem.stages.start)
-    searches = hypothesis.searches
+    searches, start = 0, hypothesis.start + CONTACTS
     for variant in (hypothesis, *_without_lags(context, hypothesis)):
-        tried = replace(variant, searches=searches)
+        tried = replace(variant, start=start, searches=searches)
         few, searches = _screened(context, tried, every), searches + 1
         if not few:
             continue
