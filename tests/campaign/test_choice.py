@@ -10,7 +10,7 @@ import twinloop as tl
 from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign import standing
-from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed
+from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed, foretold
 from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
@@ -174,3 +174,13 @@ def test_no_other_family_has_starts_by_lqr():
         options=SMALL,
     )  # fmt: skip
     assert linear_gains(campaign.setup, Committee([None], np.zeros(2), True)) == []
+
+
+@pytest.mark.parametrize(
+    ("predicted", "spread", "quality", "true"),
+    [(1.0, 0.1, 1.19, True), (1.0, 0.1, 1.3, False), (1.0, 0.0, 1.05, True), (None, None, 1.0, False)],
+)
+def test_a_prediction_comes_true_within_two_spreads_or_a_tenth(predicted, spread, quality, true):
+    run = SimpleNamespace(test=SimpleNamespace(predicted=predicted, spread=spread), quality=quality)
+    assert foretold([run]) is true
+    assert foretold([SimpleNamespace(test=None, quality=1.0), run]) is true

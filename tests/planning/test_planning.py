@@ -12,6 +12,7 @@ from twinloop import _core
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
+from twinloop.law.actuation import delayed
 from twinloop.limits import Limits
 from twinloop.planning.candidates import candidates as drawn
 from twinloop.planning.excitation import SHARE, answered, binary, chirps, first_chirps
@@ -463,3 +464,23 @@ def test_gains_that_fly_again_are_excited_more_each_time_up_to_a_limit():
         amplitudes.append(float(np.abs(repeated).max()))
     most = planner.options.excitation_most
     assert amplitudes == pytest.approx([0.02, 0.04, most, most], rel=0.05)
+
+
+def test_gains_bear_a_period_more_of_delay_as_long_as_no_prediction_has_come_true():
+    known = signals()
+    # So quick that a period more of delay makes the best gains of the law as it is unstable.
+    quick = _core.Model(member(known, 40.0).program, "acceleration", known.engine)
+    slow = delayed(quick, known)
+    sds, planner = np.array([1e-3, 5e-3]), planner_of(known, evaluations=2048)
+    gentle = np.array([0.2, 0.0, 0.1])
+    tuned, wary = (planner.tune(Committee([quick], sds, True, late), [gentle], 1) for late in ((), (slow,)))
+
+    def worth(genes, model):
+        return float(planner.judge([model], genes[None], sds, 1).mean[0])
+
+    assert worth(tuned, quick) < worth(wary, quick) < worth(gentle, quick)
+    assert worth(wary, slow) < 2.0 * worth(wary, quick)
+    assert not worth(tuned, slow) < worth(wary, slow)
+    # A flight that does not bear it is not proposed, but gains that fly are.
+    found = proposed(planner, Committee([quick], sds, True, (slow,)), tuned=tuned, best=gentle)
+    assert found.genes.tobytes() != tuned.tobytes()

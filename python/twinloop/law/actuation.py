@@ -97,3 +97,15 @@ def alike_commands(signals: Signals) -> tuple[tuple[int, ...], ...]:
     for i, command in enumerate(signals.commands):
         found.setdefault((command.unit, command.bounds, command.size), []).append(i)
     return tuple(tuple(group) for group in found.values())
+
+
+def delayed(model: _core.Model, signals: Signals) -> _core.Model:
+    """The same model with commands that act one period later.
+
+    Args:
+        model: of these signals.
+        signals: of the system.
+    """
+    actuation = Actuation.of(model, signals)
+    late = [actuator._replace(delay=actuator.delay + 1) for actuator in actuation.actuators]
+    return _core.Model(model.program, model.form, signals.engine, late, list(actuation.hidden), model.offsets)

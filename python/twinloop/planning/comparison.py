@@ -64,7 +64,7 @@ class Comparison:
             workers=judge.workers,
         )
         self.possible = self._possible()
-        self.keeps = self.possible & (self.quiet.worst_usage <= self._reach())
+        self.keeps = self.possible & (self.quiet.worst_usage <= self._reach()) & self._bears_delay()
         self.promised = float(self.quiet.mean[0])
 
     def proposal(self) -> Proposal:
@@ -135,6 +135,18 @@ class Comparison:
         possible[self.drafts.repeats :] &= self.flown.flies
         # Where all of them are, the safest of them is still the best that can be said.
         return possible if possible.any() else np.ones_like(possible)
+
+    def _bears_delay(self) -> Flags:
+        """Candidates that keep the envelope with more delay than was seen; all of them where none does."""
+        drafts, bears = self.drafts, np.ones_like(self.possible)
+        if self.committee.late:
+            flights = self.judge.judge(
+                self.committee.late, drafts.genes, self.committee.sds, 1, drafts.excitation, drafts.ends
+            )
+            bears = ~outside(flights.worst_usage)
+            # Gains that have flown need not show it.
+            bears[drafts.repeats :] |= self.flown.flies
+        return bears if bears[: drafts.repeats].any() else np.ones_like(bears)
 
     def _reach(self) -> float:
         """Usage of the envelope that a proposal may have, where that of each flight so far is known."""

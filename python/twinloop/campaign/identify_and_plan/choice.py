@@ -25,6 +25,8 @@ DOUBT = 3.0
 """Standard deviations of predicted flights by which they may be worse than one that was measured."""
 SURE = 2.0
 """Spreads of a predicted quality that a flight may be off it and still confirm it."""
+NEARLY = 0.1
+"""Share of a quality by which a prediction may be off it and still have come true."""
 UNKNOWN = "No controller to fly: "
 
 
@@ -199,6 +201,21 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
             return False
         return bool(abs(test.predicted - run.quality) <= SURE * test.spread)
     return True
+
+
+def foretold(experiments: Sequence[Experiment]) -> bool:
+    """Whether the quality of some flight came out as predicted: within two spreads, or within a tenth of it.
+
+    Args:
+        experiments: in the order told.
+    """
+    for run in experiments:
+        test = run.test
+        if test is None or test.predicted is None or test.spread is None or run.quality is None:
+            continue
+        if abs(test.predicted - run.quality) <= max(SURE * test.spread, NEARLY * run.quality):
+            return True
+    return False
 
 
 def off_start(book: Logbook) -> Floats | None:

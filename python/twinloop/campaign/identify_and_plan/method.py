@@ -15,7 +15,7 @@ from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import (
     calibrated,
 )
-from twinloop.campaign.identify_and_plan.choice import Choice
+from twinloop.campaign.identify_and_plan.choice import Choice, foretold
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -28,6 +28,7 @@ from twinloop.elementary import log
 from twinloop.errors import NotAvailable
 from twinloop.hold_back import HoldBack
 from twinloop.identification.identify import UnderWay
+from twinloop.law.actuation import delayed
 from twinloop.law.twin import Twin
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -109,7 +110,7 @@ class IdentifyAndPlan:
         """The next test, with what is expected of it."""
         if self.options.tests != "ask":
             return self._asked_of_nobody(book)
-        committee, best = self._committee(), standing.best_flown(book)
+        committee, best = self._committee(book), standing.best_flown(book)
         if best is None and not committee.trusted:
             raise NotAvailable(
                 "Campaign.ask: expected a twin that follows the runs that it was learnt from, or a flown test, found"
@@ -177,7 +178,7 @@ class IdentifyAndPlan:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
         if self.memory.best is not None and self.memory.best[0] == book.revision:
             return self.memory.best[1]
-        committee = self._committee()
+        committee = self._committee(book)
         best = best_alone(self.planner, committee, book, self.options.draws)
         choice = Choice(self.planner, committee, book, self.options.draws, self.options.confidence)
         if at_once:
@@ -229,10 +230,11 @@ class IdentifyAndPlan:
         assert self.memory.latest is not None
         return self.memory.latest
 
-    def _committee(self) -> Committee:
+    def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        return Committee(latest.believed, sensors, latest.follows)
+        late = [] if foretold(book.experiments) else [delayed(latest.believed[0], self.setup.signals)]
+        return Committee(latest.believed, sensors, latest.follows, late)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
         """Whether the tuned gains are flown as they are, unless that is what a test that is waiting does."""
@@ -248,7 +250,7 @@ class IdentifyAndPlan:
         told = len(book.experiments)
         if self.memory.gains is not None and self.memory.gains[0] == book.outcomes:
             return self.memory.gains[1]
-        committee, asked = self._committee(), self.memory.asked
+        committee, asked = self._committee(book), self.memory.asked
         starts = starts_of(self.setup, book, committee, None if asked is None else asked.gains)
         genes = starts[0]
         if committee.trusted:
