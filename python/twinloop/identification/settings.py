@@ -102,6 +102,21 @@ class IdentificationOptions:
             return self.form
         return "acceleration" if len(signals.driven) < signals.n_x else "increment"
 
+    @property
+    def plain(self) -> IdentificationOptions:
+        """The same for a law with linear terms only; itself where those are not among its terms."""
+        if "linear" not in self.libraries:
+            return self
+        return replace(
+            self,
+            libraries=("linear",),
+            generations=0,
+            implicit=False,
+            contacts=False,
+            hidden=False,
+            parts=False,
+        )
+
     def brief(self) -> IdentificationOptions:
         """The same for a short look: a fourth of the moves, and terms of libraries only, where there are any."""
         generations = 0 if self.libraries else self.generations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -28,11 +29,20 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.objectives import closed_loop, normalised_error
+from twinloop.remarks import serious
 from twinloop.steps import Watch
 from twinloop.streams import Unit
 
 FEWEST = 4
 """Members of a committee that are kept in any case."""
+PLAIN = 1_000_000
+"""Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""
+ROUGH = serious(
+    "rough",
+    "No law with other than linear terms follows the flights when it is flown by itself. The twin has linear terms"
+    " only: it follows the flights roughly, which may do to tune gains, and is no simulator.",
+)
+"""What is said of a twin that is linear because no other one follows."""
 WRONG = 0.5
 """Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
 
@@ -71,22 +81,30 @@ class Learner:
         told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
         needed = () if asked is None else knowledge.needed_factors(asked)
         flights = learnt_from(book.experiments, self.options.most_readings)
-        identified = identify_runs(
+        identified_from = partial(
+            identify_runs,
             [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
             self.setup.signals,
-            self.options,
             rests=self._rests(),
             seed=self.setup.seed,
-            iteration=told,
-            earlier=None if asked is None else asked.identified,
             workers=self.workers,
             watch=self.watch,
+        )
+        identified = identified_from(
+            self.options,
+            iteration=told,
+            earlier=None if asked is None else asked.identified,
             under_way=under_way,
             keep=keep,
         )
-        followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
+        followed, follows = self._following(identified, book)
+        if not follows and self.options.plain != self.options:
+            # What is too coarse for a simulator may still tell better gains from worse.
+            plain = identified_from(self.options.plain, iteration=PLAIN + told)
+            by_plain, follows = self._following(plain, book)
+            if follows:
+                followed, identified = by_plain, replace(plain, remarks=[*plain.remarks, ROUGH])
         believed = [identified.members[i] for i in believed_members(followed)]
-        follows = self._can_follow(identified, book, followed)
         lesson = self._lesson(identified, follows, book, followed)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -102,13 +120,14 @@ class Learner:
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
 
-    def _can_follow(self, identified: Identified, book: Logbook, followed: Following) -> bool:
-        """Whether the best model, flown by itself, follows at least half of the runs that it was learnt from.
+    def _following(self, identified: Identified, book: Logbook) -> tuple[Following, bool]:
+        """How members follow the flights, and whether the best one, flown by itself, follows at least half of them.
 
         Where commands were sent in pulses, under those.
         """
+        followed = following(identified.members, book.experiments, self.setup.limits, self.workers)
         if not np.isfinite(identified.chi_squared):
-            return False
+            return followed, False
         scales = np.array([state.scale for state in self.setup.signals.states])
         noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
         free, frozen = followed.free[0], followed.frozen
@@ -118,7 +137,7 @@ class Learner:
         if again:
             model, limits = identified.members[0], self.setup.limits
             lost[again] = in_pieces(model, [flights[j] for j in again], limits, self.workers) > WRONG
-        return 2 * int(lost.sum()) <= len(lost)
+        return followed, 2 * int(lost.sum()) <= len(lost)
 
     def _unexplained(self, identified: Identified, book: Logbook, followed: Following) -> list[float]:
         """By how much more than noise and disturbances the best model misses each flight; none where it diverges."""
