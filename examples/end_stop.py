@@ -1,4 +1,4 @@
-"""A twin that is not to be trusted: a pendulum hits a stop of which the twin has no equation; the report says so."""
+"""A twin not to be trusted: a pendulum hits a hard stop of which three flights show too little; the report says so."""
 
 import sys
 import warnings
