@@ -37,16 +37,16 @@ def test_the_share_is_that_of_the_system(learnt, pendulum):
     qualities = [np.abs(states[1:, 0] - 1.0).sum() for states in (without, within)]
     method = learnt._method
 
-    found = share_of(method.planner, method._committee(), excited, 1)
+    found = share_of(method.planner, method._committee(learnt._book), excited, 1)
 
     assert found == pytest.approx(qualities[0] / qualities[1], rel=0.02)
     assert abs(found - 1.0) > 0.05  # or it shows nothing
-    assert share_of(method.planner, method._committee(), quiet, 1) == 1.0
+    assert share_of(method.planner, method._committee(learnt._book), quiet, 1) == 1.0
 
 
 def test_gains_are_not_the_best_for_what_their_excitation_did(learnt):
     method, book = learnt._method, learnt._book
-    committee = method._committee()
+    committee = method._committee(learnt._book)
     worth = {
         run.number: run.quality * share_of(method.planner, committee, run.test, 1)
         for run in learnt.experiments

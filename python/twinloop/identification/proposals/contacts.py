@@ -26,7 +26,8 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         return
     problem = posed(context, hypothesis)
     still = all(calm(problem, found.chain) is found.chain for found in hypothesis.sums)
-    if still and hypothesis.fit.stable:
+    # A hinge would evade the bounds of what it is made of.
+    if problem.priors.bounds or (still and hypothesis.fit.stable):
         return
     context.watch("terms")
     every = hinges(context.signals, problem.stages.start)
