@@ -33,7 +33,7 @@ demo: $(NATIVE) ## identify the built-in quadrotor from four flights
 
 test: $(VENV)/.installed-test $(VENV)/.installed-others $(NATIVE) ## all tests, and the benchmarks in smoke mode
 	cargo test --package twinloop-core
-	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 	$(BIN)/python benchmarks/speed.py --smoke
 	$(BIN)/python benchmarks/long_campaign.py --smoke
 	$(BIN)/python benchmarks/report.py --smoke
