@@ -8,9 +8,8 @@ from dataclasses import replace
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.selection import from_both_sides, posed
-from twinloop.identification.search.structure import search
-from twinloop.identification.sensors.noise import calm, first_noise
+from twinloop.identification.search.selection import from_below, from_both_sides, posed
+from twinloop.identification.sensors.noise import calm
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, entered, hinges
 from twinloop.law.actuation import Actuation
@@ -49,16 +48,13 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 
 def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) -> list[Hinge]:
     """Hinges that a short search finds among all terms, with the noise that these leave if all are used."""
-    options, grown = context.options, hypothesis.candidates.growing()
+    grown = hypothesis.candidates.growing()
     places = {entered(grown.pool, hinge, len(every)): hinge for hinge in every}
     tried = replace(hypothesis, candidates=grown.with_terms(places), fit=None)
-    problem, terms = posed(context, tried), tried.candidates.ladder[0]
-    usable = problem.usable(terms)
-    low = [first_noise(problem, found.chain, usable, options.gusts) for found in tried.sums]
-    sums = search(
-        problem, low, terms, tried.sums,
-        moves=options.moves // 4, starts=1, largest=options.largest, unit=tried.next_unit(context.unit),
-    )  # fmt: skip
+    driven = [found.chain for found in tried.sums]
+    sums = from_below(
+        context, tried, posed(context, tried), driven, tried.sums, moves=context.options.moves // 4, starts=1
+    )
     near = (
         subset
         for found in sums

@@ -16,6 +16,7 @@ from twinloop.identification.search.joints import with_joints
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.structure import Sum, search
+from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import calm, first_noise, unexplained
 from twinloop.identification.terms.directions import directions
 from twinloop.identification.terms.evolution import evolve
@@ -40,6 +41,39 @@ def posed(context: Context, hypothesis: Hypothesis, inputs: Stages | None = None
     )  # fmt: skip
 
 
+def from_below(
+    context: Context,
+    hypothesis: Hypothesis,
+    problem: Problem,
+    driven: Sequence[Chain],
+    known: Sequence[Sum | None],
+    *,
+    moves: int,
+    starts: int,
+) -> list[Sum]:
+    """Sums of the first rung's terms, begun with the noise that a fit of all of them leaves.
+
+    Args:
+        context: of the identification.
+        hypothesis: whose terms of the first rung are searched.
+        problem: that it poses.
+        driven: chains, each with a guess of its sensors' noise.
+        known: for each chain a sum that is already known, or None; the answer is never worse.
+        moves: of each walk.
+        starts: walks for each chain.
+
+    Returns:
+        A sum for each chain.
+    """
+    options, terms = context.options, hypothesis.candidates.ladder[0]
+    usable = problem.usable(terms)
+    below = [first_noise(problem, chain, usable, options.gusts) for chain in driven]
+    return search(
+        problem, below, terms, known,
+        moves=moves, starts=starts, largest=options.largest, unit=hypothesis.next_unit(context.unit),
+    )  # fmt: skip
+
+
 def from_both_sides(
     context: Context, hypothesis: Hypothesis, known: Sequence[Sum | None] | None = None
 ) -> Hypothesis:
@@ -55,14 +89,11 @@ def from_both_sides(
     """
     options, problem = context.options, posed(context, hypothesis)
     terms, nothing = hypothesis.candidates.ladder[0], [None] * len(hypothesis.driven)
-    usable = problem.usable(terms)
-    below = [first_noise(problem, chain, usable, options.gusts) for chain in hypothesis.driven]
     low = hypothesis.searched(
-        search(
-            problem, below, terms, known or nothing,
-            moves=options.moves, starts=2, largest=options.largest, unit=hypothesis.next_unit(context.unit),
+        from_below(
+            context, hypothesis, problem, hypothesis.driven, known or nothing, moves=options.moves, starts=2
         )
-    )  # fmt: skip
+    )
     if not options.noise_from_above:
         return replace(low, from_above=low.sums)
     above = [unexplained(problem, chain, options.gusts) for chain in hypothesis.driven]
