@@ -120,7 +120,7 @@ def other_commands(experiments: Sequence[Experiment]) -> list[int]:
     Args:
         experiments: that were learnt from; controllers are run on the readings.
     """
-    return [run.number for run in _unlike(experiments) if run.number is not None and not _pulses(run)]
+    return [number for number, pulsed in _unlike(experiments).items() if not pulsed]
 
 
 def in_pulses(experiments: Sequence[Experiment]) -> list[int]:
@@ -129,30 +129,29 @@ def in_pulses(experiments: Sequence[Experiment]) -> list[int]:
     Args:
         experiments: that were learnt from; controllers are run on the readings.
     """
-    return [run.number for run in _unlike(experiments) if run.number is not None and _pulses(run)]
+    return [number for number, pulsed in _unlike(experiments).items() if pulsed]
 
 
-def _unlike(experiments: Sequence[Experiment]) -> list[Experiment]:
-    """Flights, each test once, on which what was sent is not what the controller gives."""
-    found: dict[int, Experiment] = {}
+def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
+    """Tests in which what was sent is not what the controller gives, by number: whether it was sent in pulses."""
+    found: dict[int, bool] = {}
     for run in experiments:
         if run.test is None or run.test.number in found:
             continue
-        given, span = _given(run.test, run.trajectory.states), _span(run.test)
+        sent, given = run.trajectory.commands, _given(run.test, run.trajectory.states)
+        span = _span(run.test)
         size = np.square((given - given.mean(axis=0)) / span).mean()
-        off = np.square((run.trajectory.commands - given) / span).mean()
+        off = np.square((sent - given) / span).mean()
         if off > OTHER * size and off > LITTLE * LITTLE:
-            found[run.test.number] = run
-    return list(found.values())
+            found[run.test.number] = _pulses(sent, given, span)
+    return found
 
 
-def _pulses(run: Experiment) -> bool:
+def _pulses(sent: Floats, given: Floats, span: Floats) -> bool:
     """Whether few levels were sent, and until any time as much as the controller gives, up to a pulse or two."""
-    assert run.test is not None  # `_unlike` names no others
-    if any(len(np.unique(sent)) > LEVELS for sent in run.trajectory.commands.T):
+    if any(len(np.unique(command)) > LEVELS for command in sent.T):
         return False
-    owed = np.cumsum(run.trajectory.commands - _given(run.test, run.trajectory.states), axis=0)
-    return bool((np.abs(owed) <= PULSES * _span(run.test)).all())
+    return bool((np.abs(np.cumsum(sent - given, axis=0)) <= PULSES * span).all())
 
 
 def _given(test: Test, states: Floats) -> Floats:

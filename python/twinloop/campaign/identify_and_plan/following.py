@@ -73,16 +73,13 @@ def following(
     free, lasted = np.empty((2, len(models), len(flights)))
     frozen = np.empty(len(flights))
     for j, flight in enumerate(flights):
-        states, steps, signals = flight.trajectory.states, flight.trajectory.steps, limits.signals
-        scales = np.array([state.scale for state in signals.states])
-        frozen[j] = np.square(signals.difference(states[1:], states[0]) / scales).mean()
+        states, steps = flight.trajectory.states, flight.trajectory.steps
+        frozen[j] = _squares(states[1:], states[0], limits).mean()
         for i, model in enumerate(models):
-            with engine_input():
-                start = model.states_of(states[:1])[0]
-            runs = drawn_runs(model, _cut(flight.replayed, start, steps), limits, workers=workers)
-            lasted[i, j] = runs.lasted[0] / steps
-            misses = np.square(signals.difference(runs.read[0, 1:], states[1:]) / scales)
-            free[i, j] = misses.mean() if lasted[i, j] == 1.0 else np.inf
+            flown = _cut(flight.replayed, _start(model, states[0]), steps)
+            missed, length = _missed(model, flown, states[1:], limits, workers)
+            lasted[i, j] = length / steps
+            free[i, j] = missed.mean() if length == steps else np.inf
     return Following(free, lasted, frozen)
 
 
@@ -102,21 +99,18 @@ def in_pieces(
     Returns:
         Mean squares over those of a model that never moves from where a piece begins (N,), infinite where one diverges.
     """
-    signals, found = limits.signals, np.empty(len(flights))
-    scales = np.array([state.scale for state in signals.states])
+    found = np.empty(len(flights))
     for j, flight in enumerate(flights):
         states, commands = flight.trajectory.states, flight.trajectory.commands
-        length, missed, moved = -(-len(commands) // PIECES), 0.0, 0.0
-        for first in range(0, len(commands), length):
-            piece = commands[first : first + length]
+        most, off, moved = -(-len(commands) // PIECES), 0.0, 0.0
+        for first in range(0, len(commands), most):
+            piece = commands[first : first + most]
             read = states[first + 1 : first + 1 + len(piece)]
-            with engine_input():
-                start = model.states_of(states[first : first + 1])[0]
-            runs = drawn_runs(model, Replay(signals, start, piece), limits, workers=workers)
-            off = np.square(signals.difference(runs.read[0, 1:], read) / scales).sum()
-            missed += float(off) if runs.lasted[0] == len(piece) else np.inf
-            moved += float(np.square(signals.difference(read, states[first]) / scales).sum())
-        found[j] = missed / moved if moved > 0.0 else np.inf
+            flown = Replay(limits.signals, _start(model, states[first]), piece)
+            missed, length = _missed(model, flown, read, limits, workers)
+            off += float(missed.sum()) if length == len(piece) else np.inf
+            moved += float(_squares(read, states[first], limits).sum())
+        found[j] = off / moved if moved > 0.0 else np.inf
     return found
 
 
@@ -142,16 +136,13 @@ def expected_misses(
         Mean squares over draws, steps and states, in units of the states' scales (N,), as `Following.free`; infinite
         where a run diverges, in which the free run may be anywhere.
     """
-    scales = np.array([state.scale for state in limits.signals.states])
     found = np.empty(len(flights))
     for j, flight in enumerate(flights):
         steps = flight.trajectory.steps
         seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
-        with engine_input():
-            start = model.states_of(flight.trajectory.states[:1])[0]
         runs = drawn_runs(
             model,
-            _cut(flight.replayed, start, steps),
+            _cut(flight.replayed, _start(model, flight.trajectory.states[0]), steps),
             limits,
             noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
             disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
@@ -159,7 +150,7 @@ def expected_misses(
         )
         lasted = bool((runs.lasted == steps).all())
         with np.errstate(invalid="ignore"):
-            off = np.square(limits.signals.difference(runs.measured[1:], runs.read[0]) / scales).mean()
+            off = _squares(runs.measured[1:], runs.read[0], limits).mean()
         found[j] = off if lasted else np.inf
     return found
 
@@ -178,6 +169,28 @@ def unexplained(free: Floats, frozen: Floats, expected: Floats) -> Floats:
     matters = (free > RELEVANT * RELEVANT * frozen) & (free > TIMES * TIMES * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(matters, np.sqrt(free / expected), 0.0)
+
+
+def _missed(
+    model: _core.Model, flown: Test | Replay, read: Floats, limits: Limits, workers: _core.Workers
+) -> tuple[Floats, int]:
+    """Squares of what a free run misses of the n readings after its start (n, n_x), and how many steps it lasts."""
+    runs = drawn_runs(model, flown, limits, workers=workers)
+    return _squares(runs.read[0, 1:], read, limits), int(runs.lasted[0])
+
+
+def _squares(states: Floats, others: Floats, limits: Limits) -> Floats:
+    """Squares of differences between states, in units of their scales (…, n_x)."""
+    scales = np.array([state.scale for state in limits.signals.states])
+    squares: Floats = np.square(limits.signals.difference(states, others) / scales)
+    return squares
+
+
+def _start(model: _core.Model, reading: Floats) -> Floats:
+    """The state of a model that is read so (n_x,)."""
+    with engine_input():
+        start: Floats = model.states_of(reading[np.newaxis])[0]
+    return start
 
 
 def _cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:

@@ -132,8 +132,9 @@ class Learner:
         noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
         free, frozen = followed.free[0], followed.frozen
         lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
-        flights, pulsed = book.experiments, in_pulses(book.experiments)
-        again = [j for j in np.flatnonzero(lost) if flights[j].number in pulsed]
+        flights, numbers = book.experiments, np.flatnonzero(lost)
+        pulsed = in_pulses([flights[j] for j in numbers])
+        again = [j for j in numbers if flights[j].number in pulsed]
         if again:
             model, limits = identified.members[0], self.setup.limits
             lost[again] = in_pieces(model, [flights[j] for j in again], limits, self.workers) > WRONG
