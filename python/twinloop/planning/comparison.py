@@ -139,9 +139,9 @@ class Comparison:
     def _bears_delay(self) -> Flags:
         """Candidates that keep the envelope with more delay than was seen; all of them where none does."""
         drafts, bears = self.drafts, np.ones_like(self.possible)
-        if self.committee.late:
+        if self.committee.delayed:
             flights = self.judge.judge(
-                self.committee.late, drafts.genes, self.committee.sds, 1, drafts.excitation, drafts.ends
+                self.committee.delayed, drafts.genes, self.committee.sds, 1, drafts.excitation, drafts.ends
             )
             bears = ~outside(flights.worst_usage)
             # Gains that have flown need not show it.

@@ -38,13 +38,13 @@ class Committee:
         members: m of them.
         sds: of each state's sensor (n_x,).
         trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
-        late: models with more delay than was seen; gains have to bear it as long as no prediction has come true.
+        delayed: models with more delay than was seen; gains have to bear it as long as no prediction has come true.
     """
 
     members: Sequence[_core.Model]
     sds: Floats
     trusted: bool
-    late: Sequence[_core.Model] = ()
+    delayed: Sequence[_core.Model] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,10 +77,10 @@ class Planner(Judge):
             other = 0.5 * places[0] + 0.5 * stream.uniforms(self.family.size)
             all_starts.append(self.family.from_unit(other))
         scored = scored or Scored()
-        late = list(committee.late)
-        first = [*committee.members[:1], *late]
+        delayed = list(committee.delayed)
+        first = [*committee.members[:1], *delayed]
         best = self._searched(first, committee.sds, 1, all_starts, 0.2, number, "gains", scored)
-        members = [*committee.members[: max(1, options.tuning_members - len(late))], *late]
+        members = [*committee.members[: max(1, options.tuning_members - len(delayed))], *delayed]
         fine = [best, starts[0]]
         return self._searched(members, committee.sds, options.draws, fine, 0.08, number, "fine_gains", scored)
 

@@ -195,27 +195,26 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
     """
     for run in reversed(experiments):
         test = run.test
-        if test is None or test.predicted is None or np.isnan(test.predicted):
-            continue
-        if run.quality is None or test.spread is None:
-            return False
-        return bool(abs(test.predicted - run.quality) <= SURE * test.spread)
+        if test is not None and test.predicted is not None and not np.isnan(test.predicted):
+            return _came_true(run, 0.0)
     return True
 
 
-def foretold(experiments: Sequence[Experiment]) -> bool:
+def confirmed_once(experiments: Sequence[Experiment]) -> bool:
     """Whether the quality of some flight came out as predicted: within two spreads, or within a tenth of it.
 
     Args:
-        experiments: in the order told.
+        experiments: in the order of `tell`.
     """
-    for run in experiments:
-        test = run.test
-        if test is None or test.predicted is None or test.spread is None or run.quality is None:
-            continue
-        if abs(test.predicted - run.quality) <= max(SURE * test.spread, NEARLY * run.quality):
-            return True
-    return False
+    return any(_came_true(run, NEARLY) for run in experiments)
+
+
+def _came_true(run: Experiment, share: float) -> bool:
+    """Whether a quality was predicted, and came out within two spreads of that, or within a share of itself."""
+    test = run.test
+    if test is None or test.predicted is None or test.spread is None or run.quality is None:
+        return False
+    return bool(abs(test.predicted - run.quality) <= max(SURE * test.spread, share * run.quality))
 
 
 def off_start(book: Logbook) -> Floats | None:

@@ -15,7 +15,7 @@ from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import (
     calibrated,
 )
-from twinloop.campaign.identify_and_plan.choice import Choice, foretold
+from twinloop.campaign.identify_and_plan.choice import Choice, confirmed_once
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -233,8 +233,8 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        late = [] if foretold(book.experiments) else [delayed(latest.believed[0], self.setup.signals)]
-        return Committee(latest.believed, sensors, latest.follows, late)
+        slower = [] if confirmed_once(book.experiments) else [delayed(latest.believed[0], self.setup.signals)]
+        return Committee(latest.believed, sensors, latest.follows, delayed=slower)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
         """Whether the tuned gains are flown as they are, unless that is what a test that is waiting does."""
