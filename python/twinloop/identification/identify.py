@@ -22,6 +22,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.outliers import cleaned
 from twinloop.identification.proposals.calm import calm
 from twinloop.identification.proposals.contacts import contacts
+from twinloop.identification.proposals.friction import friction
 from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
 from twinloop.identification.proposals.parts import parts
@@ -39,7 +40,7 @@ from twinloop.streams import Unit
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
-PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, contacts, second_look, parts, calm)
+PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, friction, contacts, second_look, parts, calm)
 """In the order in which they are made."""
 
 

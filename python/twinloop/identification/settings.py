@@ -50,7 +50,8 @@ class IdentificationOptions:
         price_disturbances: whether correlated disturbances that explain less than they cost are dropped in the end.
         implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
             masses.
-        contacts: whether what begins at a place, as the force of a stop or behind the play of a gear does, is searched.
+        contacts: whether what begins at a place, as the force of a stop or behind the play of a gear does, is searched,
+            and dry friction.
         lags: whether lags and delays of the actuators are searched.
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
             replaced them.

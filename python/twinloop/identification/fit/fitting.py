@@ -53,14 +53,20 @@ def _tuned(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Fit]:
             fit = freed
         else:
             sums = tuple(replace(found, chain=chain) for found, chain in zip(sums, held, strict=False))
-    if fit.stable and hypothesis.form != "absolute":
-        values, places = fit.model.constants.tolist(), layout(hypothesis)[1]
-        sums = tuple(
-            replace(found, weights=dict(zip(found.weights, (values[place] for place in at), strict=True)))
-            for found, at in zip(sums, places, strict=True)
-        )
-    actuation = Actuation.of(fit.model, context.signals)
-    return replace(hypothesis, sums=sums, fit=fit, actuation=actuation), fit
+    tuned = with_fit(replace(hypothesis, sums=sums), fit)
+    return replace(tuned, actuation=Actuation.of(fit.model, context.signals)), fit
+
+
+def with_fit(hypothesis: Hypothesis, fit: Fit) -> Hypothesis:
+    """The hypothesis with a fit, and with the weights of its model where that is stable."""
+    if not fit.stable or hypothesis.form == "absolute":
+        return replace(hypothesis, fit=fit)
+    values, places = fit.model.constants.tolist(), layout(hypothesis)[1]
+    sums = tuple(
+        replace(found, weights=dict(zip(found.weights, (values[place] for place in at), strict=True)))
+        for found, at in zip(hypothesis.sums, places, strict=True)
+    )
+    return replace(hypothesis, sums=sums, fit=fit)
 
 
 def _held(chain: Chain, dt: float) -> Chain:

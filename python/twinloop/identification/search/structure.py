@@ -91,6 +91,11 @@ def prices(
     )
 
 
+def priced(pool: Pool, terms: Sequence[int], readings: int, runs: int) -> float:
+    """What a sum of terms pays beside its misfit, in units of χ²: each of them, and the rung that they stand on."""
+    return RUNG * pool.rung(terms) + float(prices(pool, terms, readings, runs).sum())
+
+
 def search(
     problem: Problem,
     chains: Sequence[Chain],

@@ -1,0 +1,146 @@
+"""Dry friction, where terms leave more than noise.
+
+A rate that is read at rest is all noise, and a term as steep as friction makes forces of it. No regression on readings
+finds such a term: it is added to what is known, tuned on predictions, and judged by innovations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from twinloop.identification.context import Context
+from twinloop.identification.evidence import strongest
+from twinloop.identification.fit.fitting import fitted, with_fit
+from twinloop.identification.fit.innovations import by_innovations
+from twinloop.identification.fit.models import model_of
+from twinloop.identification.fit.predictions import smoothed
+from twinloop.identification.fit.tuning import tune
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.description import shorter, shortest
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import climbed, posed
+from twinloop.identification.search.structure import Sum, priced
+from twinloop.identification.sensors.noise import RIDGE, calm
+from twinloop.identification.terms.friction import entered, frictions, is_friction
+
+WORTH = 20.0
+"""What friction must gain, in units of χ², beside its price: as much as a rung of the ladder."""
+ROUNDS = 4
+"""Times that each equation may get one more term."""
+
+
+def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The hypothesis with dry friction among its terms; none where its terms leave nothing but noise."""
+    options, fit = context.options, hypothesis.fit
+    if not (options.contacts and options.libraries) or fit is None or not fit.stable:
+        return
+    problem = posed(context, hypothesis)
+    # Friction would evade the bounds of the speed that it is made of.
+    if problem.priors.bounds or hypothesis.form == "absolute" or _still(problem, hypothesis):
+        return
+    context.watch("terms")
+    bases = [hypothesis]
+    terms = [term for found in hypothesis.sums for term in found.weights]
+    if hypothesis.pool.rung(terms) > 0:
+        # Terms of higher rungs and evolved ones may stand in for friction: it is looked for beside few terms, too.
+        few = fitted(context, replace(hypothesis, sums=hypothesis.from_above, fit=None))
+        bases += [few] if few.evidence.stable else []
+    found = [other for other in (_with_friction(context, base) for base in bases) if _rubs(other)]
+    if not found:
+        return
+    best = strongest(found)
+    if not _rubs(hypothesis):
+        given = by_innovations(context, hypothesis)
+        if not shorter(best.evidence.length + WORTH, given.evidence.length):
+            return
+    if (again := smoothed(context, best)) is not None:
+        yield replace(again, fit=best.fit)
+
+
+def _with_friction(context: Context, hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis with terms of friction that pay by its innovations; as it was where none does."""
+    best = by_innovations(context, hypothesis) if _rubs(hypothesis) else hypothesis
+    for _ in range(ROUNDS):
+        more = _with_one_more(context, best)
+        if more is best:
+            break
+        more = by_innovations(context, more)
+        judged = best if _rubs(best) else by_innovations(context, best)
+        if not shorter(more.evidence.length + WORTH, judged.evidence.length):
+            break
+        best = _reselected(context, more)
+    return best
+
+
+def _rubs(hypothesis: Hypothesis) -> bool:
+    """Whether there is friction among its terms."""
+    return any(is_friction(hypothesis.pool, term) for found in hypothesis.sums for term in found.weights)
+
+
+def _reselected(context: Context, hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis with its terms selected again on states that it has smoothed, if innovations say so."""
+    again = smoothed(context, hypothesis)
+    if again is None:
+        return hypothesis
+    other = fitted(context, climbed(context, again, brief=True))
+    if not other.evidence.stable:
+        return hypothesis
+    other = by_innovations(context, other)
+    return other if shorter(other.evidence.length, hypothesis.evidence.length) else hypothesis
+
+
+def _still(problem: Problem, hypothesis: Hypothesis) -> bool:
+    """Whether hardly anything disturbs what terms leave."""
+    return all(calm(problem, found.chain) is found.chain for found in hypothesis.sums)
+
+
+def _with_one_more(context: Context, hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis with one more term in each sum that is disturbed, where one pays; itself where none does."""
+    best = hypothesis
+    for i, known in enumerate(hypothesis.sums):
+        grown = replace(best, candidates=best.candidates.growing())
+        problem = posed(context, grown)
+        if calm(problem, known.chain) is not known.chain:
+            nodes = _offered(context, problem, known)
+            best = shortest([best, *(_tuned(context, problem, grown, i, node) for node in nodes)], _described)
+    return best
+
+
+def _offered(context: Context, problem: Problem, known: Sum) -> list[int]:
+    """Friction of all speeds, entered in the pool; beside friction also what is viscous, for it may have stood in."""
+    every = list(frictions(context.signals, problem.stages.start))
+    readings = problem.readings(known.chain)
+    nodes = [entered(problem.pool, each, len(every), readings) for each in every]
+    if any(is_friction(problem.pool, term) for term in known.weights):
+        nodes += sorted({place for each in every for place in each.inputs})
+    return problem.usable([node for node in dict.fromkeys(nodes) if node not in known.weights])
+
+
+def _described(hypothesis: Hypothesis) -> float:
+    """Description length of a fit under a noise that stays as it was, up to what is the same for all."""
+    assert hypothesis.fit is not None
+    runs, misfit = hypothesis.runs, hypothesis.fit.chi_squared
+    return misfit + sum(
+        priced(hypothesis.pool, list(found.weights), hypothesis.fit.readings, len(runs))
+        for found in hypothesis.sums
+    )
+
+
+def _tuned(context: Context, problem: Problem, hypothesis: Hypothesis, i: int, node: int) -> Hypothesis:
+    """The hypothesis with one more term in a sum, tuned with the noise that it had; itself where that is singular."""
+    assert hypothesis.fit is not None
+    known, sums = hypothesis.sums[i], list(hypothesis.sums)
+    terms = problem.usable([*known.weights, node])
+    regression = problem.regression(known.chain, problem.values(terms))
+    gram = regression.gram(known.chain.sensors, known.chain.motion, problem.workers)
+    solved = gram.solve(list(range(len(terms))), RIDGE)
+    if solved is None:
+        return hypothesis
+    sums[i] = replace(known, weights=dict(zip(terms, map(float, solved[0]), strict=True)), others=[])
+    candidates = hypothesis.candidates.with_terms([node])
+    more = replace(hypothesis, candidates=candidates, sums=tuple(sums), fit=None)
+    fit, _ = tune(
+        context, more, model_of(context, more), hypothesis.fit.observer, context.options.tuning_steps
+    )
+    return with_fit(more, fit)
