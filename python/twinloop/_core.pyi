@@ -692,8 +692,9 @@ def predictions(
     records: Sequence[_Record],
     *,
     workers: Workers | None = None,
-) -> list[tuple[_Floats, _Floats]] | None:
-    """Whitened prediction errors and states once each reading was used, both (n + 1, n_x) for each run."""
+) -> list[tuple[_Floats, _Floats, _Floats]] | None:
+    """Of each run whitened prediction errors (n + 1, n_x), and states (n + 1, n_x) and correlated disturbances (n + 1,
+    chains) once each reading was used; 0 for a chain without."""
 
 def ranks(objectives: ArrayLike) -> _Integers: ...
 def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> _Floats: ...

@@ -72,7 +72,7 @@ pub use regression::{
     Annealing, Chain, Choices, Found, Gram, Leftover, Noise, Record, Regression, Solution, likelihood,
     most_likely_noise, most_likely_noises, search, search_all,
 };
-pub use tuning::{Observed, Recorded, Tuned, Tuning};
+pub use tuning::{Observed, Predictions, Recorded, Tuned, Tuning};
 
 // Judgement.
 pub use flights::{

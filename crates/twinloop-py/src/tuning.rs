@@ -2,7 +2,7 @@
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use twinloop_core::{Chain, Learnt, Noise, Observed, Recorded, Signals, Tuning};
+use twinloop_core::{Chain, Learnt, Noise, Observed, Predictions, Recorded, Signals, Tuning};
 
 use crate::arrays::{Matrix, finite, rows, to_matrix};
 use crate::error::{Result, misuse};
@@ -16,6 +16,9 @@ use crate::workers::{PyWorkers, or_default};
 type Chains = Vec<(Vec<usize>, Vec<f64>, (f64, f64, f64), bool)>;
 /// Readings, weights and commands of each run.
 type Records<'py> = Vec<(Matrix<'py>, Matrix<'py>, Matrix<'py>)>;
+
+/// Whitened prediction errors, states and correlated disturbances of a run.
+type OfRun<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// The signals of the limits, unless the model is for others.
 fn fitting<'a>(model: &PyModel, limits: &'a PyLimits) -> Result<&'a Signals> {
@@ -104,11 +107,10 @@ pub fn tune<'py>(
     Ok((finished, tuned.chi_squared, tuned.readings, covariance, members))
 }
 
-/// Whitened prediction errors (n + 1, n_x) and states once each reading was used (n + 1, n_x) of each run; none where
-/// the model diverges on one of them.
+/// Whitened prediction errors (n + 1, n_x), and states (n + 1, n_x) and correlated disturbances (n + 1, chains) once each
+/// reading was used, of each run; none where the model diverges on one of them.
 #[pyfunction]
 #[pyo3(signature = (model, limits, chains, records, *, workers = None))]
-#[expect(clippy::type_complexity, reason = "two matrices for each run")]
 pub fn predictions<'py>(
     py: Python<'py>,
     model: &PyModel,
@@ -116,7 +118,7 @@ pub fn predictions<'py>(
     chains: Chains,
     records: Records<'py>,
     workers: Option<&PyWorkers>,
-) -> Result<Option<Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)>>> {
+) -> Result<Option<Vec<OfRun<'py>>>> {
     let workers = or_default(workers)?;
     let signals = fitting(model, limits)?;
     let observer = observer(chains, signals.dt)?;
@@ -134,6 +136,12 @@ pub fn predictions<'py>(
     };
     tuning.check()?;
     let runs = py.detach(|| tuning.predictions(&workers));
-    let of_run = |(errors, states)| (to_matrix(py, n_x, errors), to_matrix(py, n_x, states));
+    let of_run = |run: Predictions| {
+        (
+            to_matrix(py, n_x, run.errors),
+            to_matrix(py, n_x, run.states),
+            to_matrix(py, observer.len(), run.gusts),
+        )
+    };
     Ok(runs.map(|runs| runs.into_iter().map(of_run).collect()))
 }

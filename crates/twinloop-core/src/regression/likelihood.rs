@@ -49,6 +49,13 @@ const GAIN: f64 = 1e-6;
 /// Times that all of them are gone through: where one variance began far too large, the others are small after the first.
 const LADDERS: usize = 3;
 
+/// Periods between which a disturbance is said to be correlated: shorter than this it is white.
+const BRIEFEST_MEMORY: f64 = 3.0;
+/// Longer than this it is a constant.
+const LONGEST_MEMORY: f64 = 300.0;
+/// Times that it is forgotten within the longest record, at least: what is not, a record shows as a constant of its own.
+const FORGOTTEN: f64 = 4.0;
+
 /// The noise under which residuals are most likely, by coordinate search from `start`; never below `smallest`.
 pub fn most_likely_noise(
     chain: &Chain,
@@ -58,7 +65,10 @@ pub fn most_likely_noise(
     smallest: &Noise,
 ) -> (Noise, f64) {
     let d = chain.states;
+    let periods = residuals.iter().map(|run| run.len() / d).max().unwrap_or(0) as f64;
+    let longest = (chain.dt * periods / FORGOTTEN).clamp(BRIEFEST_MEMORY * chain.dt, LONGEST_MEMORY * chain.dt);
     let mut best = start.clone();
+    best.correlation_time = best.correlation_time.min(longest);
     let mut score = likelihood(chain, records, residuals, &best);
     for _ in 0..LADDERS {
         let before = score;
@@ -77,9 +87,8 @@ pub fn most_likely_noise(
                         } else if which == d + 1 {
                             tried.gust = (tried.gust * factor).max(smallest.gust);
                         } else {
-                            // Shorter than a few periods it is white, longer than this it is a constant.
                             tried.correlation_time =
-                                (tried.correlation_time * factor).clamp(3.0 * chain.dt, 300.0 * chain.dt);
+                                (tried.correlation_time * factor).clamp(BRIEFEST_MEMORY * chain.dt, longest);
                         }
                         if tried == best {
                             continue;

@@ -10,6 +10,8 @@ mod observer;
 mod slopes;
 mod variant;
 
+pub use observer::Predictions;
+
 use crate::error::{Result, invalid};
 use crate::lgp::Code;
 use crate::model::Frame;

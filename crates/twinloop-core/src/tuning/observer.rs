@@ -8,13 +8,22 @@ use crate::model::Model;
 use crate::regression::{LONGEST, Record, Whitening};
 use crate::workers::Workers;
 
+/// What an observer makes of a record of n + 1 readings, row by row.
+pub struct Predictions {
+    /// Whitened prediction errors, (n + 1) × n_x.
+    pub errors: Vec<f64>,
+    /// States once each reading was used, (n + 1) × n_x.
+    pub states: Vec<f64>,
+    /// Correlated disturbances at that time, one a chain; 0 of a chain that has none.
+    pub gusts: Vec<f64>,
+}
+
 /// Variants that run side by side.
 pub(super) const LANES: usize = 32;
 
 impl Tuning<'_> {
-    /// Whitened prediction errors of the model as it is, (n + 1) × n_x for each record, and its states once each
-    /// reading was used; none where it diverges.
-    pub fn predictions(&self, workers: &Workers) -> Option<Vec<(Vec<f64>, Vec<f64>)>> {
+    /// What the observer of the model as it is makes of each record; none where it diverges.
+    pub fn predictions(&self, workers: &Workers) -> Option<Vec<Predictions>> {
         let whitenings = self.whitenings();
         let variant = self.start();
         let runs = workers.map(self.records.len(), |r| {
@@ -28,7 +37,11 @@ impl Tuning<'_> {
             dispatch(workers.width(), part)
         });
         let finite = runs.iter().all(|run| !run.diverged[0]);
-        let of_states = |run: Run| (self.by_state(&run.errors[0]), run.states);
+        let of_states = |run: Run| Predictions {
+            errors: self.by_state(&run.errors[0]),
+            states: run.states,
+            gusts: run.gusts,
+        };
         finite.then(|| runs.into_iter().map(of_states).collect())
     }
 
@@ -100,6 +113,8 @@ pub(super) struct Run {
     pub errors: Vec<Vec<f64>>,
     /// States of the first variant after each reading was used.
     pub states: Vec<f64>,
+    /// Its correlated disturbances at that time, one a chain.
+    pub gusts: Vec<f64>,
 }
 
 impl Kernel for Part<'_> {
@@ -116,6 +131,7 @@ impl Kernel for Part<'_> {
             all.errors.extend(run.errors);
             if all.states.is_empty() {
                 all.states = run.states;
+                all.gusts = run.gusts;
             }
         }
         all
@@ -142,6 +158,7 @@ impl Part<'_> {
         let count = self.variants.len();
         let mut errors = vec![Vec::with_capacity(if self.keep { record.states.len() } else { 0 }); count];
         let mut states = Vec::with_capacity(if self.keep { record.states.len() } else { 0 });
+        let mut kept_gusts = Vec::new();
         let steps = record.commands.len() / n_u;
         for k in 0..=steps {
             for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
@@ -167,6 +184,7 @@ impl Part<'_> {
             }
             if self.keep {
                 states.extend(state.iter().map(|value| value.lane(0)));
+                kept_gusts.extend(gusts.iter().map(|gust| gust.lane(0)));
             }
             if k == steps {
                 break;
@@ -197,6 +215,7 @@ impl Part<'_> {
                 .collect(),
             errors,
             states,
+            gusts: kept_gusts,
         }
     }
 }

@@ -165,11 +165,12 @@ proptest! {
         let line = Line::new(start, noise, &runs);
         let chi_squared = line.tuning().tune(0, &one_worker()).chi_squared;
         let found = line.tuning().predictions(&one_worker()).expect("no divergence");
-        let squares: f64 = found.iter().flat_map(|(errors, _)| errors).map(|error| error * error).sum();
+        let squares: f64 = found.iter().flat_map(|run| &run.errors).map(|error| error * error).sum();
         prop_assert!((squares - chi_squared).abs() < 1e-9 * chi_squared);
-        for ((errors, states), (readings, _)) in found.iter().zip(&runs) {
-            prop_assert_eq!((errors.len(), states.len()), (readings.len(), readings.len()));
-            prop_assert_eq!((errors[0], states[0]), (0.0, readings[0]));
+        for (run, (readings, _)) in found.iter().zip(&runs) {
+            prop_assert_eq!((run.errors.len(), run.states.len()), (readings.len(), readings.len()));
+            prop_assert_eq!((run.errors[0], run.states[0]), (0.0, readings[0]));
+            prop_assert_eq!(run.gusts.len(), readings.len());
         }
     }
 }

@@ -143,7 +143,7 @@ class Knowledge:
                 [(run.states, run.weights, run.commands) for run in runs],
                 workers=workers,
             )
-        return None if found is None else tuple(errors for errors, _ in found)
+        return None if found is None else tuple(errors for errors, _, _ in found)
 
     def rivals(self, learnt: Learnt) -> tuple[Rival, ...]:
         """Subsets of terms that annealing has found nearly as good.

@@ -19,8 +19,9 @@ FEW = 0.02
 """Share of readings up to which they are outliers; where more are wrong, the model is."""
 
 
-def predictions(context: Context, hypothesis: Hypothesis) -> Sequence[tuple[Floats, Floats]] | None:
-    """Whitened errors of a fitted hypothesis' observer and the states that it believes, by run; None: it diverges."""
+def predictions(context: Context, hypothesis: Hypothesis) -> Sequence[tuple[Floats, Floats, Floats]] | None:
+    """Of each run the whitened errors of a fitted hypothesis' observer, the states and the correlated disturbances that
+    it believes; None: it diverges."""
     fit = hypothesis.fit
     if fit is None:
         return None
@@ -42,7 +43,7 @@ def without_outliers(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     errors = predictions(context, hypothesis)
     if errors is None:
         return hypothesis
-    wrong = [np.abs(whitened) > OUTLIER for whitened, _ in errors]
+    wrong = [np.abs(whitened) > OUTLIER for whitened, _, _ in errors]
     share = float(np.mean(np.concatenate([w.any(axis=1) for w in wrong])))
     if share == 0.0 or share > FEW:
         return hypothesis
@@ -60,6 +61,6 @@ def smoothed(context: Context, hypothesis: Hypothesis) -> Hypothesis | None:
         return None
     runs = (
         replace(run, smooth=np.where(np.isfinite(states), states, run.states))
-        for run, (_, states) in zip(hypothesis.runs, errors, strict=True)
+        for run, (_, states, _) in zip(hypothesis.runs, errors, strict=True)
     )
     return replace(hypothesis, runs=tuple(runs), smoothed=True, fit=None)
