@@ -369,7 +369,9 @@ def test_predictions_are_those_of_a_plain_loop_and_a_reading_that_does_not_count
     readings, weights, commands = flown(4)
     weights[37], readings[37] = 0.0, 3.0
     values = (-1.2, 1.9, 0.1)
-    [(errors, states, _)] = _core.predictions(lagging(*values), LIMITS, CHAIN, [(readings, weights, commands)])
+    [(errors, states, _)] = _core.predictions(
+        lagging(*values), LIMITS, CHAIN, [(readings, weights, commands)]
+    )
     np.testing.assert_allclose(errors[:, 0], residuals(values, [(readings, weights, commands)]), atol=1e-6)
     assert errors[37, 0] == 0.0 and abs(states[37, 0] - 3.0) > 0.5
     _, left, counted, _, _ = _core.tune(

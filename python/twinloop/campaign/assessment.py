@@ -106,6 +106,8 @@ class Disturbance:
         white: what is added in a period, in its unit; 0: nothing that is felt.
         correlated: what is added in a second by one that is forgotten slowly, in its unit; 0: nothing that is felt.
         correlation_time: after which that is forgotten to 1/e, s.
+        recurs: whether it comes again at the same times in flight after flight: then it is an error of the law, and no
+            disturbance.
     """
 
     name: str
@@ -113,6 +115,7 @@ class Disturbance:
     white: float
     correlated: float
     correlation_time: float
+    recurs: bool = False
 
 
 def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
@@ -136,7 +139,8 @@ def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
         white = white if white > least else 0.0
         size = size if size * max(time, twin.signals.dt) > least else 0.0
         if white or size:
-            found.append(Disturbance(state.name, state.unit, white, size, time))
+            recurs = size > 0.0 and state.name in lesson.recurring
+            found.append(Disturbance(state.name, state.unit, white, size, time, recurs))
     return tuple(found)
 
 

@@ -173,6 +173,8 @@ class Lesson(Recorded, kind="lesson"):
         follows: whether free runs of the best model follow at least half of the runs that it was learnt from; if not,
             no test is planned with it.
         remarks: diagnostics.
+        recurring: states whose correlated disturbance comes again at the same times in flight after flight: the law is
+            wrong there, and nothing disturbs.
         asked: the tests planned after it.
     """
 
@@ -192,6 +194,7 @@ class Lesson(Recorded, kind="lesson"):
     normalised: tuple[float, ...]
     follows: bool
     remarks: tuple[Remark, ...]
+    recurring: tuple[str, ...] = ()
     asked: tuple[Planned, ...] = ()
 
 

@@ -40,6 +40,7 @@ def diagnostics_of(
     steps: int,
     missed: Sequence[float] = (),
     others: Sequence[int] = (),
+    recurring: Sequence[str] = (),
 ) -> list[Remark]:
     """What speaks against the data or the twin.
 
@@ -50,6 +51,7 @@ def diagnostics_of(
         steps: of a whole run.
         missed: times further from each run than noise and disturbances explain that the free run is; 0 where they do.
         others: numbers of the tests whose recorded commands are none that their controllers give.
+        recurring: states whose disturbance comes again in flight after flight.
 
     Returns:
         Remarks, none where nothing does.
@@ -91,6 +93,14 @@ def diagnostics_of(
                 f"Flown by itself the twin misses {sum(map(bool, missed))} of the {len(missed)} runs that it was"
                 f" learnt from, {how}: something acts that no term describes. Do not believe it beyond the"
                 " flights that were made.",
+            )
+        )
+    if recurring:
+        said.append(
+            note(
+                "model-error",
+                f"What disturbs {', '.join(recurring)} comes again at the same times in flight after flight. So it is"
+                " an error of the law, and no disturbance: a term is missing there.",
             )
         )
     copies = len(experiments) - len(distinct(experiments))

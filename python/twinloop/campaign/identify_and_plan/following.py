@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -45,12 +46,18 @@ class Following:
 
     def order(self) -> list[int]:
         """Models, the one that goes wrong least on its worst flight first; of the diverging, what lasts longest."""
+        numbers: list[int] = np.lexsort((-self.lasted.min(axis=1), self._ratios().max(axis=1))).tolist()
+        return numbers
+
+    def worst(self, model: int) -> float:
+        """Of a model, on the flight that it misses most: its mean square over that of the model that never moves."""
+        return float(self._ratios()[model].max())
+
+    def _ratios(self) -> Floats:
         still = self.frozen == 0.0
-        ratios = np.where(
+        return np.where(
             still, np.where(self.free == 0.0, 1.0, np.inf), self.free / np.where(still, 1.0, self.frozen)
         )
-        numbers: list[int] = np.lexsort((-self.lasted.min(axis=1), ratios.max(axis=1))).tolist()
-        return numbers
 
 
 def following(
@@ -155,20 +162,23 @@ def expected_misses(
     return found
 
 
-def unexplained(free: Floats, frozen: Floats, expected: Floats) -> Floats:
+def unexplained(free: Floats, frozen: Floats, expected: Floats, steered: NDArray[np.bool_]) -> Floats:
     """Times further from its flights than noise and disturbances explain that a free run is, where that matters.
 
     Args:
         free: mean squares of the free run (N,), infinite where it diverges.
         frozen: of the model that never moves (N,).
         expected: of noise and disturbances (N,), infinite where these make it diverge.
+        steered: whether a flight had its controller, who kept it from diverging (N,). Under recorded commands alone
+            any free run of an unstable system may.
 
     Returns:
         Ratios of roots (N,); 0 where the free run does as can be expected, or is within 3 % of how far the flight went.
     """
+    lost = steered & np.isinf(free)
     matters = (free > RELEVANT * RELEVANT * frozen) & (free > TIMES * TIMES * expected)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(matters, np.sqrt(free / expected), 0.0)
+        return np.where(lost, np.inf, np.where(matters, np.sqrt(free / expected), 0.0))
 
 
 def _missed(

@@ -15,13 +15,11 @@ from twinloop.campaign.identify_and_plan.calibration import (
     residuals_of_flights,
 )
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
+from twinloop.campaign.identify_and_plan.recurring import observed
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
-from twinloop.errors import engine_input
-from twinloop.identification.records import Run
 from twinloop.identification.remarks import symbols_of
-from twinloop.identification.sensors.offsets import moved
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
 
@@ -130,19 +128,8 @@ class Knowledge:
         """
         if learnt.identified.exact:
             return None
-        runs = [
-            Run.of(run.trajectory.states, run.trajectory.commands).continued(self.setup.signals)
-            for run in self.book.experiments[: learnt.experiments]
-        ]
-        runs = moved(runs, self.setup.signals, learnt.identified.offsets)
-        with engine_input():
-            found = _core.predictions(
-                learnt.identified.model,
-                self.setup.limits.engine,
-                [chain.engine for chain in learnt.identified.chains],
-                [(run.states, run.weights, run.commands) for run in runs],
-                workers=workers,
-            )
+        flights, limits = self.book.experiments[: learnt.experiments], self.setup.limits
+        found = observed(learnt.identified, flights, self.setup.signals, limits, workers)
         return None if found is None else tuple(errors for errors, _, _ in found)
 
     def rivals(self, learnt: Learnt) -> tuple[Rival, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -21,6 +21,7 @@ from twinloop.campaign.identify_and_plan.following import (
 )
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
+from twinloop.campaign.identify_and_plan.recurring import recurring_states
 from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
@@ -39,12 +40,37 @@ PLAIN = 1_000_000
 """Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""
 ROUGH = serious(
     "rough",
-    "No law with other than linear terms follows the flights when it is flown by itself. The twin has linear terms"
-    " only: it follows the flights roughly, which may do to tune gains, and is no simulator.",
+    "No law with other than linear terms follows the flights as well when it is flown by itself. The twin has linear"
+    " terms only: it follows them roughly, which may do to tune gains, and is no simulator.",
 )
 """What is said of a twin that is linear because no other one follows."""
 WRONG = 0.5
 """Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What was identified, beside the flights that it was learnt from.
+
+    Args:
+        identified: a model and a committee.
+        followed: free runs of the members.
+        follows: whether the best of them follows at least half of the flights.
+        recurring: states that an error of the law moves, and no disturbance.
+        missed: times further from each flight than noise and disturbances explain that the best one is; 0 where they
+            do.
+    """
+
+    identified: Identified
+    followed: Following
+    follows: bool
+    recurring: Sequence[int]
+    missed: Sequence[float]
+
+    @property
+    def worst(self) -> float:
+        """Mean square of the best member on the flight that it misses most, over that of the model that never moves."""
+        return self.followed.worst(0)
 
 
 @dataclass(frozen=True)
@@ -97,15 +123,16 @@ class Learner:
             under_way=under_way,
             keep=keep,
         )
-        followed, follows = self._following(identified, book)
-        if not follows and self.options.plain != self.options:
+        answer = self._flown(identified, book)
+        if (not answer.follows or any(answer.missed)) and self.options.plain != self.options:
             # What is too coarse for a simulator may still tell better gains from worse.
             plain = identified_from(self.options.plain, iteration=PLAIN + told)
-            by_plain, follows = self._following(plain, book)
-            if follows:
-                followed, identified = by_plain, replace(plain, remarks=[*plain.remarks, ROUGH])
-        believed = [identified.members[i] for i in believed_members(followed)]
-        lesson = self._lesson(identified, follows, book, followed)
+            rough = self._flown(replace(plain, remarks=[*plain.remarks, ROUGH]), book)
+            if rough.follows and (not answer.follows or rough.worst < answer.worst):
+                answer = rough
+        identified, follows = answer.identified, answer.follows
+        believed = [identified.members[i] for i in believed_members(answer.followed)]
+        lesson = self._lesson(answer, book)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
         )
@@ -119,6 +146,13 @@ class Learner:
         family, target = self.setup.family, np.atleast_2d(self.setup.target_state)[0]
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
+
+    def _flown(self, identified: Identified, book: Logbook) -> Answer:
+        """What was identified, with how it follows the flights when it is flown by itself."""
+        followed, follows = self._following(identified, book)
+        recurring = self._recurring(identified, book)
+        missed = self._unexplained(identified, book, followed, recurring)
+        return Answer(identified, followed, follows, recurring, missed)
 
     def _following(self, identified: Identified, book: Logbook) -> tuple[Following, bool]:
         """How members follow the flights, and whether the best one, flown by itself, follows at least half of them.
@@ -140,21 +174,41 @@ class Learner:
             lost[again] = in_pieces(model, [flights[j] for j in again], limits, self.workers) > WRONG
         return followed, 2 * int(lost.sum()) <= len(lost)
 
-    def _unexplained(self, identified: Identified, book: Logbook, followed: Following) -> list[float]:
-        """By how much more than noise and disturbances the best model misses each flight; none where it diverges."""
+    def _recurring(self, identified: Identified, book: Logbook) -> list[int]:
+        """States that an error of the law moves, and no disturbance; none are known where the best model diverges."""
         if not np.isfinite(identified.chi_squared):
             return []
-        noise, unit = (
-            identified.noise(self.setup.signals),
-            Unit(self.setup.seed).part(len(book.experiments), 1),
-        )
-        model, limits = identified.members[0], self.setup.limits
-        expected = expected_misses(model, book.experiments, noise, unit, limits, self.workers)
-        missed: list[float] = unexplained(followed.free[0], followed.frozen, expected).tolist()
-        return missed
+        setup = self.setup
+        return recurring_states(identified, book.experiments, setup.signals, setup.limits, self.workers)
 
-    def _lesson(self, identified: Identified, follows: bool, book: Logbook, followed: Following) -> Lesson:
+    def _unexplained(
+        self, identified: Identified, book: Logbook, followed: Following, recurring: Sequence[int]
+    ) -> list[float]:
+        """By how much more than noise and disturbances the best model misses each flight; none where it diverges.
+
+        Nothing of what recurs is a disturbance. Under the commands of a flight that were sent in pulses it is judged
+        elsewhere, piece by piece.
+        """
+        if not np.isfinite(identified.chi_squared):
+            return []
+        noise = identified.noise(self.setup.signals)
+        noise = replace(
+            noise, correlated=tuple(each for each in noise.correlated if each.states[0] not in recurring)
+        )
+        unit = Unit(self.setup.seed).part(len(book.experiments), 1)
+        model, limits, flights = identified.members[0], self.setup.limits, book.experiments
+        expected = expected_misses(model, flights, noise, unit, limits, self.workers)
+        steered = np.array([run.test is not None for run in flights])
+        missed = unexplained(followed.free[0], followed.frozen, expected, steered)
+        pulsed = in_pulses([flight for flight, off in zip(flights, missed, strict=True) if off])
+        return [
+            0.0 if run.number in pulsed else off for run, off in zip(flights, missed.tolist(), strict=True)
+        ]
+
+    def _lesson(self, answer: Answer, book: Logbook) -> Lesson:
+        identified, follows = answer.identified, answer.follows
         free = closed_loop(identified.members[:1], book.selected, self.workers)[0].tolist()
+        recurring = [self.setup.signals.state_names[state] for state in answer.recurring]
         return Lesson(
             iteration=len(book.experiments),
             tests=tuple(run.number for run in book.experiments),
@@ -184,10 +238,12 @@ class Learner:
                     follows
                     or not np.isfinite(identified.chi_squared),  # of one that diverges it is said already
                     self.setup.steps,
-                    self._unexplained(identified, book, followed),
+                    answer.missed,
                     () if follows else other_commands(book.experiments),
+                    recurring,
                 ),
             ),
+            recurring=tuple(recurring),
         )
 
 

@@ -102,10 +102,18 @@ def disturbances(result: Mapping[str, Any]) -> Table | None:
             each["white"] or None,
             each["correlated"] or None,
             each["correlation_time"] or None,
+            ("an error of the law" if each["recurs"] else "a disturbance") if each["correlated"] else None,
         ]
         for each in found
     ]
-    head = ["state", "unit", "white, each period", "correlated, each second", "correlation time (s)"]
+    head = [
+        "state",
+        "unit",
+        "white, each period",
+        "correlated, each second",
+        "correlation time (s)",
+        "which is",
+    ]
     return _table("disturbances", "Disturbances (standard deviations)", head, rows)
 
 

@@ -76,7 +76,8 @@ def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
         parts = [f"{found['white']:.2g} {unit} a period"] if found["white"] else []
         if found["correlated"]:
             size, time = found["correlated"], found["correlation_time"]
-            parts.append(f"{size:.2g} ({unit})/s with a correlation time of {time:.2g} s")
+            law = ", an error of the law" if found["recurs"] else ""
+            parts.append(f"{size:.2g} ({unit})/s with a correlation time of {time:.2g} s{law}")
         words.append(f"{name} {' and '.join(parts)}")
     return f"Disturbances (standard deviations): {'; '.join(words)}."
 

@@ -20,8 +20,9 @@ FEW = 0.02
 
 
 def predictions(context: Context, hypothesis: Hypothesis) -> Sequence[tuple[Floats, Floats, Floats]] | None:
-    """Of each run the whitened errors of a fitted hypothesis' observer, the states and the correlated disturbances that
-    it believes; None: it diverges."""
+    """By run, whitened errors of a fitted hypothesis' observer, with the states and gusts that it believes; None where
+    it diverges.
+    """
     fit = hypothesis.fit
     if fit is None:
         return None
