@@ -104,12 +104,15 @@ def test_what_noise_and_disturbances_explain_is_held_against_no_twin():
     free, frozen = np.array([1e-4, 9.1e-4, 9.1e-4, 1e-2, np.inf]), np.full(5, 1.0)
     expected = np.array([1e-9, 1e-9, 1e-4, 1e-3, 1e-3])
     # Too small to matter, up to 3 % of how far the flight went; then beyond three times what is expected, or not.
-    ratios = unexplained(free, frozen, expected)
+    ratios = unexplained(free, frozen, expected, np.ones(5, bool))
     assert ratios[:3].tolist() == [0.0, pytest.approx(np.sqrt(9.1e5)), pytest.approx(np.sqrt(9.1))]
     assert ratios[3] == pytest.approx(np.sqrt(10.0)) and np.isposinf(ratios[4])
-    assert unexplained(np.array([8e-3]), np.ones(1), np.array([1e-3])).tolist() == [0.0]
-    # Where noise alone makes the twin diverge, it may.
-    assert unexplained(np.array([np.inf]), np.ones(1), np.array([np.inf])).tolist() == [0.0]
+    steered, unsteered = np.array([True]), np.array([False])
+    assert unexplained(np.array([8e-3]), np.ones(1), np.array([1e-3]), steered).tolist() == [0.0]
+    # A flight that its controller kept from diverging did not; under recorded commands alone a twin may, if noise can.
+    lost = np.array([np.inf])
+    assert unexplained(lost, np.ones(1), lost, steered).tolist() == [np.inf]
+    assert unexplained(lost, np.ones(1), lost, unsteered).tolist() == [0.0]
 
 
 def test_commands_of_another_controller_are_found(new_campaign, pendulum):

@@ -380,6 +380,35 @@ def test_predictions_are_those_of_a_plain_loop_and_a_reading_that_does_not_count
     assert left == pytest.approx((errors**2).sum(), rel=1e-9) and counted == 120
 
 
+def test_a_gust_that_is_predicted_is_that_of_a_kalman_filter():
+    """speed' = u + g under a gust g that lasts: state and gust are filtered together."""
+    signals = _core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None])
+    program = _core.Program.parse(program_text(2, 1, 3, [["r2 = r1 * 1.0"]]))
+    model = _core.Model(program, "acceleration", signals)
+    size, time, random = 0.8, 0.5, np.random.default_rng(0)
+    kept, commands = float(np.exp(-DT / time)), np.sin(0.2 * np.arange(120))[:, np.newaxis]
+    gust, speed, readings = [size * random.standard_normal()], 0.0, []
+    for u in [*commands[:, 0], 0.0]:
+        readings.append([speed + np.sqrt(SENSOR) * random.standard_normal()])
+        speed += DT * (u + gust[-1])
+        gust.append(kept * gust[-1] + np.sqrt(1.0 - kept * kept) * size * random.standard_normal())
+    readings = np.array(readings)
+    chain = [([0], [SENSOR], (1e-12, size * size, time), True)]
+    [(_, states, gusts)] = _core.predictions(model, LIMITS, chain, [(readings, np.ones((121, 1)), commands)])
+    moves, believed = np.array([[1.0, DT], [0.0, kept]]), []
+    mean, covariance = np.array([readings[0, 0], 0.0]), np.diag([np.abs(readings).max() ** 2, size * size])
+    for k in range(121):
+        gain = covariance[:, 0] / (covariance[0, 0] + SENSOR)
+        mean = mean + gain * (readings[k, 0] - mean[0])
+        covariance = covariance - np.outer(gain, covariance[0])
+        believed.append(mean)
+        if k < 120:
+            mean = moves @ mean + [DT * commands[k, 0], 0.0]
+            covariance = moves @ covariance @ moves.T + np.diag([1e-12 * DT, (1.0 - kept**2) * size**2])
+    np.testing.assert_allclose(np.column_stack([states, gusts]), believed, rtol=1e-6, atol=1e-9)
+    assert np.corrcoef(gusts[:, 0], gust[:121])[0, 1] > 0.5
+
+
 def test_only_what_is_free_moves_and_the_rest_stays_to_the_bit():
     start = (-0.8, 2.0, 0.12)
     tuned, left, *_ = _core.tune(lagging(*start), LIMITS, CHAIN, [flown(1)], free=[0], lags=[], iterations=30)

@@ -20,9 +20,7 @@ FEW = 0.02
 
 
 def predictions(context: Context, hypothesis: Hypothesis) -> Sequence[tuple[Floats, Floats, Floats]] | None:
-    """By run, whitened errors of a fitted hypothesis' observer, with the states and gusts that it believes; None where
-    it diverges.
-    """
+    """What a fitted hypothesis' observer makes of each run: whitened errors, states and gusts; None: it diverges."""
     fit = hypothesis.fit
     if fit is None:
         return None
