@@ -217,6 +217,21 @@ def test_the_noise_that_made_a_record_is_found(states, integrated, sensors, whit
     assert score <= regression.likelihood([0.0], sensors, (white, 0.0, 1.0)) + 1.0
 
 
+def test_what_a_record_sees_as_a_constant_is_no_correlated_disturbance():
+    """Each record drifts its own way; a disturbance is forgotten four times within one at least."""
+    dense, steps = Dense(1, True), 200
+    nothing, drift = np.zeros((steps, 1)), DT * np.arange(steps + 1.0)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((2, steps + 1))
+    records = [
+        ((sign * drift + noise[i])[:, np.newaxis], np.ones((steps + 1, 1)), nothing, nothing, nothing)
+        for i, sign in enumerate((1.0, -2.0))
+    ]
+    regression = _core.Regression(dense.states, DT, True, records)
+    problem = (regression, [0.0], [1e-6], (1e-9, 1.0, 10.0 * DT), [1e-12], (1e-12, 1e-12, DT))
+    ((_, motion, _),) = _core.most_likely_noises([problem])
+    assert motion[1] > 0.01 and motion[2] == pytest.approx(0.25 * DT * (steps + 1))
+
+
 def test_no_variance_falls_below_its_floor():
     dense = Dense(1, True)
     record = wandering(dense, np.array([1e-4]), (1e-2, 0.0, 1.0), 300, 6)

@@ -66,7 +66,8 @@ pub fn most_likely_noise(
 ) -> (Noise, f64) {
     let d = chain.states;
     let periods = residuals.iter().map(|run| run.len() / d).max().unwrap_or(0) as f64;
-    let longest = (chain.dt * periods / FORGOTTEN).clamp(BRIEFEST_MEMORY * chain.dt, LONGEST_MEMORY * chain.dt);
+    let longest =
+        (chain.dt * periods / FORGOTTEN).clamp(BRIEFEST_MEMORY * chain.dt, LONGEST_MEMORY * chain.dt);
     let mut best = start.clone();
     best.correlation_time = best.correlation_time.min(longest);
     let mut score = likelihood(chain, records, residuals, &best);
