@@ -106,7 +106,7 @@ class _Likelihood:
             return float("inf")
         squares = sum(
             float(np.square(whitened[:, self.states][weights > 0.0]).sum())
-            for (whitened, _), weights in zip(errors, self.counted, strict=True)
+            for (whitened, _, _), weights in zip(errors, self.counted, strict=True)
         )
         determinant = float(self.still.likelihood(np.zeros(1), chain.sensors, chain.motion))
         return squares + determinant + CORRELATED * (chain.motion.correlated > 0.0)
