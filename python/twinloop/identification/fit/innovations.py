@@ -27,6 +27,8 @@ from twinloop.identification.sensors.noise import floor_of
 
 STEPS = (30.0, 5.0, 1.5)
 """Factors by which variances and times are tried in turn, coarse to fine."""
+FORGOTTEN = 4.0
+"""Times that a correlated disturbance is forgotten within the longest record, at least, as in the engine's likelihood."""
 TURNS = 10
 """Times at most that the noise is estimated behind a law, and the law tuned with it."""
 GAIN = 1.0
@@ -87,6 +89,7 @@ class _Likelihood:
         chain = hypothesis.sums[i].chain
         self.states, self.dt = list(chain.states), context.signals.dt
         self.counted = [run.weights[:, self.states] for run in hypothesis.runs]
+        self.longest = self.dt * max(len(weights) for weights in self.counted) / FORGOTTEN
         self.readings = int(sum(weights.sum() for weights in self.counted))
         # The determinant is that of the kinematics: of readings that are 0 nothing else is left.
         nothing = [np.zeros((len(weights) - 1, 1)) for weights in self.counted]
@@ -137,5 +140,5 @@ class _Likelihood:
             for k in range(numbers):
                 motion = list(chain.motion)
                 motion[k] *= factor
-                if motion[k] >= slow[k]:
+                if motion[k] >= slow[k] and (k < 2 or motion[k] <= self.longest):
                     yield chain.with_noise(chain.sensors, (motion[0], motion[1], motion[2]))

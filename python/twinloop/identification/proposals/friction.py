@@ -42,7 +42,7 @@ def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("terms")
     bases = [hypothesis]
     terms = [term for found in hypothesis.sums for term in found.weights]
-    if hypothesis.pool.rung(terms) > 0:
+    if hypothesis.from_above and hypothesis.pool.rung(terms) > 0:
         # Terms of higher rungs and evolved ones may stand in for friction: it is looked for beside few terms, too.
         few = fitted(context, replace(hypothesis, sums=hypothesis.from_above, fit=None))
         bases += [few] if few.evidence.stable else []
