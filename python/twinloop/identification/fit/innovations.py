@@ -28,7 +28,7 @@ from twinloop.identification.sensors.noise import floor_of
 STEPS = (30.0, 5.0, 1.5)
 """Factors by which variances and times are tried in turn, coarse to fine."""
 FORGOTTEN = 4.0
-"""Times that a correlated disturbance is forgotten within the longest record, at least, as in the engine's likelihood."""
+"""Times that a correlated disturbance is forgotten within the longest record, as in the engine's likelihood."""
 TURNS = 10
 """Times at most that the noise is estimated behind a law, and the law tuned with it."""
 GAIN = 1.0
