@@ -97,6 +97,8 @@ def test_a_free_run_that_noise_does_not_explain_is_a_serious_remark():
     assert remarked(flown(), missed=[0.0]) == []
     assert remarked(flown(), missed=[4.5]) == [("free-run", True)]
     assert remarked(flown(), flown(1), missed=[0.0, np.inf]) == [("free-run", True)]
+    assert remarked(flown(), unmoved=["yaw_rate"]) == [("unmoved", True)]
+    assert remarked(flown(), recurring=["yaw_rate"]) == [("model-error", False)]
     assert remarked(flown(), others=[3]) == [("other-commands", True)]
 
 

@@ -74,19 +74,19 @@ def answered(family: Family, genes: Floats, target: Floats) -> float:
         The largest share of the envelope (of the scale, where a state has none) by which a state is off, over all signs
         of the commands; of all errors that it answers so, the smallest. 0 where it answers no error at all.
     """
-    slopes = _slopes(family, genes, target)
-    products = (slopes[:, np.newaxis, :] * slopes[np.newaxis, :, :]).sum(axis=2)
+    sent = slopes(family, genes, target)
+    products = (sent[:, np.newaxis, :] * sent[np.newaxis, :, :]).sum(axis=2)
     values, vectors = _core.eigen(products)
     used = values > UNUSED * values[-1] if values[-1] > 0.0 else np.zeros(len(values), bool)
-    # Pseudo-inverse: slopesᵀ (slopes slopesᵀ)⁺, and the sum of each row's magnitudes.
-    inverse = np.zeros_like(slopes.T)
+    # Pseudo-inverse: sentᵀ (sent sentᵀ)⁺, and the sum of each row's magnitudes.
+    inverse = np.zeros_like(sent.T)
     for value, vector in zip(values[used], vectors[used], strict=True):
-        along = (slopes * vector[:, np.newaxis]).sum(axis=0) / value
+        along = (sent * vector[:, np.newaxis]).sum(axis=0) / value
         inverse += along[:, np.newaxis] * vector[np.newaxis, :]
     return float(np.abs(inverse).sum(axis=1).max())
 
 
-def _slopes(family: Family, genes: Floats, target: Floats) -> Floats:
+def slopes(family: Family, genes: Floats, target: Floats) -> Floats:
     """What a controller at rest sends for an error (n_u, n_x), in scales of the commands for shares of the envelope."""
     columns = []
     scales = np.array([command.size for command in family.signals.commands])

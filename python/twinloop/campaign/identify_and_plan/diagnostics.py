@@ -41,6 +41,7 @@ def diagnostics_of(
     missed: Sequence[float] = (),
     others: Sequence[int] = (),
     recurring: Sequence[str] = (),
+    unmoved: Sequence[str] = (),
 ) -> list[Remark]:
     """What speaks against the data or the twin.
 
@@ -52,6 +53,7 @@ def diagnostics_of(
         missed: times further from each run than noise and disturbances explain that the free run is; 0 where they do.
         others: numbers of the tests whose recorded commands are none that their controllers give.
         recurring: states whose disturbance comes again in flight after flight.
+        unmoved: states that move though their equations say that nothing moves them.
 
     Returns:
         Remarks, none where nothing does.
@@ -65,6 +67,14 @@ def diagnostics_of(
                 f"The commands recorded of test{'s' if len(others) > 1 else ''} {', '.join(map(str, others))} are"
                 " none that its controller gives for the recorded states: check the signs, units and order of states"
                 " and commands, and that the recorded controller is the one that the test names.",
+            )
+        )
+    if unmoved:
+        said.append(
+            serious(
+                "unmoved",
+                f"By the law nothing moves {', '.join(unmoved)}, but the flights show motion that the controller"
+                " answers to: what commands do there is lost in what disturbs. Gains for it cannot be tuned yet.",
             )
         )
     if not follows:

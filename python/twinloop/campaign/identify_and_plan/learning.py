@@ -23,6 +23,7 @@ from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.recurring import recurring_states
 from twinloop.campaign.identify_and_plan.selection import learnt_from
+from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -57,6 +58,7 @@ class Answer:
         followed: free runs of the members.
         follows: whether the best of them follows at least half of the flights.
         recurring: states that an error of the law moves, and no disturbance.
+        unmoved: states that move, and nothing moves them by the law.
         missed: times further from each flight than noise and disturbances explain that the best one is; 0 where they
             do.
     """
@@ -65,6 +67,7 @@ class Answer:
     followed: Following
     follows: bool
     recurring: Sequence[int]
+    unmoved: Sequence[int]
     missed: Sequence[float]
 
     @property
@@ -152,7 +155,8 @@ class Learner:
         followed, follows = self._following(identified, book)
         recurring = self._recurring(identified, book)
         missed = self._unexplained(identified, book, followed, recurring)
-        return Answer(identified, followed, follows, recurring, missed)
+        unmoved = unmoved_states(identified, book.experiments, self.setup)
+        return Answer(identified, followed, follows, recurring, unmoved, missed)
 
     def _following(self, identified: Identified, book: Logbook) -> tuple[Following, bool]:
         """How members follow the flights, and whether the best one, flown by itself, follows at least half of them.
@@ -241,6 +245,7 @@ class Learner:
                     answer.missed,
                     () if follows else other_commands(book.experiments),
                     recurring,
+                    [self.setup.signals.state_names[state] for state in answer.unmoved],
                 ),
             ),
             recurring=tuple(recurring),

@@ -1,0 +1,55 @@
+"""Unmoved: states whose equation says that nothing moves them, though they move and the controller answers to them.
+
+In gusts a gentle flight shows of an axis what disturbs it, and little of what commands do. A twin without a law for it
+may follow the flights on the other axes; gains that are tuned on it are worth nothing there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment
+from twinloop.campaign.setup import Setup
+from twinloop.identification.identified import Identified
+from twinloop.identification.sensors.chains import driven_states
+from twinloop.law.law import Law
+from twinloop.planning.excitation import slopes
+
+MOVED = 3.0
+"""Standard deviations of its sensor by which a state deviates from a straight line if it moves."""
+
+
+def unmoved_states(identified: Identified, experiments: Sequence[Experiment], setup: Setup) -> list[int]:
+    """Driven states with an empty equation that move, and that the controller answers to, or to their integrals.
+
+    Args:
+        identified: with the model.
+        experiments: that it was learnt from.
+        setup: of the campaign.
+    """
+    signals, model = setup.signals, identified.model
+    law, sensors = Law.of(model, signals), identified.sensors(signals.n_x)
+    target = np.atleast_2d(setup.target_state)[0]
+    middle = np.array([0.5 * (gain.low + gain.high) for gain in setup.family.gains])
+    answered = (slopes(setup.family, middle, target) != 0.0).any(axis=0)
+    by_first = {found.chain.states[0]: list(found.chain.states) for found in identified.sums}
+    return [
+        first
+        for first, output in zip(driven_states(signals, model.form), law.outputs, strict=True)
+        if law.expressions.constant_value(output) is not None
+        and answered[by_first[first]].any()
+        and any(_moved(run.trajectory.states[:, first], sensors[first]) for run in experiments)
+    ]
+
+
+def _moved(readings: Floats, sensor: float) -> bool:
+    """Whether readings of a state bend away from a straight line by more than its sensor scatters."""
+    if len(readings) < 3:
+        return False
+    times = np.arange(len(readings)) - 0.5 * (len(readings) - 1)
+    off = readings - readings.mean()
+    off = off - times * float((times * off).sum() / np.square(times).sum())
+    return bool(off.std() > MOVED * sensor)

@@ -1,0 +1,50 @@
+"""States of which a law says that nothing moves them, though they move."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+import twinloop as tl
+from strategies import program_text
+from twinloop import _core
+from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
+
+STEPS, SENSOR = 100, 1e-3
+SIGNALS = tl.Signals(
+    [
+        tl.State("angle", "rad", 1.0),
+        tl.State("rate", "rad/s", 5.0, derivative_of="angle"),
+        tl.State("airspeed", "m/s", 10.0),
+    ],
+    [tl.Command("torque", "N m", (-10.0, 10.0), scale=1.0)],
+    0.02,
+)
+FAMILY = tl.controllers.PID(
+    axes=[("angle", "rate")], gains={"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 1.0), "angle.kd": (0.0, 2.0)}
+).bind(SIGNALS)
+SETUP = SimpleNamespace(signals=SIGNALS, family=FAMILY, target_state=np.zeros(3))
+
+
+def found(rate, motion):
+    """What is unmoved if the first output is `rate` and the second one nothing, and every state moves by `motion`."""
+    program = _core.Program.parse(program_text(4, 2, 6, [[rate, "r5 = r5 + 0.0"]]))
+    identified = SimpleNamespace(
+        model=_core.Model(program, "acceleration", SIGNALS.engine),
+        sensors=lambda n_x: np.full(n_x, SENSOR),
+        sums=[SimpleNamespace(chain=SimpleNamespace(states=states)) for states in ((1, 0), (2,))],
+    )
+    noise = SENSOR * np.random.default_rng(0).standard_normal((STEPS + 1, 3))
+    flight = SimpleNamespace(trajectory=SimpleNamespace(states=noise + motion[:, np.newaxis]))
+    return unmoved_states(identified, [flight], SETUP)
+
+
+def test_an_empty_equation_of_a_state_that_moves_and_that_the_controller_answers_to_is_found():
+    """The angle's controller answers to the rate; nobody answers to the airspeed, which may do what it likes."""
+    turning = np.sin(np.linspace(0.0, 3.0, STEPS + 1))
+    assert found("r4 = r4 + 0.0", turning) == [1]
+    assert found("r4 = r3 * 2.0", turning) == []
+
+
+def test_noise_and_a_straight_line_are_no_motion():
+    assert found("r4 = r4 + 0.0", np.linspace(0.0, 5.0, STEPS + 1)) == []
+    assert found("r4 = r4 + 0.0", np.zeros(STEPS + 1)) == []
