@@ -6,6 +6,7 @@ import pytest
 import twinloop as tl
 from strategies import program_text
 from twinloop import _core
+from twinloop.law.forms import DERIVATIVES
 
 SIGNALS = tl.Signals(
     states=[tl.State("angle", "rad", 3.0), tl.State("rate", "rad/s", 8.0, derivative_of="angle")],
@@ -55,7 +56,7 @@ def flown(twin, steps=60, seed=0):
 
 def model_of(lines, form="acceleration", signals=SIGNALS, inputs=4, actuators=None, hidden=()):
     """What the engine flies."""
-    outputs = len(signals.driven) if form == "acceleration" else signals.n_x
+    outputs = len(signals.driven) if form in DERIVATIVES else signals.n_x
     program = _core.Program.parse(program_text(inputs, outputs, inputs + outputs + 6, [lines]))
     return _core.Model(program, form, signals.engine, actuators, hidden)
 
@@ -87,6 +88,12 @@ TWINS = {
     "absolute": lambda: twin_of(
         ["r4 = r1 * 0.05", "r4 = r4 + r0", "r5 = r1 * 0.9", "r6 = r3 * 0.01", "r5 = r5 - r6"], "absolute",
     ),
+    "explicit Euler": lambda: twin_of(PENDULUM, "explicit-euler"),
+    "semi-implicit Euler": lambda: twin_of(PENDULUM, "semi-implicit-euler"),
+    "semi-implicit Euler, actuators and hidden states": lambda: twin_of(
+        FILLED, "semi-implicit-euler", inputs=5, offsets=(0.003, 0.0),
+        actuators=[(0.08, 2, None), (0.0, 1, 2.0)], hidden=[((0, 1), True, None, 0.7)],
+    ),
     "actuators and hidden states": lambda: twin_of(
         FILLED, inputs=5, offsets=(0.003, 0.0),
         actuators=[(0.08, 2, None), (0.0, 1, 2.0)], hidden=[((0, 1), True, None, 0.7)],
@@ -100,6 +107,13 @@ TWINS = {
     ),
     "kinematics": lambda: twin_of(
         ["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], signals=BODY, inputs=7,
+    ),
+    "kinematics, explicit Euler": lambda: twin_of(
+        ["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], "explicit-euler", BODY, inputs=7,
+    ),
+    "kinematics, semi-implicit Euler": lambda: twin_of(
+        ["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], "semi-implicit-euler", BODY, inputs=7,
+        actuators=[(0.04, 1, 0.5)],
     ),
     "kinematics in several steps": lambda: twin_of(
         ["r7 = r6 * 20.0", "r8 = r3 * r5", "r8 = r8 * -0.3", "r9 = sin(r0)"], signals=FAST_BODY, inputs=7,

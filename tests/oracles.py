@@ -91,7 +91,7 @@ def rk4(derivative, state, dt):
 
 
 def model_step(program, form, state, command, scales, derivative_of, dt):
-    """Next state under a program of one of the three forms."""
+    """Next state under a program of any form."""
     state = np.asarray(state, dtype=float)
     seen = np.asarray(command) * (1.0 / np.asarray(scales))
 
@@ -104,12 +104,30 @@ def model_step(program, form, state, command, scales, derivative_of, dt):
         if form == "increment":
             return state + outputs(state)
         rate_of = {of: rate for rate, of in enumerate(derivative_of) if of is not None}
+        if form.endswith("euler"):
+            return euler(form, outputs(state), state, rate_of, dt)
 
         def derivative(x):
             rest = iter(outputs(x))
             return np.array([x[rate_of[i]] if i in rate_of else next(rest) for i in range(len(x))])
 
         return rk4(derivative, state, dt)
+
+
+def euler(form, slopes, state, rate_of, dt):
+    """One step of Euler, explicit or semi-implicit."""
+    after, rest = state.copy(), iter(slopes)
+    for i in range(len(state)):
+        if i not in rate_of:
+            after[i] = state[i] + next(rest) * dt
+    moving = state if form == "explicit-euler" else after
+    # Semi-implicit, a rate is moved before what it is the rate of.
+    depth = {i: 0 for i in range(len(state)) if i not in rate_of}
+    while len(depth) < len(state):
+        depth |= {i: depth[rate] + 1 for i, rate in rate_of.items() if rate in depth and i not in depth}
+    for i in sorted(rate_of, key=depth.get):
+        after[i] = state[i] + moving[rate_of[i]] * dt
+    return after
 
 
 class Pid:

@@ -18,7 +18,7 @@ _Hidden = tuple[Sequence[int], bool, float | None, float]
 """Commands, whether their squares fill it, their mean at rest (scaled; None: of the first period), and time (s)."""
 _Motion = tuple[float, float, float]
 """Variance of a white disturbance, variance of a lasting one, time after which that is forgotten to 1/e (s)."""
-_Chain = tuple[Sequence[int], Sequence[float], _Motion, bool]
+_Chain = tuple[Sequence[int], Sequence[float], _Motion, str]
 """States, the driven one first; variance of each sensor; disturbances; whether features are derivatives."""
 _Gains = Sequence[float | tuple[float, float, bool]]
 """Of a law in its order: a number that fixes a gain, or low, high and whether the scale is logarithmic."""
@@ -242,7 +242,8 @@ class Signals:
 
 @final
 class Model:
-    """A program with the form that makes it dynamics: "absolute", "increment" or "acceleration"."""
+    """A program with the form that makes it dynamics: "absolute", "increment", "acceleration", "explicit-euler" or
+    "semi-implicit-euler"."""
 
     def __new__(
         cls,
@@ -616,7 +617,7 @@ class Regression:
         cls,
         states: int,
         dt: float,
-        integrated: bool,
+        form: str,
         records: Sequence[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike]],
     ) -> Regression:
         """records: readings and weights (n + 1, states), features at start, middle and end (n, p)."""

@@ -9,6 +9,7 @@ import twinloop as tl
 from lives import StopAt
 from oracles import final_distance, same_bits
 from twinloop import pareto
+from twinloop.law.forms import FORMS
 from twinloop.objectives import closed_loop, frozen_error, open_loop, selected_tests
 
 GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
@@ -441,7 +442,7 @@ def test_the_quadrotor_goes_through_the_front_page(tiny):
     assert test.steps == 100
 
 
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("tradeoff", ["raw", "normalised"])
 def test_every_form_and_trade_off_makes_a_whole_campaign(new_campaign, pendulum, form, tradeoff):
     campaign = new_campaign(options={"form": form, "tradeoff": tradeoff}).run(pendulum, 2)

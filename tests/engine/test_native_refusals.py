@@ -85,11 +85,11 @@ class World:
         self.envelope = [(-2.0, 2.0)] * n_x
         self.noise = np.zeros((1, 5, n_x))
         self.excitation, self.disturbance = np.zeros((1, 4, n_u)), np.zeros((1, 4, n_x))
-        self.chains = [([i], [0.01], (0.01, 0.0, 1.0), False) for i in range(n_x)]
+        self.chains = [([i], [0.01], (0.01, 0.0, 1.0), "increment") for i in range(n_x)]
         self.records = [(self.states, np.ones((5, n_x)), self.commands)]
         features = random.normal(size=(4, n_x))
         self.readings = [(self.states[:, :1], np.ones((5, 1)), features, features, features)]
-        self.regression = _core.Regression(1, dt, True, self.readings)
+        self.regression = _core.Regression(1, dt, "acceleration", self.readings)
         self.coefficients, self.sensors, self.motion = np.ones(n_x), np.full(1, 0.1), (0.1, 0.0, 1.0)
         self.gram = self.regression.gram(self.sensors, self.motion)
         self.search = _core.ModelSearch.start(
@@ -302,7 +302,7 @@ def calls(world):
         ),
         "Regression": (
             _core.Regression,
-            {"states": 1, "dt": w.dt, "integrated": True, "records": w.readings},
+            {"states": 1, "dt": w.dt, "form": "acceleration", "records": w.readings},
         ),
         "Regression.residuals": (w.regression.residuals, {"coefficients": w.coefficients}),
         "Regression.likelihood": (w.regression.likelihood, {"coefficients": w.coefficients, **motion}),

@@ -7,6 +7,8 @@ from conftest import setting_of
 from oracles import Pid, close_loop, final_distance, model_step, same_bits
 from strategies import program_text
 from twinloop import _core, objectives
+from twinloop.law.forms import DERIVATIVES as RATES
+from twinloop.law.forms import FORMS
 
 GROUPS = [1, 2, 5, 9, 33]
 """Numbers of runs that fill groups of lanes in every way."""
@@ -26,7 +28,7 @@ def drawn(count, seed=0):
 
 def models(rig, form, count=3):
     """Random models, one that is sure to move and one that is sure to run away among them."""
-    outputs = 1 if form == "acceleration" else 2
+    outputs = 1 if form in RATES else 2
     text = program_text(4, outputs, 4 + outputs, [[f"r{4 + k} = r{k} * 1.3" for k in range(outputs)]])
     programs = [_core.Program.parse(text), *_core.Grammar(4, outputs).random(11, count)]
     return [_core.Model(program, form, rig) for program in programs]
@@ -46,7 +48,7 @@ def agree(form, found, expected):
         assert same_bits(found, expected)
 
 
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", GROUPS)
 def test_a_roll_out_is_the_plain_loop(rig, rig_setting, form, count):
     task, genes = _core.Task(START, TARGET, 15), drawn(count)
@@ -76,7 +78,7 @@ def test_the_controller_reads_the_noise_and_the_model_does_not(rig, rig_setting,
         assert same_bits(runs.commands[i, :lasted], commands)
 
 
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", GROUPS)
 def test_excitation_moves_the_commands_and_disturbance_the_true_state(rig, rig_setting, form, count):
     stream, steps = np.random.default_rng(4), 12
@@ -123,7 +125,7 @@ def test_a_python_function_is_rolled_out_like_a_model(rig, rig_setting):
     assert same_bits(called.commands, learnt.commands)
 
 
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", GROUPS)
 def test_final_distances_are_those_of_the_plain_loop(rig, rig_setting, form, count):
     task, genes, several = _core.Task(START, TARGET, 10), drawn(count), models(rig, form)
@@ -149,7 +151,7 @@ def selected(rig_setting, count):
     return tests, recorded
 
 
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", GROUPS)
 def test_the_open_loop_error_is_the_mean_square_one_step_ahead(rig, rig_setting, form, count):
     tests, recorded = selected(rig_setting, count)
@@ -167,7 +169,7 @@ def test_the_open_loop_error_is_the_mean_square_one_step_ahead(rig, rig_setting,
             assert row[k] == pytest.approx(expected if np.isfinite(expected) else np.inf, rel=1e-9)
 
 
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", GROUPS)
 def test_the_closed_loop_error_is_that_of_the_free_run_under_the_tests_controller(
     rig, rig_setting, form, count

@@ -186,7 +186,9 @@ def test_a_pool_comes_back_as_it_was(pool):
 
 @given(ANY_NUMBER, st.lists(ANY_NUMBER, max_size=4))
 def test_numbers_come_back_to_the_bit_those_that_json_cannot_write_too(number, several):
-    chain = Chain((0,), None, True, np.array(several), np.array([number, 1.0]), Motion(number, 0.0, 1.0))
+    chain = Chain(
+        (0,), None, "acceleration", np.array(several), np.array([number, 1.0]), Motion(number, 0.0, 1.0)
+    )
     assert same(again(chain), chain)
 
 
@@ -392,7 +394,7 @@ def test_a_pool_that_never_was_is_refused(nodes):
 def test_what_was_identified_of_other_signals_is_refused(pendulum_signals, quadrotor):
     pool = Pool(3)
     program = pool.program_of_sums([{0: 1.0}])
-    chain = Chain((1, 0), 0, True, np.ones(2), np.ones(2))
+    chain = Chain((1, 0), 0, "acceleration", np.ones(2), np.ones(2))
     model = _core.Model(program, "acceleration", pendulum_signals.engine)
     direct = Actuation.direct(pendulum_signals)
     sums = [Sum({0: 1.0}, 2.0, chain, [((0,), 1.0)])]

@@ -19,7 +19,7 @@ def inner_products(seed, features=4, steps=30):
     states = np.cumsum(np.vstack([np.zeros(1), values @ draw.normal(size=(features, 1))]), axis=0)
     states += 0.3 * draw.normal(size=states.shape)
     record = (states, np.ones_like(states), values, values, values)
-    return _core.Regression(1, 1.0, False, [record]).gram([1.0], QUIET)
+    return _core.Regression(1, 1.0, "increment", [record]).gram([1.0], QUIET)
 
 
 @given(st.integers(0, 2**32 - 1), st.data())

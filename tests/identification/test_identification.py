@@ -371,7 +371,7 @@ def test_terms_that_exact_runs_cannot_tell_apart_are_left_out():
     twins = np.hstack([features, features])
     measured = np.vstack([np.zeros((1, 1)), np.cumsum(features @ [[1.0], [2.0], [0.0]], axis=0)])
     record = (measured, np.ones_like(measured), twins, twins, twins)
-    gram = _core.Regression(1, 1.0, False, [record]).gram([1e-6], (1e-9, 0.0, 1.0))
+    gram = _core.Regression(1, 1.0, "increment", [record]).gram([1e-6], (1e-9, 0.0, 1.0))
     both, prices_ = [(0, 1, 3), (1, 4)], np.ones(6)
     assert all(gram.solve(list(subset)) is None for subset in both)
     found = all_judged(gram, both, prices_, {})

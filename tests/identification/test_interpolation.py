@@ -75,7 +75,7 @@ def test_a_sensor_far_better_than_the_root_of_rounding_is_believed():
     # Of a level that stays, the second reading differs from the first by two errors.
     error, apart, size = 1e-11, 2e-11, 3.0
     record = ([[size], [size + apart]], np.ones((2, 1)), *(np.zeros((1, 1)) for _ in range(3)))
-    regression = _core.Regression(1, 0.1, False, [record])
+    regression = _core.Regression(1, 0.1, "increment", [record])
     found = regression.likelihood([0.0], [error**2], (1e-40, 0.0, 1.0))
     spread = (size + apart) ** 2
     expected = np.log(spread) + size**2 / spread + np.log(2.0 * error**2) + apart**2 / (2.0 * error**2)

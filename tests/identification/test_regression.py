@@ -18,15 +18,21 @@ QUIET = (0.0, 0.0, 1.0)
 class Dense:
     """A chain of states written as one big normal distribution: what reading after reading of a filter should give."""
 
-    def __init__(self, states, integrated, dt=DT):
-        self.states, self.integrated, self.dt = states, integrated, dt
-        self.drift = np.diag(np.ones(states - 1), -1) if integrated else np.zeros((states, states))
+    def __init__(self, states, form, dt=DT):
+        self.states, self.form, self.dt = states, form, dt
+        self.drift = np.diag(np.ones(states - 1), -1) if form != "increment" else np.zeros((states, states))
         self.transition = expm(self.drift * dt)
+        if form == "explicit-euler":
+            self.transition = np.eye(states) + dt * self.drift
+        if form == "semi-implicit-euler":
+            # Of x⁺ = x + dt v⁺, one state after another.
+            self.transition = np.linalg.inv(np.eye(states) - dt * self.drift)
 
     def disturbance(self, variance):
         """Covariance of what white noise adds in a period, by quadrature."""
-        if not self.integrated:
-            return np.diag([variance] + [0.0] * (self.states - 1))
+        if self.form != "acceleration":
+            push = variance if self.form == "increment" else variance / self.dt
+            return push * np.outer(self.reach, self.reach)
         places, weights = np.polynomial.legendre.leggauss(8)
         columns = [expm(self.drift * 0.5 * self.dt * (1 + s))[:, 0] for s in places]
         return (
@@ -36,8 +42,9 @@ class Dense:
     @cached_property
     def reach(self):
         """What a held disturbance of 1 adds in a period, by quadrature."""
-        if not self.integrated:
-            return np.eye(self.states)[0]
+        if self.form != "acceleration":
+            first = np.eye(self.states)[0] * (1.0 if self.form == "increment" else self.dt)
+            return self.transition @ first if self.form == "semi-implicit-euler" else first
         places, weights = np.polynomial.legendre.leggauss(8)
         columns = [expm(self.drift * 0.5 * self.dt * (1 + s))[:, 0] for s in places]
         return 0.5 * self.dt * sum(w * c for w, c in zip(weights, columns, strict=True))
@@ -71,12 +78,12 @@ class Dense:
         for k in range(steps):
             state = self.transition @ state
             for m in range(self.states):
-                if self.integrated:
+                if self.form == "acceleration":
                     kernel = [(self.dt - s) ** m / max(1, m * (m - 1)) for s in (0, self.dt / 2, self.dt)]
                     simpson = kernel[0] * start[k] + 4 * kernel[1] * middle[k] + kernel[2] * end[k]
                     state[m] += self.dt / 6 * simpson
-                elif m == 0:
-                    state[m] += start[k]
+                else:
+                    state[m] += self.reach[m] * start[k]
             rows.append(state.copy())
         return np.concatenate(rows)
 
@@ -98,7 +105,8 @@ def drawn(dense, seed, steps=30, p=3, runs=2, sensors=1e-3, ignored=0):
     return records, truth
 
 
-CASES = [(1, False), (1, True), (2, True), (3, True)]
+CASES = [(1, "increment"), *((n, "acceleration") for n in (1, 2, 3))]
+CASES += [(n, form) for n in (1, 3) for form in ("explicit-euler", "semi-implicit-euler")]
 MOTIONS = [QUIET, (1e-3, 0.0, 1.0), (1e-4, 0.05, 0.2)]
 
 
@@ -114,13 +122,13 @@ def dense_problem(dense, records, sensors, motion):
 
 
 @pytest.mark.parametrize("motion", MOTIONS, ids=["quiet", "white", "gusts"])
-@pytest.mark.parametrize(("states", "integrated"), CASES)
+@pytest.mark.parametrize(("states", "form"), CASES)
 @pytest.mark.parametrize("ignored", [0, 5])
-def test_least_squares_are_those_of_the_whole_covariance(states, integrated, motion, ignored):
-    dense = Dense(states, integrated)
+def test_least_squares_are_those_of_the_whole_covariance(states, form, motion, ignored):
+    dense = Dense(states, form)
     records, _ = drawn(dense, 3, ignored=ignored)
     sensors = np.array([1e-3, 4e-3, 2e-3])[:states]
-    regression = _core.Regression(states, DT, integrated, records)
+    regression = _core.Regression(states, DT, form, records)
     gram = regression.gram(sensors, motion)
     assert gram.features == 3 and gram.readings == sum(int(r[1].sum()) for r in records)
     left, right = [], []
@@ -164,13 +172,13 @@ def test_more_rows_are_more_rows():
 
 
 @pytest.mark.parametrize("motion", MOTIONS, ids=["quiet", "white", "gusts"])
-@pytest.mark.parametrize(("states", "integrated"), CASES)
+@pytest.mark.parametrize(("states", "form"), CASES)
 @pytest.mark.parametrize("ignored", [0, 5])
-def test_the_likelihood_is_that_of_one_big_normal_distribution(states, integrated, motion, ignored):
-    dense = Dense(states, integrated)
+def test_the_likelihood_is_that_of_one_big_normal_distribution(states, form, motion, ignored):
+    dense = Dense(states, form)
     records, truth = drawn(dense, 4, ignored=ignored)
     sensors = np.array([1e-3, 4e-3, 2e-3])[:states]
-    regression = _core.Regression(states, DT, integrated, records)
+    regression = _core.Regression(states, DT, form, records)
     expected = 0.0
     for z, f, covariance in dense_problem(dense, records, sensors, motion):
         density = multivariate_normal(cov=covariance, allow_singular=False).logpdf(z - f @ truth)
@@ -200,13 +208,17 @@ def wandering(dense, sensors, motion, steps, seed):
 
 
 @pytest.mark.parametrize(
-    ("states", "integrated", "sensors", "white"),
-    [(1, False, [1e-2], 1e-3), (1, True, [1e-3], 1e-2), (2, True, [1e-2, 1e-4], 0.05)],
+    ("states", "form", "sensors", "white"),
+    [
+        (1, "increment", [1e-2], 1e-3),
+        (1, "acceleration", [1e-3], 1e-2),
+        (2, "acceleration", [1e-2, 1e-4], 0.05),
+    ],
 )
-def test_the_noise_that_made_a_record_is_found(states, integrated, sensors, white):
-    dense = Dense(states, integrated)
+def test_the_noise_that_made_a_record_is_found(states, form, sensors, white):
+    dense = Dense(states, form)
     record = wandering(dense, np.array(sensors), (white, 0.0, 1.0), 1500, 5)
-    regression = _core.Regression(states, DT, integrated, [record])
+    regression = _core.Regression(states, DT, form, [record])
     low, none = np.full(states, 1e-12), (1e-12, 0.0, 1.0)
     start = (30.0 * white, 0.0, 1.0)
     problem = (regression, [0.0], np.full(states, 1e-3), start, low, none)
@@ -233,9 +245,9 @@ def test_what_a_record_sees_as_a_constant_is_no_correlated_disturbance():
 
 
 def test_no_variance_falls_below_its_floor():
-    dense = Dense(1, True)
+    dense = Dense(1, "acceleration")
     record = wandering(dense, np.array([1e-4]), (1e-2, 0.0, 1.0), 300, 6)
-    regression = _core.Regression(1, DT, True, [record])
+    regression = _core.Regression(1, DT, "acceleration", [record])
     problem = (regression, [0.0], [1.0], (1.0, 0.0, 1.0), [0.5], (0.25, 0.0, 1.0))
     ((found, motion, _),) = _core.most_likely_noises([problem])
     assert found[0] == 0.5 and motion[0] == 0.25
@@ -244,20 +256,20 @@ def test_no_variance_falls_below_its_floor():
 @pytest.mark.parametrize(
     "wrong",
     [
-        lambda r: _core.Regression(0, DT, True, [r]),
-        lambda r: _core.Regression(5, DT, True, [r]),
-        lambda r: _core.Regression(1, 0.0, True, [r]),
-        lambda r: _core.Regression(1, DT, True, [(r[0][:-1], *r[1:])]),
-        lambda r: _core.Regression(1, DT, True, [(np.full_like(r[0], np.nan), *r[1:])]),
-        lambda r: _core.Regression(1, DT, True, [r]).gram([0.0], QUIET),
-        lambda r: _core.Regression(1, DT, True, [r]).gram([1.0, 1.0], QUIET),
-        lambda r: _core.Regression(1, DT, True, [r]).gram([1.0], (-1.0, 0.0, 1.0)),
-        lambda r: _core.Regression(1, DT, True, [r]).gram([1.0], QUIET).solve([7]),
-        lambda r: _core.Regression(1, DT, True, [r]).likelihood([1.0, 2.0], [1.0], QUIET),
+        lambda r: _core.Regression(0, DT, "acceleration", [r]),
+        lambda r: _core.Regression(5, DT, "acceleration", [r]),
+        lambda r: _core.Regression(1, 0.0, "acceleration", [r]),
+        lambda r: _core.Regression(1, DT, "acceleration", [(r[0][:-1], *r[1:])]),
+        lambda r: _core.Regression(1, DT, "acceleration", [(np.full_like(r[0], np.nan), *r[1:])]),
+        lambda r: _core.Regression(1, DT, "acceleration", [r]).gram([0.0], QUIET),
+        lambda r: _core.Regression(1, DT, "acceleration", [r]).gram([1.0, 1.0], QUIET),
+        lambda r: _core.Regression(1, DT, "acceleration", [r]).gram([1.0], (-1.0, 0.0, 1.0)),
+        lambda r: _core.Regression(1, DT, "acceleration", [r]).gram([1.0], QUIET).solve([7]),
+        lambda r: _core.Regression(1, DT, "acceleration", [r]).likelihood([1.0, 2.0], [1.0], QUIET),
     ],
 )
 def test_what_no_regression_can_be_made_of_is_refused(wrong):
-    records, _ = drawn(Dense(1, True), 0, runs=1)
+    records, _ = drawn(Dense(1, "acceleration"), 0, runs=1)
     with pytest.raises(ValueError, match="expected"):
         wrong(records[0])
 
@@ -277,7 +289,7 @@ def problem(seed, p=8, twins=False, zero=False):
     measured = np.zeros((steps + 1, 1))
     measured[1:, 0] = np.cumsum(features[:, :3] @ stream.normal(size=3) + 0.3 * stream.normal(size=steps))
     record = (measured, np.ones_like(measured), features, features, features)
-    gram = _core.Regression(1, 1.0, False, [record]).gram([1e-3], (0.1, 0.0, 1.0))
+    gram = _core.Regression(1, 1.0, "increment", [record]).gram([1e-3], (0.1, 0.0, 1.0))
     return gram, stream.uniform(1.0, 12.0, p)
 
 
@@ -344,8 +356,8 @@ def test_a_search_gives_the_same_bits_for_any_number_of_threads():
         assert same_bits([e for _, e in a], [e for _, e in b])
     grown = [problem(seed)[0] for seed in range(3)]
     assert all(same_bits([a.total], [b.total]) for a, b in zip(grams, grown, strict=True))
-    records, _ = drawn(Dense(2, True), 1, runs=5)
-    regression = _core.Regression(2, DT, True, records)
+    records, _ = drawn(Dense(2, "acceleration"), 1, runs=5)
+    regression = _core.Regression(2, DT, "acceleration", records)
     parts = [
         regression.gram([1e-3, 1e-3], (1e-3, 0.0, 1.0), _core.Workers(threads=threads)).solve([0, 1, 2])
         for threads in (1, 2)

@@ -183,6 +183,39 @@ def test_an_acceleration_is_written_as_derivatives():
     assert same_bits(read(text, [[2.0, 7.0, 0.25, 0.0]]), [[7.0, -0.75]])
 
 
+def later(text):
+    """With names in the place of states a period later."""
+    return text.replace("[k+1]", "_later")
+
+
+@pytest.mark.parametrize("form", ["explicit-euler", "semi-implicit-euler"])
+def test_a_step_of_euler_is_written_as_the_state_and_a_period_times_its_derivative(form):
+    law = law_of(parsed(4, 1, 5, ["r4 = r0 * -0.5", "r4 = r4 + r2"]), form)
+    text = equations(law)
+    after = "[k+1]" if form == "semi-implicit-euler" else ""
+    assert f"x[k+1] = x + 0.1*v{after}" in text and "v[k+1] = v + 0.1*(-0.5*x + u_scaled)" in text
+    inputs = np.array([[1.0, 2.0, 0.5, 0.1], [3.0, -2.0, 0.0, 0.1]])
+    values = dict(zip(NAMES, inputs.T, strict=True))
+    for left, right in reversed(written(later(equations(law, digits=17)))):
+        values[left] = evaluate(right, values)
+    found = np.stack([values["x_later"], values["v_later"]], axis=1)
+    assert same_bits(found, law.model().step(inputs[:, :2], inputs[:, 2:] * [2.0, 1.0]))
+
+
+def test_the_constants_of_a_step_of_euler_have_their_spread():
+    drags = [-0.5, -0.52, -0.47]
+    members = [
+        law_of(parsed(4, 1, 6, [f"r4 = r1 * {drag}", "r5 = r0 * 0.25", "r4 = r4 + r5"]), "explicit-euler")
+        for drag in drags
+    ]
+    text = equations(members[0], members)
+    (line,) = (line for line in text.splitlines() if "0.5*v" in line)
+    assert line.endswith(f"# ± {np.std(drags, ddof=1):.2g}")
+    right = dict(written(later(text)))["v_later"]
+    x, v = sympy.symbols("x v")
+    assert sympy.expand(sympy.sympify(right) - (v + 0.1 * (0.25 * x - 0.5 * v))) == 0
+
+
 def test_the_legend_says_what_the_symbols_mean():
     text = equations(law_of(parsed(4, 2, 6, ["r4 = r2 / r3", "r5 = sqrt(r0)"])))
     assert "# u_scaled = u / 2, u in V" in text

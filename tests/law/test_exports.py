@@ -29,6 +29,7 @@ from twinloop.law.exports.simulations import (
     python_simulation,
 )
 from twinloop.law.exports.taking import compared
+from twinloop.law.forms import DERIVATIVES
 from twinloop.law.noise import CorrelatedDisturbance, Noise
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
@@ -63,7 +64,9 @@ def test_modules_for_other_packages_simulate_what_the_twin_does(which, kind, tmp
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("which", ["acceleration", "actuators and hidden states", "kinematics"])
+@pytest.mark.parametrize(
+    "which", ["acceleration", "actuators and hidden states", "kinematics", "kinematics, semi-implicit Euler"]
+)
 def test_casadi_differentiates_a_step_as_the_twin_does(which):
     pytest.importorskip("casadi")
     twin, names = TWINS[which](), {}
@@ -183,13 +186,22 @@ def test_sympy_has_the_equations_with_all_digits(which, tmp_path):
             )
             continue
         state, command = row[:n_x], row[n_x:] * scales
-        if law.form == "acceleration":
+        if law.form in DERIVATIVES:
             tiny = tl.Signals(twin.signals.states, twin.signals.commands, 1e-5, twin.signals.kinematics)
             after = _core.Model(twin.model.program, law.form, tiny.engine).step(state[None], command[None])[0]
             np.testing.assert_allclose(found, (after - state) / 1e-5, rtol=1e-3, atol=1e-4)
         else:
             after = twin.predict(state, command) - (state if law.form == "increment" else 0.0)
             np.testing.assert_allclose(found, after, rtol=1e-12)
+
+
+def test_latex_of_a_step_of_euler_says_which_of_the_states_goes_on_by_which():
+    text = twin_of(PENDULUM, "semi-implicit-euler").export("latex")
+    assert r"\mathit{angle}_{k+1} &= \mathit{angle} + 0.05 \left(\mathit{rate}_{k+1}\right) \\" in text
+    assert r"\mathit{rate}_{k+1} &= \mathit{rate} + 0.05 \left(" in text and "mathrm{d}" not in text
+    assert r"+ 0.05 \left(\mathit{rate}\right)" in twin_of(PENDULUM, "explicit-euler").export("latex")
+    body = TWINS["kinematics, semi-implicit Euler"]().export("latex")
+    assert r"\mathit{q}_{k+1} \, \cos\left(\mathit{roll}\right)" in body and "t_" not in body
 
 
 def test_latex_says_what_the_equations_say():
@@ -204,7 +216,10 @@ def test_a_twin_comes_back_in_another_process_with_the_same_numbers(tmp_path):
     errors = [TestErrors(0, 1e-5, 2e-5, 0.01, None, 2e-5)]
     lone = TWINS["actuators and hidden states"]()
     noise = Noise(
-        np.array([1e-3, 5e-3]), np.array([0.0, 1e-3]), (CorrelatedDisturbance((1, 0), True, 0.1, 0.3),), 0.05
+        np.array([1e-3, 5e-3]),
+        np.array([0.0, 1e-3]),
+        (CorrelatedDisturbance((1, 0), "acceleration", 0.1, 0.3),),
+        0.05,
     )
     twin = tl.Twin(
         lone.model, SIGNALS, errors, members=[lone.model], noise=noise, seed=3, inflation=1.5,

@@ -42,7 +42,7 @@ def write(folder=FOLDER):
         noise = Noise(
             np.full(bare.signals.n_x, 1e-3),
             np.zeros(bare.signals.n_x),
-            (CorrelatedDisturbance((1, 0), True, 0.1, 0.3),) if bare.signals is SIGNALS else (),
+            (CorrelatedDisturbance((1, 0), "acceleration", 0.1, 0.3),) if bare.signals is SIGNALS else (),
             0.05,
         )
         twin = tl.Twin(

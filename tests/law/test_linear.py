@@ -14,6 +14,7 @@ from law_twins import PENDULUM, SIGNALS, model_of
 from strategies import programs
 from twinloop.errors import NotAvailable
 from twinloop.law.expressions import Expressions
+from twinloop.law.forms import DERIVATIVES, FORMS
 from twinloop.law.law import Law
 from twinloop.law.linear.controller import linear_controller
 from twinloop.law.linear.jacobian import jacobian
@@ -49,9 +50,9 @@ def test_derivatives_are_those_of_differences(program, seed):
     np.testing.assert_allclose(slopes, fine, rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 def test_over_a_period_it_moves_as_the_twin_predicts(form):
-    lines = PENDULUM if form == "acceleration" else [*PENDULUM, "r5 = r0 * 0.9"]
+    lines = PENDULUM if form in DERIVATIVES else [*PENDULUM, "r5 = r0 * 0.9"]
     model = twin(lines, form)
     state, command = np.array([0.4, -0.3]), np.array([0.5, 2.0])
     found = model.linearise(state, command, discrete=True)
@@ -61,8 +62,9 @@ def test_over_a_period_it_moves_as_the_twin_predicts(form):
     assert found.states == ("angle", "rate") and found.commands == ("torque", "fan") and found.dt == 0.05
 
 
+@pytest.mark.parametrize("form", DERIVATIVES)
 @pytest.mark.parametrize("usual", [1.0, 20.0])
-def test_kinematics_are_among_the_equations(usual):
+def test_kinematics_are_among_the_equations(usual, form):
     body = tl.Signals(
         states=[tl.State(name, "rad", 1.0) for name in ("roll", "pitch", "yaw")]
         + [tl.State(name, "rad/s", usual) for name in ("p", "q", "r")],
@@ -71,7 +73,7 @@ def test_kinematics_are_among_the_equations(usual):
         kinematics=tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "r")),
     )
     assert body.substeps == (1 if usual == 1.0 else 4)
-    model = twin(["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], inputs=7, signals=body)
+    model = twin(["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], form, inputs=7, signals=body)
     # Upright, all but vertical, turned over; slow and by a radian a period.
     for pitch in (0.4, -1.1, 1.5, 2.2):
         for fast in (1.0, 20.0):
@@ -248,6 +250,22 @@ def test_at_its_gain_margin_the_loop_stands_on_the_edge():
     for share, stable in ((0.999, True), (1.001, False)):
         stronger, _, _ = loops(0.5 * factor * share, 1.5 * factor * share, 0.3 * factor * share)
         assert stronger.margins(0, "angle").stable is stable
+
+
+@pytest.mark.parametrize("stiffness", [5.0, 12.0, 30.0])
+def test_an_oscillation_without_damping_is_no_edge(stiffness):
+    # Semi-implicit, it has its poles on the very circle of frequencies.
+    model = twin([f"r4 = r0 * -{stiffness}", "r5 = r2 * 2.0", "r4 = r4 + r5"], "semi-implicit-euler")
+    plant = linearised(model.law, np.zeros(2), np.zeros(2), True)
+    np.testing.assert_allclose(np.abs(np.linalg.eigvals(plant.A)), 1.0, rtol=1e-12)
+
+    def closed(factor):
+        law = linear_controller(pid("rate"), factor * np.array([2.0, 0.2, 1.0]), np.zeros(2))
+        return Loops(plant, law, np.array([[1.0], [0.0]])).margins(0, "angle")
+
+    gain = closed(1.0).gain
+    assert 1.0 < gain < 1000.0 and closed(1.0).stable
+    assert closed(0.999 * gain).stable and not closed(1.001 * gain).stable
 
 
 def test_at_its_delay_margin_too():

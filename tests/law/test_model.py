@@ -1,4 +1,4 @@
-"""Models: the three forms of dynamics, one step at a time."""
+"""Models: the forms of dynamics, one step at a time."""
 
 import numpy as np
 import pytest
@@ -15,12 +15,13 @@ SCALES, DERIVATIVES = [1.0, 4.0], [None, 0]
 def test_the_shape_of_a_program_follows_from_the_form_and_the_signals(rig):
     assert _core.Model.shape("absolute", rig) == (4, 2)
     assert _core.Model.shape("increment", rig) == (4, 2)
-    assert _core.Model.shape("acceleration", rig) == (4, 1)
+    for form in ("acceleration", "explicit-euler", "semi-implicit-euler"):
+        assert _core.Model.shape(form, rig) == (4, 1)
 
 
-@given(st.data(), st.sampled_from(["absolute", "increment"]))
+@given(st.data(), st.sampled_from(["absolute", "increment", "explicit-euler", "semi-implicit-euler"]))
 def test_a_step_is_what_the_program_says_to_the_last_bit(rig, data, form):
-    program = data.draw(exact_programs(inputs=4, outputs=2))
+    program = data.draw(exact_programs(inputs=4, outputs=1 if form.endswith("euler") else 2))
     x, u = np.hsplit(data.draw(rows(4)), 2)
     expected = [model_step(program, form, a, b, SCALES, DERIVATIVES, 0.1) for a, b in zip(x, u, strict=True)]
     for width in _core.vector_widths():
@@ -46,6 +47,42 @@ def test_a_constant_acceleration_gives_the_parabola(rig):
     program = _core.Program.parse(program_text(4, 1, 5, [["r4 = r4 + 3.0"]]))
     found = _core.Model(program, "acceleration", rig).step([[0.5, 2.0]], [[0.0, 0.0]])
     np.testing.assert_allclose(found, [[0.5 + 0.2 + 0.5 * 3.0 * 0.01, 2.3]], rtol=1e-14)
+
+
+CHAIN = _core.Signals(0.1, [1.0] * 4, [(-1.0, 1.0)], [1.0], [1, None, 0, None])
+"""Velocity, position, acceleration and something else."""
+
+
+@pytest.mark.parametrize("form", ["explicit-euler", "semi-implicit-euler"])
+def test_every_state_of_a_chain_goes_on_by_the_one_before_it(form):
+    program = _core.Program.parse(
+        program_text(5, 2, 9, [["r5 = sin(r1)", "r6 = r3 * r4", "r5 = r5 - r2", "r6 = r6 - r0"]])
+    )
+    x, u = np.random.default_rng(5).normal(size=(7, 4)), np.full((7, 1), 0.5)
+    for width in _core.vector_widths():
+        found = _core.Model(program, form, CHAIN).step(x, u, _core.Workers(width=width))
+        expected = [
+            model_step(program, form, a, b, [1.0], [1, None, 0, None], 0.1) for a, b in zip(x, u, strict=True)
+        ]
+        np.testing.assert_allclose(found, expected, rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("form", ["explicit-euler", "semi-implicit-euler"])
+def test_a_body_is_turned_by_its_rates_at_one_end_of_the_period(form):
+    body = _core.Signals(0.05, [1.0] * 6, [(-1.0, 1.0)], [1.0], [None] * 6, kinematics=((0, 1, 2), (3, 4, 5)))
+    program = _core.Program.parse(
+        program_text(7, 3, 10, [["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = r9 + 1.5"]])
+    )
+    x, u = np.random.default_rng(2).uniform(-1.2, 1.2, (9, 6)), np.full((9, 1), 0.3)
+    found = _core.Model(program, form, body).step(x, u)
+    p, q, r = x[:, 3:].T
+    after = x[:, 3:] + 0.05 * np.stack([np.full(9, 0.6), p * r, np.full(9, 1.5)], axis=1)
+    np.testing.assert_allclose(found[:, 3:], after, rtol=1e-14)
+    p, q, r = (after if form == "semi-implicit-euler" else x[:, 3:]).T
+    roll, pitch = x[:, 0], x[:, 1]
+    across = q * np.sin(roll) + r * np.cos(roll)
+    turning = [p + np.tan(pitch) * across, q * np.cos(roll) - r * np.sin(roll), across / np.cos(pitch)]
+    np.testing.assert_allclose(found[:, :3], x[:, :3] + 0.05 * np.transpose(turning), rtol=1e-13, atol=1e-15)
 
 
 def test_a_program_sees_commands_in_units_of_their_scale(rig):

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from oracles import Pid, close_loop, rk4, same_bits
 from strategies import program_text
 from twinloop import _core
+from twinloop.law.forms import DERIVATIVES, EULER, FORMS
 
 DT = 0.05
 QUIET = (0.0, 0.0, 1.0)
@@ -129,13 +130,13 @@ def test_hidden_states_are_those_of_a_plain_loop(hidden):
 
 
 @pytest.mark.parametrize("actuators", [[(0.0, 0, None)] * 2, ACTUATORS[1]])
-@pytest.mark.parametrize("form", ["absolute", "increment", "acceleration"])
+@pytest.mark.parametrize("form", FORMS)
 def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_setting, form, actuators):
     hidden, scales = HIDDEN[2], np.array([1.0, 4.0])
     text = program_text(
         6, 2, 9, [["r6 = r1 * 0.1", "r8 = r2 * r4", "r6 = r6 + r8", "r7 = r3 - r1", "r7 = r7 + r5"]]
     )
-    if form == "acceleration":
+    if form in DERIVATIVES:
         text = program_text(6, 1, 8, [["r6 = r2 * r4", "r7 = r3 - r1", "r6 = r6 + r7", "r6 = r6 + r5"]])
     program = _core.Program.parse(text)
     model = _core.Model(program, form, rig, actuators, hidden)
@@ -156,6 +157,9 @@ def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_setting,
                     return np.array([s[1], program.run([[*s, *next(stages)]])[0, 0]])
 
                 state = rk4(slope, state, 0.1)
+            elif form in EULER:
+                after = state[1] + 0.1 * program.run([[*state, *seen[0]]])[0, 0]
+                state = np.array([state[0] + 0.1 * (after if form == EULER[1] else state[1]), after])
             else:
                 change = program.run([[*state, *seen[1]]])[0]
                 state = change + (state if form == "increment" else 0.0)
@@ -319,7 +323,7 @@ def residuals(values, records):
 
 
 UNIT = (3, "members", [0])
-CHAIN = [([0], [SENSOR], QUIET, True)]
+CHAIN = [([0], [SENSOR], QUIET, "acceleration")]
 LIMITS = _core.Limits(_core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None]))
 
 
@@ -446,10 +450,10 @@ def test_tuning_gives_the_same_bits_for_any_workers():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"chains": [([0], [0.0], QUIET, True)]},
-        {"chains": [([1], [1.0], QUIET, True)]},
+        {"chains": [([0], [0.0], QUIET, "acceleration")]},
+        {"chains": [([1], [1.0], QUIET, "acceleration")]},
         {"chains": []},
-        {"chains": [([0], [1.0, 1.0], QUIET, True)]},
+        {"chains": [([0], [1.0, 1.0], QUIET, "acceleration")]},
         {"free": [2]},
         {"lags": [[1]]},
         {"records": [(np.zeros((4, 1)), np.zeros((4, 1)), np.zeros((4, 1)))]},

@@ -27,6 +27,24 @@ pub(crate) fn turning<V: Vector>(attitude: [V; 4], rates: [V; 3]) -> [V; 4] {
     [(b * p + c * q + d * r) * -1.0, a * p + c * r - d * q, a * q - b * r + d * p, a * r + b * q - c * p]
 }
 
+/// Cosine of a pitch nearest to 0 that is divided by.
+const UPRIGHT: f64 = 1e-3;
+
+/// How body rates turn roll, pitch and yaw (Diebel 2006, equation 79). Near a pitch of a quarter turn, where the angles are
+/// singular, its cosine is kept from 0.
+#[inline(always)]
+pub(crate) fn euler_rates<V: Vector>(angles: [V; 3], rates: [V; 3]) -> [V; 3] {
+    let [roll, pitch, _] = angles;
+    let [p, q, r] = rates;
+    let (sine, cosine) = (roll.map(libm::sin), roll.map(libm::cos));
+    let upright = pitch.map(|pitch| {
+        let cosine = libm::cos(pitch);
+        if cosine.abs() < UPRIGHT { UPRIGHT.copysign(cosine) } else { cosine }
+    });
+    let yawing = q * sine + r * cosine;
+    [p + yawing * pitch.map(libm::sin) / upright, q * cosine - r * sine, yawing / upright]
+}
+
 /// Roll, pitch and yaw of a quaternion of any length, as sensors give them: the pitch within a quarter turn, roll and yaw
 /// by whole turns the nearest to what they were. Where the pitch was beyond a quarter turn it stays there.
 #[inline(always)]

@@ -28,8 +28,8 @@ pub struct PyRegression(Regression);
 #[pymethods]
 impl PyRegression {
     #[new]
-    fn new(states: usize, dt: f64, integrated: bool, records: Vec<RecordArrays<'_>>) -> Result<Self> {
-        let chain = Chain { states, dt, integrated }.validated()?;
+    fn new(states: usize, dt: f64, form: &str, records: Vec<RecordArrays<'_>>) -> Result<Self> {
+        let chain = Chain { states, dt, form: form.parse()? }.validated()?;
         let features = records.first().map_or(0, |(_, _, start, _, _)| start.as_array().ncols());
         let record = |(measured, weights, start, middle, end): &RecordArrays<'_>| {
             let flat = |matrix: &Matrix<'_>, columns| -> Result<Vec<f64>> {

@@ -11,9 +11,8 @@ use crate::rng::Name;
 use crate::setting::PyLimits;
 use crate::workers::{PyWorkers, or_default};
 
-/// States, sensor variances, (process variance, gust variance, correlation time) and whether features are derivatives, for each
-/// chain.
-type Chains = Vec<(Vec<usize>, Vec<f64>, (f64, f64, f64), bool)>;
+/// States, sensor variances, (process variance, gust variance, correlation time) and what features are, for each chain.
+type Chains = Vec<(Vec<usize>, Vec<f64>, (f64, f64, f64), String)>;
 /// Readings, weights and commands of each run.
 type Records<'py> = Vec<(Matrix<'py>, Matrix<'py>, Matrix<'py>)>;
 
@@ -27,13 +26,13 @@ fn fitting<'a>(model: &PyModel, limits: &'a PyLimits) -> Result<&'a Signals> {
 }
 
 fn observer(chains: Chains, dt: f64) -> Result<Vec<Observed>> {
-    let of_chain = |(states, sensors, (process, gust, correlation_time), integrated): (
+    let of_chain = |(states, sensors, (process, gust, correlation_time), form): (
         Vec<usize>,
         Vec<f64>,
         (f64, f64, f64),
-        bool,
+        String,
     )| {
-        let chain = Chain { states: states.len(), dt, integrated }.validated()?;
+        let chain = Chain { states: states.len(), dt, form: form.parse()? }.validated()?;
         let noise = Noise { sensors, process, gust, correlation_time }.validated(states.len())?;
         Ok(Observed { states, chain, noise })
     };

@@ -14,9 +14,9 @@ from twinloop.errors import InvalidInput, unknown
 from twinloop.identification.settings import FORMS as ALL_FORMS
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.identification.terms.libraries import LIBRARIES
+from twinloop.law.forms import FORMS
 from twinloop.planning.settings import TESTS, PlanningOptions
 
-FORMS = ("absolute", "increment", "acceleration")
 TRADEOFFS = ("raw", "normalised")
 
 
@@ -30,7 +30,8 @@ class Options:
         test_population: tests in the population (the paper).
         test_generations: generations of the test loop; None: a thirtieth of the models' with two objectives, a
             twentieth with three, at least 1 (the ratios of the paper's Table I).
-        form: what a program's outputs mean, "absolute", "increment" or "acceleration" (our choice).
+        form: what a program's outputs mean, "absolute", "increment", "acceleration", "explicit-euler" or
+            "semi-implicit-euler" (our choice).
         spare_registers: registers beside inputs and outputs (our choice).
         pages: pages of a program (the paper).
         page_length: instructions of a page (the paper).

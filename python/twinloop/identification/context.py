@@ -34,7 +34,7 @@ class Context:
         rests: commands whose effect may be there at the start of a run (n_u,).
         earlier: what was learnt from fewer runs.
         watch: called with each step that begins.
-        as_integrated: whether chains on increments bear what integration leaves, too: where forms are compared, what a
+        as_integrated: whether chains that step bear what integration leaves, too: where forms are compared, what a
             derivative could not show is no evidence for them.
     """
 

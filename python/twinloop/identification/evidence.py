@@ -8,6 +8,7 @@ from typing import Protocol, TypeVar
 
 from twinloop.identification.search.description import shorter
 from twinloop.law.actuation import Actuation
+from twinloop.law.forms import EULER
 
 LAGGING = 12.0
 """What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
@@ -16,7 +17,7 @@ HIDING = 30.0
 CORRELATED = 16.0
 """What a correlated disturbance must gain, each: its size, its correlation time, and the choice of having one."""
 STEPPING = 12.0
-"""What increments must gain: a law of a step holds for that step alone."""
+"""What a law of a step must gain, increments or one of Euler: it holds for that step alone."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], corre
     """
     lagging = sum(any(not actuation.actuators[i].direct for i in group) for group in alike)
     return (
-        STEPPING * (form == "increment")
+        STEPPING * (form == "increment" or form in EULER)
         + LAGGING * lagging
         + HIDING * bool(actuation.hidden)
         + CORRELATED * correlated

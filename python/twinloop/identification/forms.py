@@ -1,4 +1,4 @@
-"""What a law's outputs mean is a hypothesis too: derivatives, or increments, as a simulator's own step makes them.
+"""What a law's outputs mean is a hypothesis too: derivatives, integrated, or a step, as a simulator takes it.
 
 Over a period, a polynomial law does not give a polynomial map; a simulator that takes one Euler step a period does.
 Both forms are learnt briefly from the same readings, and the shorter description of these is believed.
@@ -9,78 +9,67 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
+from twinloop import _core
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import STEPPING, strongest
+from twinloop.identification.evidence import STEPPING
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Run
+from twinloop.identification.search.description import shorter
 from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
+from twinloop.identification.sensors.euler_steps import euler_form
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.starts import FORMS, begun
+from twinloop.identification.starts import FORMS, begun, with_offsets
+from twinloop.law.forms import EULER
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
 
-SURE = 5.0
-"""Standard errors from 0 of a share that is believed."""
-WHOLE = 0.15
-"""By how much a share may differ from a whole step of Euler; a sensor that is late leaves any other share."""
-FEWEST = 10
-"""Periods from which one is estimated."""
-MEANINGS = {"acceleration": "derivatives", "increment": "what a period adds", "absolute": "the next state"}
+MEANINGS = {
+    "acceleration": "derivatives",
+    "increment": "what a period adds",
+    "absolute": "the next state",
+    "explicit-euler": "derivatives in one explicit Euler step a period",
+    "semi-implicit-euler": "derivatives in one semi-implicit Euler step a period",
+}
 """Forms in words."""
+LATE = 18.0
+"""What late sensors must gain over a step of Euler, each: an offset, and that of all offsets it is half a period."""
+HALF_A_PERIOD = (
+    "Between a state and its derivative a sensor that is late or early by half a period shows the same; what drives"
+    " them decides."
+)
+"""What is said where one of the forms is a step of Euler."""
 
 
-def candidates(options: IdentificationOptions, signals: Signals, runs: Sequence[Run]) -> tuple[str, ...]:
+def first_form(options: IdentificationOptions, signals: Signals) -> str:
+    """The form that is believed unless another describes the readings more briefly.
+
+    Args:
+        options: of the identification.
+        signals: of the system.
+    """
+    told = options.form != "auto" or options.fixed_terms or options.bounded_terms
+    return options.form_for(signals) if told else "acceleration"
+
+
+def candidates(
+    options: IdentificationOptions, signals: Signals, runs: Sequence[Run], workers: _core.Workers
+) -> tuple[str, ...]:
     """Forms that may be the law's, the one that is believed unless another is shorter first.
 
     Args:
         options: of the identification.
         signals: of the system.
         runs: recorded.
+        workers: how the work is carried out.
     """
-    if options.form != "auto" or options.fixed_terms or options.bounded_terms:
-        return (options.form_for(signals),)
-    declared = any(state.derivative_of is not None for state in signals.states)
-    if signals.kinematics is not None or (declared and not steps_like_euler(runs, signals)):
-        return ("acceleration",)
-    return ("acceleration", "increment")
-
-
-def steps_like_euler(runs: Sequence[Run], signals: Signals) -> bool:
-    """Whether a state goes on by its declared derivative at the start or at the end of a period, not by the mean.
-
-    What the mean leaves of a move is then half of what the derivative changes by, with one sign or the other: a share
-    of 1. A sensor that is late by τ leaves a share of 2 τ / dt. Noise of the derivative adds to neither.
-
-    Args:
-        runs: recorded.
-        signals: of the system.
-    """
-    for rate, state in enumerate(signals.states):
-        if state.derivative_of is None:
-            continue
-        place = signals.state_names.index(state.derivative_of)
-        moves, begun, ended = (
-            np.concatenate(parts)
-            for parts in zip(
-                *(
-                    (np.diff(run.states[:, place]), run.states[:-1, rate], run.states[1:, rate])
-                    for run in runs
-                ),
-                strict=True,
-            )
-        )
-        left = moves - 0.5 * signals.dt * (begun + ended)
-        half = 0.5 * signals.dt * (ended - begun)
-        size = float((half * half).sum())
-        if size > 0.0 and len(half) > FEWEST:
-            share = float((left * half).sum()) / size
-            rest = left - share * half
-            error = float(np.sqrt((rest * rest).sum() / (len(half) - 1.0) / size))
-            if abs(share) > SURE * error and abs(abs(share) - 1.0) < WHOLE:
-                return True
-    return False
+    first = first_form(options, signals)
+    if options.form != "auto":
+        return (first,)
+    if len(signals.driven) < signals.n_x:
+        # Formulas of a user mean derivatives under either.
+        step = euler_form(runs, signals, workers)
+        return (first,) if step is None else (first, step)
+    return (first,) if options.fixed_terms or options.bounded_terms else (first, "increment")
 
 
 def likeliest(context: Context) -> tuple[str, list[Remark]]:
@@ -92,30 +81,55 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
     Returns:
         The form, and a remark where there was a choice.
     """
-    forms = candidates(context.options, context.signals, context.runs)
+    forms = candidates(context.options, context.signals, context.runs, context.workers)
     if context.earlier is not None and context.settled and context.earlier.model.form in forms:
         forms = (context.earlier.model.form,)
     if len(forms) == 1:
         return forms[0], []
     context.watch("form")
-    looks = [brief_look(context, form, FORMS + place) for place, form in enumerate(forms)]
-    best = strongest(looks)
-    return best.form, [_said(best, strongest(look for look in looks if look is not best))]
+    aligned = forms[-1] in EULER
+    looks = [brief_look(context, form, FORMS + place, aligned) for place, form in enumerate(forms)]
+    best, other = looks
+    if shorter(_described(other), _described(best)):
+        best, other = other, best
+    return best.form, [_said(best, other)]
 
 
-def brief_look(context: Context, form: str, start: int) -> Hypothesis:
-    """What a short search finds under a form, with what disturbs explained by terms as far as they can."""
+def brief_look(context: Context, form: str, start: int, aligned: bool = False) -> Hypothesis:
+    """What a short search finds under a form, with what disturbs explained by terms as far as they can.
+
+    Args:
+        context: of the identification.
+        form: what outputs mean.
+        start: its number.
+        aligned: whether late sensors are looked for: where another form is a step of Euler, for which they may be
+            taken. Quotients are not then, for a period of any law resembles one.
+    """
     brief = replace(context.brief(context.runs), as_integrated=True)
-    first = from_both_sides(brief, begun(brief, form, brief.first_pool(), start))
-    return undisturbed(brief, climbed(brief, first))
+    first = begun(brief, form, brief.first_pool(), start)
+    if aligned:
+        brief = replace(brief, options=replace(brief.options, implicit=False))
+        first = with_offsets(brief, first)
+    return undisturbed(brief, climbed(brief, from_both_sides(brief, first)))
+
+
+def _described(look: Hypothesis) -> float:
+    """Description length of the readings, with what is late in it priced."""
+    return look.evidence.length + LATE * len(set(look.offsets[look.offsets != 0.0].tolist()))
 
 
 def _said(best: Hypothesis, other: Hypothesis) -> Remark:
-    gain = other.length - best.length
+    step = best.form in EULER or other.form in EULER
+    gain = _described(other) - _described(best) if step else other.length - best.length
     than = "longer" if gain > 0.0 else "shorter"
+    decided = f", where {STEPPING:g} would decide. The option form fixes it."
+    if step:
+        decided = (
+            f", with what a step and what a late sensor costs. The option form fixes it. {HALF_A_PERIOD}"
+        )
     return note(
         "form",
         f"The form of the law was searched. The readings are described as {MEANINGS[best.form]}"
         f" (form {best.form!r}): as {MEANINGS[other.form]} (form {other.form!r}) their description is"
-        f" {abs(gain):.3g} {than}, where {STEPPING:g} would decide. The option form fixes it.",
+        f" {abs(gain):.3g} {than}{decided}",
     )

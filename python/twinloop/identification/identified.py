@@ -122,7 +122,7 @@ class Identified(Recorded, kind="identified"):
         correlated = [
             CorrelatedDisturbance(
                 tuple(chain.states),
-                chain.integrated,
+                chain.form,
                 float(np.sqrt(chain.motion.correlated)),
                 chain.motion.correlation_time,
             )

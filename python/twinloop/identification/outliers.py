@@ -15,7 +15,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.elementary import log
 from twinloop.identification.context import Context
-from twinloop.identification.forms import candidates
+from twinloop.identification.forms import first_form
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.search.description import shorter
 from twinloop.identification.search.selection import from_both_sides
@@ -122,7 +122,7 @@ def cleaned(context: Context) -> Context:
 
 def _length(context: Context, runs: Sequence[Run], start: int) -> float:
     """Description length of what a short search finds."""
-    brief, form = context.brief(runs), candidates(context.options, context.signals, runs)[0]
+    brief, form = context.brief(runs), first_form(context.options, context.signals)
     return from_both_sides(brief, begun(brief, form, brief.first_pool(), start)).length
 
 

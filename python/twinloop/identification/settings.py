@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from twinloop.identification.terms.libraries import LIBRARIES
+from twinloop.law import forms as law_forms
 from twinloop.signals import Signals
 
-FORMS = ("auto", "absolute", "increment", "acceleration")
+FORMS = ("auto", *law_forms.FORMS)
 LEAST_MOVES = 100
 """Of a walk; a shorter one hardly leaves its start."""
 
@@ -17,11 +18,13 @@ class IdentificationOptions:
     """Options of the identification.
 
     Args:
-        form: meaning of a program's outputs, "acceleration" (derivatives of the driven states), "increment" (change
-            over a period) or "absolute" (the next state); "auto": derivatives, unless increments describe the
-            readings more briefly, as for a simulator with one Euler step per period. With fixed or bounded terms,
-            whose constants are meant for one of the two, nothing is compared: derivatives if any are declared, else
-            increments.
+        form: meaning of a program's outputs, "acceleration" (derivatives of the driven states, integrated finely),
+            "explicit-euler" or "semi-implicit-euler" (derivatives, in one step of Euler a period, in which a state goes
+            on by its derivative at the start or at the end of it), "increment" (change over a period) or "absolute"
+            (the next state); "auto": derivatives, unless a step describes the readings more briefly: one of Euler where
+            they show that a state with a declared derivative takes one, increments where none is declared. With fixed
+            or bounded terms, whose constants are meant for one of the two, derivatives are not compared with
+            increments: derivatives if any are declared, else increments.
         libraries: sources of terms, any of "linear", "quadratic", "damping", "roots", "friction", "trigonometric",
             "quotients", "cubic"; none: evolved programs only.
         seed_terms: formulas of states and commands that may be in the law, such as "rate * abs(rate)"; they are on

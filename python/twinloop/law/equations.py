@@ -13,6 +13,7 @@ from twinloop.errors import InvalidInput
 from twinloop.law.actuation import Actuator
 from twinloop.law.expansion import Expansion, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
+from twinloop.law.forms import DERIVATIVES, EULER
 from twinloop.law.law import Law
 from twinloop.law.spread import Spread, spreads
 from twinloop.law.writing import EXACT, TEXT, Term, Writer
@@ -22,6 +23,8 @@ WIDTH = 100
 """Columns of a line."""
 NOTE = 22
 """Columns of a note behind an equation; longer ones stand below it."""
+LATER = "[k+1]"
+"""Behind a state: a period later."""
 LONG_NAME = 32
 """Columns of a left side above which lines that go on do not begin under its equals sign."""
 
@@ -90,6 +93,9 @@ class _Page:
             "absolute": f"the state one period of {dt:g} s later",
             "increment": f"the state one period of {dt:g} s later, as the state and what is added to it",
             "acceleration": f"derivatives, integrated by {_steps(signals)} of {dt / signals.substeps:g} s",
+            "explicit-euler": f"one Euler step a period of {dt:g} s, in which states go on by others as they were",
+            "semi-implicit-euler": f"one Euler step a period of {dt:g} s, in which states go on by others as they"
+            " have become",
         }
         units = ", ".join(f"{state.name} in {state.unit or 'units'}" for state in signals.states)
         lines = [f"Form {self.law.form!r}: {kinds[self.law.form]}; {units}."]
@@ -156,23 +162,41 @@ class _Page:
             for line in _equation(name, [_Piece(self.writer.terms(node, define=True))])
         ]
         pieces = [self._pieces(output) for output in range(len(self.outputs))]
-        if law.form == "acceleration":
-            roots, driven = law.derivatives(), self.signals.driven
-            turned = Writer(law.expressions, roots, law.symbols, EXACT, "", False)
-            for place, (name, root) in enumerate(zip(names, roots, strict=True)):
-                given = [_Piece(turned.terms(root))]
-                own = pieces[driven.index(place)] if place in driven else given
-                lines += _equation(f"d {name} / dt", own)
+        if law.form in DERIVATIVES:
+            driven = self.signals.driven
+            for place, name in enumerate(names):
+                own = pieces[driven.index(place)] if place in driven else [_Piece(self._given(place))]
+                if law.form in EULER:
+                    own = self._stepped(name, own)
+                lines += _equation(f"{name}{LATER}" if law.form in EULER else f"d {name} / dt", own)
         else:
             for name, own in zip(names, pieces, strict=True):
                 if law.form == "increment":
                     # What is added is summed first, which rounding may show.
                     itself = ("+", name)
                     own = [_Piece([*own[0].terms, itself])] if self.exact else [_Piece([itself]), *own]
-                lines += _equation(f"{name}[k+1]", own)
+                lines += _equation(f"{name}{LATER}", own)
         for number, name in enumerate(law.hidden_symbols):
             lines += self._filling(name, number)
         return lines
+
+    def _given(self, place: int) -> list[Term]:
+        """The derivative of a state that others give."""
+        roots, symbols = self.law.derivatives(), given_symbols(self.law, place, LATER)
+        return Writer(self.law.expressions, roots, symbols, EXACT, "", False).terms(roots[place])
+
+    def _stepped(self, name: str, own: Sequence[_Piece]) -> list[_Piece]:
+        """A step of Euler: the state, and a period times its derivative."""
+        dt = "" if self.signals.dt == 1.0 else f"{self.writer.number(self.signals.dt)}*"
+        terms = [list(piece.terms) for piece in own]
+        (sign, first), (_, last) = terms[0][0], terms[-1][-1]
+        if sum(map(len, terms)) == 1 and sign == "+" and first.removesuffix(LATER).isidentifier():
+            terms[0][0] = "+", f"{dt}{first}"
+        else:
+            terms[-1][-1] = terms[-1][-1][0], f"{last})"
+            terms[0][0] = "+", f"{dt}({'' if sign == '+' else '-'}{terms[0][0][1]}"
+        scaled = (_Piece(each, piece.note) for each, piece in zip(terms, own, strict=True))
+        return [_Piece([("+", name)]), *scaled]
 
     def _pieces(self, output: int) -> list[_Piece]:
         """An output, in pieces that share a constant where a committee stands behind it."""
@@ -252,6 +276,23 @@ def _equation(left: str, pieces: Sequence[_Piece]) -> list[str]:
                 [row, *(f"{indent} {line}" for line in _comment(note, len(indent) + 1))] if note else [row]
             )
     return lines
+
+
+def given_symbols(law: Law, place: int, later: str) -> list[str]:
+    """Symbols for the derivative of a state that others give, where they may stand for these a period later.
+
+    Args:
+        law: whose symbols they are.
+        place: of the state.
+        later: what is written behind such a state.
+    """
+    symbols, signals = list(law.symbols), law.signals
+    body, name = signals.kinematics, signals.state_names[place]
+    turned = body is not None and name in body.angles
+    for i, state in enumerate(signals.states if law.form == "semi-implicit-euler" else ()):
+        if not turned or (body is not None and state.name in body.rates):
+            symbols[i] += later
+    return symbols
 
 
 def _comment(text: str, indent: int = 0) -> list[str]:

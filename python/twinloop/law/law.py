@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,11 +20,13 @@ class Law:
     The inputs of the expressions are the states, the effects of the commands in units of their scales, and the hidden
     states. With the form "acceleration", outputs are the derivatives of the driven states. They are integrated by one
     Runge-Kutta step of order four per period, with effects and hidden states at its start, middle and end. With
-    "absolute" outputs are the next state, with "increment" its change, under the effects in the middle of the period.
+    "explicit-euler" and "semi-implicit-euler" they make a step of Euler, under the effects at the start of the period;
+    states that others give go on by these as they were, or as they have become. With "absolute" outputs are the next
+    state, with "increment" its change, under the effects in the middle of the period.
 
     Args:
         signals: of the system.
-        form: "absolute", "increment" or "acceleration".
+        form: one of `FORMS`.
         expressions: with the equations.
         outputs: nodes of the outputs, in the order of the states that they drive.
         actuation: actuators and hidden states.
@@ -88,16 +91,46 @@ class Law:
         return (*self.signals.state_names, *self.command_symbols, *self.hidden_symbols)
 
     def derivatives(self) -> tuple[int, ...]:
-        """With the form "acceleration", the node of each state's derivative (n_x,)."""
+        """Where outputs are derivatives, the node of each state's (n_x,)."""
         signals, remaining = self.signals, iter(self.outputs)
+        states = self._states()
         rates: dict[str | None, int] = {
-            state.derivative_of: self.expressions.input(place)
-            for place, state in enumerate(signals.states)
+            state.derivative_of: states[state.name]
+            for state in signals.states
             if state.derivative_of is not None
         }
         if signals.kinematics is not None:
-            rates |= _turning(self.expressions, signals, signals.kinematics)
+            rates |= _turning(self.expressions, signals.kinematics, states, states)
         return tuple(rates[name] if name in rates else next(remaining) for name in signals.state_names)
+
+    def increments(self) -> tuple[int, ...]:
+        """With a form of Euler, the node of what a period adds to each state (n_x,)."""
+        signals, states = self.signals, self._states()
+        slopes = dict(zip(signals.state_names, self.derivatives(), strict=True))
+        rates = {state.derivative_of: state.name for state in signals.states if state.derivative_of}
+        body = signals.kinematics
+        dt = self.expressions.constant(signals.dt)
+
+        def make(operation: str, *operands: int) -> int:
+            return self.expressions.enter(Node(operation, operands))
+
+        def ended(name: str) -> int:
+            return make("+", states[name], added(name))
+
+        def added(name: str) -> int:
+            slope = slopes[name]
+            if self.form == "semi-implicit-euler" and name in rates:
+                slope = ended(rates[name])
+            elif self.form == "semi-implicit-euler" and body is not None and name in body.angles:
+                turned = _turning(self.expressions, body, states, {rate: ended(rate) for rate in body.rates})
+                slope = turned[name]
+            return make("*", slope, dt)
+
+        return tuple(added(name) for name in signals.state_names)
+
+    def _states(self) -> dict[str, int]:
+        """The node of each state."""
+        return {name: self.expressions.input(place) for place, name in enumerate(self.signals.state_names)}
 
 
 def hidden_names(signals: Signals, count: int) -> list[str]:
@@ -125,15 +158,16 @@ def _scaled(name: str, size: float, signals: Signals) -> str:
     return symbol
 
 
-def _turning(expressions: Expressions, signals: Signals, body: RigidBody) -> dict[str | None, int]:
-    """How body rates turn roll, pitch and yaw (z-y-x angles; Diebel 2006, equation 79)."""
+def _turning(
+    expressions: Expressions, body: RigidBody, states: Mapping[str, int], rates: Mapping[str, int]
+) -> dict[str | None, int]:
+    """How body rates turn roll, pitch and yaw (z-y-x angles; Diebel 2006, equation 79), by nodes of both."""
 
     def make(operation: str, *operands: int) -> int:
         return expressions.enter(Node(operation, operands))
 
-    place = signals.state_names.index
-    roll, pitch, _ = (expressions.input(place(name)) for name in body.angles)
-    p, q, r = (expressions.input(place(name)) for name in body.rates)
+    roll, pitch, _ = (states[name] for name in body.angles)
+    p, q, r = (rates[name] for name in body.rates)
     sin, cos = make("sin", roll), make("cos", roll)
     yawing = make("+", make("*", q, sin), make("*", r, cos))
     upright = make(UPRIGHT, make("cos", pitch))

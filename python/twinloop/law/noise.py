@@ -19,13 +19,14 @@ class CorrelatedDisturbance(NamedTuple):
 
     Args:
         states: that it drives: the first one, then its integral, and so on.
-        integrated: whether it is a derivative of the first one, and not what is added to it in a period.
+        form: what it is: as an output of a law of this form, a derivative of the first one, or what is added to it in a
+            period.
         sd: its standard deviation, in the unit of the first state, a second where it is a derivative.
         correlation_time: after which 1/e of it is left, s.
     """
 
     states: tuple[int, ...]
-    integrated: bool
+    form: str
     sd: float
     correlation_time: float
 
@@ -46,19 +47,16 @@ class Noise(Recorded, kind="noise"):
     correlated: tuple[CorrelatedDisturbance, ...] = ()
     dt: float = 1.0
 
-    VERSION = 2
+    VERSION = 3
     RENAMED: ClassVar[Mapping[str, str]] = {"lasting": "correlated"}
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of the first version, which called a correlation time a memory."""
+        """A record of the first version, which called a correlation time a memory, or of one that knew two forms."""
         found = super().renewed(record)
         if isinstance(found.get("correlated"), list):
             found["correlated"] = [
-                {"correlation_time" if key == "memory" else key: value for key, value in each.items()}
-                if isinstance(each, dict)
-                else each
-                for each in found["correlated"]
+                _renewed_disturbance(each) if isinstance(each, dict) else each for each in found["correlated"]
             ]
         return found
 
@@ -70,15 +68,49 @@ class Noise(Recorded, kind="noise"):
     def disturbance(self, draws: int, steps: int, stream: _core.Stream) -> Floats:
         """Draws of disturbances of the states (draws, steps, n_x)."""
         added = self.moves * stream.normals(draws, steps, len(self.moves))
-        for states, integrated, size, time in self.correlated:
+        for states, form, size, time in self.correlated:
             kept = float(exp(-self.dt / time))
             fresh = stream.normals(draws, steps)
             gust = np.empty((draws, steps))
             gust[:, 0] = fresh[:, 0]
             for k in range(1, steps):
                 gust[:, k] = kept * gust[:, k - 1] + np.sqrt(1.0 - kept * kept) * fresh[:, k]
-            reach = 1.0
-            for i, state in enumerate(states if integrated else states[:1]):
-                reach *= self.dt / (i + 1) if integrated else 1.0
+            for state, reach in zip(states, reaches(form, self.dt, len(states)), strict=True):
                 added[:, :, state] += reach * size * gust
         return added
+
+
+def reaches(form: str, dt: float, count: int) -> list[float]:
+    """How far each state of a chain is moved by what drives it, at 1 for a period.
+
+    Args:
+        form: what drives it means.
+        dt: period, s.
+        count: number of states, the driven one first, then its integral, and so on.
+    """
+    found, reach = [], 1.0
+    for i in range(count):
+        if form == "acceleration":
+            reach *= dt / (i + 1)
+        elif form == "semi-implicit-euler":
+            reach *= dt
+        else:
+            # Only the driven one goes on by it within the period.
+            reach = (dt if form == "explicit-euler" else 1.0) if i == 0 else 0.0
+        found.append(reach)
+    return found
+
+
+def renewed_form(integrated: bool) -> str:
+    """What a record means that says only whether something is a derivative.
+
+    Args:
+        integrated: what it says.
+    """
+    return "acceleration" if integrated else "increment"
+
+
+def _renewed_disturbance(record: Record) -> Record:
+    found = {"correlation_time" if key == "memory" else key: value for key, value in record.items()}
+    integrated = found.pop("integrated", None)
+    return {**found, "form": renewed_form(integrated)} if isinstance(integrated, bool) else found

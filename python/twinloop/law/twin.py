@@ -86,7 +86,7 @@ class Twin(Shown, Recorded, kind="twin"):
         """Multiple of a state's scale beyond which a simulated run counts as diverged."""
         return self.limits.divergence_factor
 
-    VERSION = 3
+    VERSION = 4
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:

@@ -14,11 +14,17 @@ pub enum Form {
     Increment,
     /// The derivative of each state whose motion no other states are declared to give, integrated by RK4.
     Acceleration,
+    /// The same derivatives, in one explicit Euler step a period: every state goes on by what it changed by at its start.
+    ExplicitEuler,
+    /// The same in one semi-implicit step: a state goes on by its derivative at the end of the period where that is
+    /// another state (E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd edition, 2006, section I.1.2).
+    SemiImplicitEuler,
 }
 
 impl Form {
     /// Every form.
-    pub const ALL: [Self; 3] = [Self::Absolute, Self::Increment, Self::Acceleration];
+    pub const ALL: [Self; 5] =
+        [Self::Absolute, Self::Increment, Self::Acceleration, Self::ExplicitEuler, Self::SemiImplicitEuler];
 
     /// The name that [`FromStr`] reads.
     pub fn name(self) -> &'static str {
@@ -26,15 +32,20 @@ impl Form {
             Self::Absolute => "absolute",
             Self::Increment => "increment",
             Self::Acceleration => "acceleration",
+            Self::ExplicitEuler => "explicit-euler",
+            Self::SemiImplicitEuler => "semi-implicit-euler",
         }
+    }
+
+    /// Whether outputs are derivatives of the states that no others give.
+    pub fn gives_derivatives(self) -> bool {
+        !matches!(self, Self::Absolute | Self::Increment)
     }
 
     /// Inputs (states, then commands) and outputs that a program must have where nothing is hidden.
     pub fn shape(self, signals: &Signals) -> (usize, usize) {
-        let outputs = match self {
-            Self::Absolute | Self::Increment => signals.states(),
-            Self::Acceleration => (0..signals.states()).filter(|&state| !signals.is_given(state)).count(),
-        };
+        let given = |state| self.gives_derivatives() && signals.is_given(state);
+        let outputs = (0..signals.states()).filter(|&state| !given(state)).count();
         (signals.states() + signals.commands(), outputs)
     }
 }

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::sensors::Sensors;
 use crate::signals::{RigidBody, Signals};
 
-/// Where the derivative of a state comes from, in the form [`Form::Acceleration`].
+/// Where the derivative of a state comes from, in a form whose outputs are derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Slope {
     State(usize),
@@ -28,6 +28,43 @@ fn slopes(signals: &Signals) -> impl Iterator<Item = Slope> {
     })
 }
 
+/// What moves states that others give.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Given {
+    /// A state goes on by another one.
+    Integral { state: usize, of: usize },
+    /// The angles of the rigid body go on by its rates.
+    Turn,
+}
+
+/// All that is given, in an order in which what moves a state stands before it.
+fn in_order(slopes: &[Slope], body: Option<&RigidBody>) -> Vec<Given> {
+    let mut left: Vec<Given> = (0..slopes.len())
+        .filter_map(|state| match slopes[state] {
+            Slope::State(of) => Some(Given::Integral { state, of }),
+            _ => None,
+        })
+        .chain(body.map(|_| Given::Turn))
+        .collect();
+    let mut known: Vec<bool> = slopes.iter().map(|slope| matches!(slope, Slope::Output(_))).collect();
+    let mut found = vec![];
+    while !left.is_empty() {
+        let ready = |given: &Given| match given {
+            Given::Integral { of, .. } => known[*of],
+            Given::Turn => body.is_some_and(|body| body.rates.iter().all(|&rate| known[rate])),
+        };
+        // Of states that are each other's derivatives none is first.
+        let next = left.remove(left.iter().position(ready).unwrap_or(0));
+        match (next, body) {
+            (Given::Integral { state, .. }, _) => known[state] = true,
+            (Given::Turn, Some(body)) => body.angles.iter().for_each(|&angle| known[angle] = true),
+            (Given::Turn, None) => {}
+        }
+        found.push(next);
+    }
+    found
+}
+
 /// How the outputs of programs become dynamics; shared by all models of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -40,6 +77,7 @@ pub struct Frame {
     /// What the inputs of a program after the states are multiplied by: commands, then hidden states.
     pub(super) factors: Vec<f64>,
     pub(super) slopes: Vec<Slope>,
+    pub(super) given: Vec<Given>,
     pub(super) body: Option<RigidBody>,
     /// A model sees a periodic state within half a period of 0.
     pub(super) periods: Periods,
@@ -50,12 +88,13 @@ pub struct Frame {
 impl Frame {
     /// The frame of a form for these signals.
     pub fn new(form: Form, signals: &Signals) -> Self {
-        let slopes = slopes(signals).collect();
+        let slopes: Vec<_> = slopes(signals).collect();
+        let given = in_order(&slopes, signals.kinematics.as_ref());
         let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
         let (commands, actuation) = (factors.len(), Actuation::default());
         let (body, periods) = (signals.kinematics, signals.periods.clone());
         let (dt, substeps, sensors) = (signals.dt, signals.substeps(), Sensors::default());
-        Self { form, dt, substeps, commands, factors, slopes, body, periods, actuation, sensors }
+        Self { form, dt, substeps, commands, factors, slopes, given, body, periods, actuation, sensors }
     }
 
     /// The same with something between commands and model, an actuator for each command.

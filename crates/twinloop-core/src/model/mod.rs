@@ -1,5 +1,6 @@
 //! A model: a program and the form that makes it dynamics (paper, section IV.A; specification, section 4).
 
+mod euler;
 mod form;
 mod frame;
 mod held;
@@ -21,6 +22,7 @@ use crate::lanes::{Vector, vectors, zeros};
 use crate::lgp::{Bank, Code, Program};
 use crate::sensors::Recent;
 use crate::signals::Signals;
+use euler::euler;
 use held::Held;
 use inputs::{Interleaved, StateAndCommand};
 use turning::turn;
@@ -100,6 +102,10 @@ impl<'a> Model<'a> {
                     None => rk4(state, self.frame.dt, stages, field),
                     Some(body) => turn(state, self.frame, stages, field, body, turned, seen),
                 }
+            }
+            form @ (Form::ExplicitEuler | Form::SemiImplicitEuler) => {
+                let outputs = self.outputs(bank, state, effects[0]);
+                euler(state, outputs, self.frame, form == Form::SemiImplicitEuler);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! A chain: a state that a sum of features drives, its integral, the integral of that; how they move in a period.
 
 use crate::error::{Result, invalid};
+use crate::model::Form;
 
 /// States of a chain at most: position, speed, acceleration, jerk.
 pub const LONGEST: usize = 4;
@@ -12,8 +13,8 @@ pub struct Chain {
     pub states: usize,
     /// Period, s.
     pub dt: f64,
-    /// Whether features are derivatives to be integrated over a period, or increments of a period.
-    pub integrated: bool,
+    /// What features are: derivatives and how they move the states, or increments of a period.
+    pub form: Form,
 }
 
 impl Chain {
@@ -30,10 +31,37 @@ impl Chain {
 
     /// What a period adds to each state where the features' values at its start, middle and end are known.
     pub fn increments(&self, start: f64, middle: f64, end: f64) -> [f64; LONGEST] {
-        if !self.integrated {
-            return [start, 0.0, 0.0, 0.0];
+        match self.form {
+            Form::Absolute | Form::Increment => [start, 0.0, 0.0, 0.0],
+            Form::Acceleration => self.simpson(start, middle, end),
+            Form::ExplicitEuler | Form::SemiImplicitEuler => self.reach().map(|reach| reach * start),
         }
-        // Simpson's rule on ∫ (dt − s)^m / m! f(s) ds.
+    }
+
+    /// What each state is moved by where a feature of 1 is held for a period.
+    fn reach(&self) -> [f64; LONGEST] {
+        let dt = self.dt;
+        match self.form {
+            Form::Absolute | Form::Increment => [1.0, 0.0, 0.0, 0.0],
+            Form::ExplicitEuler => [dt, 0.0, 0.0, 0.0],
+            Form::SemiImplicitEuler => [dt, dt * dt, dt * dt * dt, dt * dt * dt * dt],
+            Form::Acceleration => self.powers(),
+        }
+    }
+
+    /// dt^m / m! from m = 1 on.
+    fn powers(&self) -> [f64; LONGEST] {
+        let mut powers = [0.0; LONGEST];
+        let mut power = 1.0;
+        for (i, entry) in powers.iter_mut().enumerate() {
+            power *= self.dt / (i + 1) as f64;
+            *entry = power;
+        }
+        powers
+    }
+
+    /// Simpson's rule on ∫ (dt − s)^m / m! f(s) ds.
+    fn simpson(&self, start: f64, middle: f64, end: f64) -> [f64; LONGEST] {
         let mut out = [0.0; LONGEST];
         let (mut factorial, mut whole, mut half) = (1.0, 1.0, 1.0);
         for (m, out) in out.iter_mut().enumerate() {
@@ -50,24 +78,20 @@ impl Chain {
 
     /// How its states move on by themselves.
     pub(crate) fn motion(&self) -> Motion {
-        let mut powers = [0.0; LONGEST];
-        let mut power = 1.0;
-        for (i, entry) in powers.iter_mut().enumerate() {
-            power *= self.dt / (i + 1) as f64;
-            *entry = power;
-        }
-        let reach = if self.integrated { powers } else { [1.0, 0.0, 0.0, 0.0] };
-        Motion { states: self.states, integrated: self.integrated, powers, reach }
+        let Self { states, dt, form } = *self;
+        Motion { states, dt, form, powers: self.powers(), reach: self.reach() }
     }
 
     /// Covariance that a period of the disturbance adds (states × states).
     pub(super) fn disturbance(&self, process: f64) -> Vec<f64> {
         let d = self.states;
-        let mut q = vec![0.0; d * d];
-        if !self.integrated {
-            q[0] = process;
-            return q;
+        if self.form != Form::Acceleration {
+            // One push a period.
+            let (push, reach) =
+                (if self.form.gives_derivatives() { process / self.dt } else { process }, self.reach());
+            return (0..d * d).map(|at| push * reach[at / d] * reach[at % d]).collect();
         }
+        let mut q = vec![0.0; d * d];
         let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
         for a in 0..d {
             for b in 0..d {
@@ -86,7 +110,8 @@ impl Chain {
 pub(crate) struct Motion {
     /// Number of states.
     pub states: usize,
-    pub(super) integrated: bool,
+    pub(super) dt: f64,
+    pub(super) form: Form,
     /// dt^m / m! from m = 1 on.
     pub(super) powers: [f64; LONGEST],
     /// How far each state is moved by a disturbance of 1 that is held.
@@ -99,10 +124,23 @@ impl Motion {
     #[inline(always)]
     pub fn predict(&self, states: &mut [f64], correlation: f64) {
         let (states, hidden) = states.split_at_mut(self.states);
-        if self.integrated {
-            for i in (1..self.states).rev() {
-                for m in 1..=i {
-                    states[i] += self.powers[m - 1] * states[i - m];
+        match self.form {
+            Form::Absolute | Form::Increment => {}
+            Form::Acceleration => {
+                for i in (1..self.states).rev() {
+                    for m in 1..=i {
+                        states[i] += self.powers[m - 1] * states[i - m];
+                    }
+                }
+            }
+            Form::ExplicitEuler => {
+                for i in (1..self.states).rev() {
+                    states[i] += self.dt * states[i - 1];
+                }
+            }
+            Form::SemiImplicitEuler => {
+                for i in 1..self.states {
+                    states[i] += self.dt * states[i - 1];
                 }
             }
         }

@@ -53,6 +53,8 @@ fn a_form_is_read_by_its_name_and_has_its_shape() {
         (Form::Absolute, "absolute", 3),
         (Form::Increment, "increment", 3),
         (Form::Acceleration, "acceleration", 2),
+        (Form::ExplicitEuler, "explicit-euler", 2),
+        (Form::SemiImplicitEuler, "semi-implicit-euler", 2),
     ] {
         assert_eq!(name.parse(), Ok(form));
         assert_eq!(form.shape(signals), (5, outputs));

@@ -69,6 +69,20 @@ pub fn step(world: &World, program: &Program, form: Form, state: &[f64], command
             };
             (0..state.len()).map(derivative).collect()
         }),
+        Form::ExplicitEuler | Form::SemiImplicitEuler => {
+            let mut next = state.to_vec();
+            let given = |of| signals.derivative_of.iter().position(|&d| d == Some(of));
+            let driven = (0..state.len()).filter(|&of| given(of).is_none());
+            driven.zip(outputs(state)).for_each(|(of, output)| next[of] += output * signals.dt);
+            for of in 0..state.len() {
+                if let Some(rate) = given(of) {
+                    // The world has no rate that is given itself.
+                    let rates = if form == Form::ExplicitEuler { state } else { &next };
+                    next[of] = state[of] + rates[rate] * signals.dt;
+                }
+            }
+            next
+        }
     }
 }
 

@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 use twinloop_core::{
-    Annealing, Chain, Choices, Gram, Noise, Purpose, Record, Stream, Width, likelihood, most_likely_noise,
-    search,
+    Annealing, Chain, Choices, Form, Gram, Noise, Purpose, Record, Stream, Width, likelihood,
+    most_likely_noise, search,
 };
 
 use crate::dense::{Matrix, product, solved, transposed, zeros};
@@ -44,18 +44,17 @@ impl Case {
         let mut phi = zeros(d + self.hidden(), d + self.hidden());
         for i in 0..d {
             for m in 0..=i {
-                phi[i][i - m] = match (self.chain.integrated, m) {
+                phi[i][i - m] = match (self.chain.form, m) {
                     (_, 0) => 1.0,
-                    (true, _) => dt.powi(m as i32) / factorial(m),
-                    (false, _) => 0.0,
+                    (Form::Acceleration, _) => dt.powi(m as i32) / factorial(m),
+                    (Form::ExplicitEuler, 1) => dt,
+                    // x + dt (v + dt a).
+                    (Form::SemiImplicitEuler, _) => dt.powi(m as i32),
+                    _ => 0.0,
                 };
             }
             if self.hidden() > 0 {
-                phi[i][d] = match (self.chain.integrated, i) {
-                    (true, _) => dt.powi(i as i32 + 1) / factorial(i + 1),
-                    (false, 0) => 1.0,
-                    (false, _) => 0.0,
-                };
+                phi[i][d] = self.reach(i);
             }
         }
         if self.hidden() > 0 {
@@ -64,21 +63,34 @@ impl Case {
         phi
     }
 
+    /// How far a disturbance of 1 that is held for a period moves a state.
+    fn reach(&self, state: usize) -> f64 {
+        let dt = self.chain.dt;
+        match (self.chain.form, state) {
+            (Form::Acceleration, i) => dt.powi(i as i32 + 1) / factorial(i + 1),
+            (Form::SemiImplicitEuler, i) => dt.powi(i as i32 + 1),
+            (Form::ExplicitEuler, 0) => dt,
+            (_, 0) => 1.0,
+            _ => 0.0,
+        }
+    }
+
     /// What a period adds to the covariance of the states.
     fn added(&self) -> Matrix {
         let (d, dt) = (self.chain.states, self.chain.dt);
         let mut q = zeros(d + self.hidden(), d + self.hidden());
         for a in 0..d {
             for b in 0..d {
-                // ∫ (dt − s)^a / a! (dt − s)^b / b! ds.
-                q[a][b] = match (self.chain.integrated, a + b) {
-                    (true, power) => {
-                        let power = power + 1;
+                q[a][b] = match self.chain.form {
+                    // ∫ (dt − s)^a / a! (dt − s)^b / b! ds.
+                    Form::Acceleration => {
+                        let power = a + b + 1;
                         self.noise.process * dt.powi(power as i32)
                             / (factorial(a) * factorial(b) * power as f64)
                     }
-                    (false, 0) => self.noise.process,
-                    (false, _) => 0.0,
+                    Form::Absolute | Form::Increment => self.noise.process * self.reach(a) * self.reach(b),
+                    // White noise held for a period has a variance of process / dt.
+                    _ => self.noise.process / dt * self.reach(a) * self.reach(b),
                 };
             }
         }
@@ -141,13 +153,11 @@ impl Case {
                     phi.iter().map(|row| row.iter().zip(&state).map(|(p, x)| p * x).sum()).collect();
                 for (m, next) in next.iter_mut().enumerate() {
                     // Simpson's rule on ∫ (dt − s)^m / m! f(s) ds.
-                    *next += if self.chain.integrated {
+                    *next += if self.chain.form == Form::Acceleration {
                         let weight = |s: f64| (dt - s).powi(m as i32) / factorial(m);
                         dt / 6.0 * (weight(0.0) * start + 4.0 * weight(0.5 * dt) * middle + weight(dt) * end)
-                    } else if m == 0 {
-                        start
                     } else {
-                        0.0
+                        self.reach(m) * start
                     };
                 }
                 state = next;
@@ -165,8 +175,8 @@ fn factorial(n: usize) -> f64 {
 }
 
 fn case() -> impl Strategy<Value = Case> {
-    (1..4_usize, any::<bool>(), any::<bool>(), 3..9_usize).prop_flat_map(
-        |(states, integrated, gusts, steps)| {
+    (1..4_usize, prop::sample::select(Form::ALL.to_vec()), any::<bool>(), 3..9_usize).prop_flat_map(
+        |(states, form, gusts, steps)| {
             let readings = (steps + 1) * states;
             let feature = || prop::collection::vec(-2.0..2.0_f64, steps * FEATURES);
             let noise =
@@ -179,7 +189,7 @@ fn case() -> impl Strategy<Value = Case> {
             )
                 .prop_map(
                     move |(measured, weights, features, (sensors, process, gust, correlation_time))| Case {
-                        chain: Chain { states, dt: 0.1, integrated }.validated().unwrap(),
+                        chain: Chain { states, dt: 0.1, form }.validated().unwrap(),
                         noise: Noise {
                             sensors,
                             process,

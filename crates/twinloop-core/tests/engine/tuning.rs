@@ -34,8 +34,8 @@ fn code(text: &str) -> Code {
     Code::new(&program)
 }
 
-fn observed(noise: Noise, integrated: bool) -> Vec<Observed> {
-    let chain = Chain { states: 1, dt: DT, integrated }.validated().unwrap();
+fn observed(noise: Noise, form: Form) -> Vec<Observed> {
+    let chain = Chain { states: 1, dt: DT, form }.validated().unwrap();
     vec![Observed { states: vec![0], chain, noise: noise.validated(1).unwrap() }]
 }
 
@@ -61,7 +61,7 @@ impl Line {
         Self {
             code: code(&text),
             frame: Frame::new(Form::Increment, limits.signals()),
-            observer: observed(noise, false),
+            observer: observed(noise, Form::Increment),
             records: runs.iter().map(recorded).collect(),
             limits,
         }
@@ -218,7 +218,7 @@ fn a_lag_is_found_from_a_step_response() {
     let tuning = Tuning {
         code: &code,
         frame: &frame,
-        observer: &observed(noise, true),
+        observer: &observed(noise, Form::Acceleration),
         records: &[record],
         limits: &limits,
         free: &[],

@@ -98,7 +98,7 @@ class _Likelihood:
             for weights, none in zip(self.counted, nothing, strict=True)
         ]
         with engine_input():
-            self.still = _core.Regression(len(self.states), self.dt, chain.integrated, records)
+            self.still = _core.Regression(len(self.states), self.dt, chain.form, records)
 
     def __call__(self, chain: Chain) -> float:
         fit = self.hypothesis.fit

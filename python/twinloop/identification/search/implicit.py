@@ -136,8 +136,9 @@ def driving(problem: Problem, found: Sum) -> Floats:
                 missed += float(np.square(residual[:, 0]).sum())
                 continue
             missed += shown.missed * len(residual)
-            # What a period adds is one number for it.
-            edges = (shown.at[:-1], shown.at[1:]) if chain.integrated else (shown.between, shown.between)
+            # What a period adds is one number for it, and what a step of Euler goes on by.
+            finely = chain.form == "acceleration"
+            edges = (shown.at[:-1], shown.at[1:]) if finely else (shown.between, shown.between)
             for stage, slope in zip(value, (edges[0], shown.between, edges[1]), strict=True):
                 stage[rows] += slope / period
         ways.append((missed, value))

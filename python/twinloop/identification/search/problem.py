@@ -29,7 +29,7 @@ class Problem:
         dt: period, s.
         workers: how the work is carried out.
         priors: what is known of the law.
-        as_integrated: whether chains on increments bear what integration leaves, too: where forms are compared, what a
+        as_integrated: whether chains that step bear what integration leaves, too: where forms are compared, what a
             derivative could not show is no evidence for them.
     """
 
@@ -94,7 +94,7 @@ class Problem:
                 for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
             ]
             with engine_input():
-                return _core.Regression(len(states), self.dt, chain.integrated, records)
+                return _core.Regression(len(states), self.dt, chain.form, records)
 
         readings = [run.states[:, states] for run in self.runs]
         if known := self.usable(self.priors.fixed.get(states[0], ())):
@@ -133,9 +133,8 @@ class Problem:
 
     def integration(self, chain: Chain) -> float:
         """Variance, a period, of what integrating terms leaves of what moves a chain's first state."""
-        return (
-            float(self.stages.integration[chain.states[0]]) if chain.integrated or self.as_integrated else 0.0
-        )
+        integrated = chain.form == "acceleration" or self.as_integrated
+        return float(self.stages.integration[chain.states[0]]) if integrated else 0.0
 
     def readings(self, chain: Chain) -> int:
         """Readings of a chain that count."""

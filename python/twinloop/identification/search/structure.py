@@ -207,7 +207,10 @@ def _chosen(
         walks = walk(grams, costs, 0)
     subsets = [best(i, gram, walked) for i, (gram, walked) in enumerate(zip(grams, walks, strict=True))]
     for i, (chain, gram) in enumerate(zip(chains, grams, strict=True)):
-        if not chain.integrated or _feedthrough(problem, chain, usable, subsets[i][0]) <= MOST_FEEDTHROUGH:
+        if (
+            chain.form != "acceleration"
+            or _feedthrough(problem, chain, usable, subsets[i][0]) <= MOST_FEEDTHROUGH
+        ):
             continue
         rows = problem.feedthrough(chain, usable)
         for attempt, price in enumerate(FEEDTHROUGH_PRICES):

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from twinloop.arrays import Floats
+from twinloop.law.forms import DERIVATIVES
+from twinloop.law.noise import renewed_form
 from twinloop.records import Record, Recorded
 from twinloop.signals import Signals
 
@@ -38,7 +40,7 @@ class Chain(Recorded, kind="chain"):
         states: the driven one first, then its integral, and so on.
         output: number of the output of the program that drives them; None where other states do (an angle of a
             rigid body).
-        integrated: whether the output is a derivative, not an increment.
+        form: what the output means, and with it how the states move one another.
         sensors: variance of each state's sensor, in its unit squared.
         rough: variance of each state's readings about a polynomial through neighbours: the sensor's or more.
         motion: what disturbs the driven one.
@@ -46,34 +48,42 @@ class Chain(Recorded, kind="chain"):
 
     states: tuple[int, ...]
     output: int | None
-    integrated: bool
+    form: str
     sensors: Floats
     rough: Floats
     motion: Motion = QUIET
 
-    VERSION = 2
+    VERSION = 3
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of the first version, in which disturbances were numbers without names."""
-        motion = record.get("motion")
-        if not isinstance(motion, list) or len(motion) != len(Motion._fields):
-            return record
-        return {**record, "motion": dict(zip(Motion._fields, motion, strict=True))}
+        """A record of the first version, in which disturbances had no names, or of the second, which knew two forms."""
+        found, motion = dict(record), record.get("motion")
+        if isinstance(motion, list) and len(motion) == len(Motion._fields):
+            found["motion"] = dict(zip(Motion._fields, motion, strict=True))
+        integrated = found.pop("integrated", None)
+        if isinstance(integrated, bool):
+            found["form"] = renewed_form(integrated)
+        return found
+
+    @property
+    def integrated(self) -> bool:
+        """Whether the output is a derivative, not an increment."""
+        return self.form in DERIVATIVES
 
     def with_noise(self, sensors: Floats, motion: tuple[float, float, float]) -> Chain:
         """The same states with other noise."""
         return replace(self, sensors=np.asarray(sensors, dtype=np.float64), motion=Motion(*motion))
 
     @property
-    def engine(self) -> tuple[list[int], list[float], Motion, bool]:
+    def engine(self) -> tuple[list[int], list[float], Motion, str]:
         """The same for the native engine."""
-        return list(self.states), self.sensors.tolist(), self.motion, self.integrated
+        return list(self.states), self.sensors.tolist(), self.motion, self.form
 
 
 def driven_states(signals: Signals, form: str) -> tuple[int, ...]:
     """The states that a program's outputs drive under a form, in the order of the outputs."""
-    return signals.driven if form == "acceleration" else tuple(range(signals.n_x))
+    return signals.driven if form in DERIVATIVES else tuple(range(signals.n_x))
 
 
 def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
@@ -81,14 +91,14 @@ def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
 
     Args:
         signals: of the system.
-        form: "acceleration", "increment" or "absolute".
+        form: one of those of a law.
         sensors: a first guess of each sensor's variance (n_x,).
 
     Returns:
         Every state is in one of them.
     """
-    if form != "acceleration":
-        return [Chain((i,), i, False, sensors[[i]], sensors[[i]]) for i in range(signals.n_x)]
+    if form not in DERIVATIVES:
+        return [Chain((i,), i, form, sensors[[i]], sensors[[i]]) for i in range(signals.n_x)]
     driven, given = [], []
     names = signals.state_names
     seen: set[int] = set()
@@ -99,8 +109,8 @@ def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
             states.append(names.index(parent))
             parent = signals.states[states[-1]].derivative_of
         seen.update(states)
-        driven.append(Chain(tuple(states), output, True, sensors[states], sensors[states]))
+        driven.append(Chain(tuple(states), output, form, sensors[states], sensors[states]))
     for i in range(signals.n_x):
         if i not in seen:
-            given.append(Chain((i,), None, True, sensors[[i]], sensors[[i]]))
+            given.append(Chain((i,), None, form, sensors[[i]], sensors[[i]]))
     return [*driven, *given]

@@ -73,7 +73,7 @@ def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chai
         The chain with that noise; as it was where readings are too few.
     """
     (angle,) = chain.states
-    residuals = [(run.states[1:] - kinematic_step(run.states, signals))[:, angle] for run in runs]
+    residuals = [(run.states[1:] - kinematic_step(run.states, signals, chain.form))[:, angle] for run in runs]
     if sum(len(residual) for residual in residuals) < FEW_READINGS:
         return chain
     # A single wild reading must not be taken for noise.

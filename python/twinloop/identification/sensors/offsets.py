@@ -165,19 +165,38 @@ class _Group:
 
     def _believed(self, size: float) -> list[Chain]:
         """The chains with the noise under which that is most likely."""
-        dt, problems = self.signals.dt, []
-        for chain, regression in zip(self.chains, self._regressions(size, self.chains), strict=True):
-            low, slow = floor_of(chain, dt)
-            first = float(chain.rough[0])
-            gust = 0.0 if chain.output is None else max(first / (dt * dt), slow[1])
-            start = (max(first / dt, slow[0]), gust, 10.0 * dt)
-            problems.append((regression, [0.0], np.maximum(chain.rough, low), start, low, slow))
-        with engine_input():
-            found = _core.most_likely_noises(problems, self.workers)
-        return [
-            chain.with_noise(sensors, motion)
-            for chain, (sensors, motion, _) in zip(self.chains, found, strict=True)
-        ]
+        runs = moved(self.runs, self.signals, self._at(size))
+        return [chain for chain, _ in unexplained_noise(runs, self.signals, self.chains, self.workers)]
+
+
+def unexplained_noise(
+    runs: Sequence[Run], signals: Signals, chains: Sequence[Chain], workers: _core.Workers
+) -> list[tuple[Chain, float]]:
+    """The noise under which readings are most likely if disturbances are all that drives some chains.
+
+    Args:
+        runs: as they would have been read had all sensors been read at once.
+        signals: of the system.
+        chains: whose forms say how states move one another.
+        workers: how the work is carried out.
+
+    Returns:
+        Each chain with that noise, and −2 log of the likelihood of its readings, up to a constant.
+    """
+    dt, problems = signals.dt, []
+    for chain in chains:
+        low, slow = floor_of(chain, dt)
+        first = float(chain.rough[0])
+        gust = 0.0 if chain.output is None else max(first / (dt * dt), slow[1])
+        start = (max(first / dt, slow[0]), gust, 10.0 * dt)
+        regression = _unexplained(runs, signals, chain)
+        problems.append((regression, [0.0], np.maximum(chain.rough, low), start, low, slow))
+    with engine_input():
+        found = _core.most_likely_noises(problems, workers)
+    return [
+        (chain.with_noise(sensors, motion), length)
+        for chain, (sensors, motion, length) in zip(chains, found, strict=True)
+    ]
 
 
 def _unexplained(runs: Sequence[Run], signals: Signals, chain: Chain) -> _core.Regression:
@@ -187,11 +206,11 @@ def _unexplained(runs: Sequence[Run], signals: Signals, chain: Chain) -> _core.R
         readings = run.states[:, list(chain.states)]
         nothing = np.zeros((len(run.commands), 1))
         if chain.output is None:
-            turned = kinematic_step(run.states, signals) - run.states[:-1]
+            turned = kinematic_step(run.states, signals, chain.form) - run.states[:-1]
             readings[1:] -= np.cumsum(turned[:, list(chain.states)], axis=0)
         records.append((readings, run.weights[:, list(chain.states)], nothing, nothing, nothing))
     with engine_input():
-        return _core.Regression(len(chain.states), signals.dt, chain.integrated, records)
+        return _core.Regression(len(chain.states), signals.dt, chain.form, records)
 
 
 def _coarse(judge: Callable[[float], float]) -> float:

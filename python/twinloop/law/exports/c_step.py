@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from twinloop.law.exports.c_words import number, places
+from twinloop.law.forms import EULER
 from twinloop.law.law import Law
 from twinloop.signals import RigidBody
 
@@ -19,10 +20,11 @@ def step_c(law: Law, name: str, precision: str, n_x: int) -> list[str]:
         f"    {name}_effects(memory, u, seen);",
     ]
     if law.form != "acceleration":
-        add = "x[i] + first[i]" if law.form == "increment" else "first[i]"
+        add = "first[i]" if law.form == "absolute" else "x[i] + first[i]"
+        stage = 0 if law.form in EULER else 1
         return [
             *lines,
-            f"    {name}outputs_c(x, seen[1], first);",
+            f"    {name}outputs_c(x, seen[{stage}], first);",
             f"    for (int i = 0; i < {n_x}; ++i) {{",
             f"        next[i] = {add};",
             "    }",

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from twinloop._core import __version__
 from twinloop.law.exports.sensor_source import sensor_layout, sensor_source
 from twinloop.law.exports.step_source import step_source
+from twinloop.law.forms import DERIVATIVES, EULER
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Term, Writer
 
@@ -231,15 +232,19 @@ def equation_roots(law: Law) -> tuple[int, ...]:
     Args:
         law: of a twin.
     """
-    return law.derivatives() if law.form == "acceleration" else law.outputs
+    return law.derivatives() if law.form in DERIVATIVES else law.outputs
 
 
 def stepped_roots(law: Law) -> tuple[int, ...]:
-    """The same for a step, in which the angles of a rigid body go on as a quaternion: 0 stands for their derivatives.
+    """The same for a step: with a form of Euler what it adds.
+
+    Where the angles of a rigid body go on as a quaternion, 0 stands for their derivatives.
 
     Args:
         law: of a twin.
     """
+    if law.form in EULER:
+        return law.increments()
     body = law.signals.kinematics
     if law.form != "acceleration" or body is None:
         return equation_roots(law)

@@ -15,6 +15,16 @@ def _step(x, start, middle, end):
     """The state and what is added to it."""
     return [value + added for value, added in zip(x, _outputs(x, middle))]
 ''',
+    "explicit-euler": '''
+def _step(x, start, middle, end):
+    """One explicit Euler step."""
+    return [value + added for value, added in zip(x, _outputs(x, start))]
+''',
+    "semi-implicit-euler": '''
+def _step(x, start, middle, end):
+    """One semi-implicit Euler step."""
+    return [value + added for value, added in zip(x, _outputs(x, start))]
+''',
     "acceleration": '''
 def _step(x, start, middle, end):
     """One Runge-Kutta step of order four."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+import sys
+from dataclasses import replace
 
 from twinloop._core import __version__
-from twinloop.law.equations import equations
+from twinloop.law.equations import LATER, equations, given_symbols
 from twinloop.law.expansion import Expansion, written
 from twinloop.law.exports.python_source import equation_roots, joined
 from twinloop.law.expressions import Expressions
+from twinloop.law.forms import DERIVATIVES, EULER
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Writer
 from twinloop.texts import one_line
@@ -31,8 +34,9 @@ def sympy_source(law: Law) -> str:
 
     Returns:
         Python that leaves `STATES`, `COMMANDS` (in units of their scales), `HIDDEN` and `EQUATIONS`, a matrix with the
-        derivative of each state, or with what the form of the twin says; where sensors are late or early also `READ`,
-        by state what its sensor gives at the time `t`. Divisions are plain ones.
+        derivative of each state (with a form of Euler they make one step a period), or with what the form of the twin
+        says; where sensors are late or early also `READ`, by state what its sensor gives at the time `t`. Divisions are
+        plain ones.
     """
     roots = equation_roots(law)
     symbols = [f"{symbol}_" if symbol in TAKEN else symbol for symbol in law.symbols]
@@ -44,7 +48,7 @@ def sympy_source(law: Law) -> str:
     groups = dict(
         zip(TAKEN[1:4], (symbols[:n_x], symbols[n_x : n_x + n_u], symbols[n_x + n_u :]), strict=True)
     )
-    kinds = {"acceleration": "derivatives of the states", "absolute": "the next states"}
+    kinds = {**dict.fromkeys(DERIVATIVES, "derivatives of the states"), "absolute": "the next states"}
     lines = [
         f'"""The equations of a twin, learnt by Twinloop {__version__}: {kinds.get(law.form, "what is added")}."""',
         "",
@@ -79,6 +83,12 @@ def _late(law: Law) -> list[tuple[int, float]]:
     return [(i, offset) for i, offset in enumerate(law.offsets) if offset != 0.0]
 
 
+def _latex_symbol(symbol: str) -> str:
+    """The name of a signal now or a period later."""
+    later = "_{k+1}" if symbol.endswith(LATER) else ""
+    return latex_name(symbol.removesuffix(LATER)) + later
+
+
 def _latex_number(value: float, digits: int) -> str:
     text = f"{value:.{digits}g}"
     mantissa, exponent = text.split("e") if "e" in text else (text, "")
@@ -102,6 +112,9 @@ LATEX = Dialect(
     longest=400,
 )
 
+IN_FULL = replace(LATEX, longest=sys.maxsize, worth=sys.maxsize)
+"""No part of an equation has a name."""
+
 
 def latex_source(law: Law, digits: int = 6) -> str:
     """A law as LaTeX, multiplied out.
@@ -124,25 +137,23 @@ def latex_source(law: Law, digits: int = 6) -> str:
         for number, name in writer.names.items()
     ]
     outputs = dict(zip(law.outputs, roots, strict=True))
-    kinematic = Writer(
-        law.expressions,
-        equation_roots(law),
-        [latex_name(symbol) for symbol in law.symbols],
-        digits,
-        "t_",
-        False,
-        LATEX,
-    )
-    for place, (name, root) in enumerate(zip(law.signals.state_names, equation_roots(law), strict=True)):
+    every = equation_roots(law)
+    for place, (name, root) in enumerate(zip(law.signals.state_names, every, strict=True)):
         symbol = latex_name(name)
-        driven = law.form != "acceleration" or place in law.signals.driven
-        right = joined((writer if driven else kinematic).terms(outputs[root] if driven else root), " ")
+        if law.form not in DERIVATIVES or place in law.signals.driven:
+            terms = writer.terms(outputs[root])
+        else:
+            symbols = [_latex_symbol(each) for each in given_symbols(law, place, LATER)]
+            terms = Writer(law.expressions, every, symbols, digits, "t_", False, IN_FULL).terms(root)
+        right = joined(terms, " ")
         if law.form == "acceleration":
             left = rf"\frac{{\mathrm{{d}} {symbol}}}{{\mathrm{{d}} t}}"
         else:
             left = rf"{symbol}_{{k+1}}"
             if law.form == "increment":
                 right = f"{symbol} - {right[1:]}" if right.startswith("-") else f"{symbol} + {right}"
+            elif law.form in EULER:
+                right = rf"{symbol} + {_latex_number(law.signals.dt, digits)} \left({right}\right)"
         lines.append(rf"  {left} &= {right}")
     lines = [re.sub(r"\bt_([0-9]+)", r"t_{\1}", line) for line in lines]
     for place, offset in _late(law):

@@ -152,9 +152,14 @@ class Loops:
             low, high = float(frequencies[place]), float(frequencies[place + 1])
             for _ in range(HALVINGS):
                 middle = math.sqrt(low * high)
-                there = mark(complex(self.response(loop, np.array([middle]))[0]))
+                try:
+                    there = mark(complex(self.response(loop, np.array([middle]))[0]))
+                except np.linalg.LinAlgError:
+                    # An oscillation without damping: L leaps through infinity there, and crosses nothing.
+                    break
                 low, high = (middle, high) if there * marks[place] > 0.0 else (low, middle)
-            found.append(math.sqrt(low * high))
+            else:
+                found.append(math.sqrt(low * high))
         return found
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from twinloop.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.actuation import Actuation, Actuator
+from twinloop.law.forms import EULER
 from twinloop.law.law import Law
 from twinloop.law.linear.attitude import angles, quaternion, turning
 from twinloop.law.linear.dual import Dual
@@ -53,8 +54,8 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
 def _instant(law: Law, state: Floats, command: Floats) -> Linear:
     if law.form != "acceleration":
         raise NotAvailable(
-            f"Linearisation: expected a law of derivatives, found the form {law.form!r}, which steps from period to"
-            " period; ask for discrete=True."
+            f"Linearisation: expected a law whose derivatives are integrated, found the form {law.form!r}, which steps"
+            " from period to period; ask for discrete=True."
         )
     signals, hidden = law.signals, law.actuation.hidden
     n_x, n_u = signals.n_x, signals.n_u
@@ -229,6 +230,8 @@ def _stepped(law: Law, x: Dual, inputs: Sequence[Dual]) -> Dual:
         return of(law.outputs, x, inputs[1])
     if law.form == "increment":
         return x + of(law.outputs, x, inputs[1])
+    if law.form in EULER:
+        return x + of(law.increments(), x, inputs[0])
     roots, body = law.derivatives(), law.signals.kinematics
 
     def slope(point: Dual, given: Dual) -> Dual:
