@@ -9,8 +9,11 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
 from lives import CONTROLLER, SIGNALS, THOROUGH, StopAt
 from oracles import rk4, same_bits
+from strategies import program_text
+from twinloop import _core
 from twinloop.campaign import controller_to_fly, standing
 from twinloop.campaign.entering import check_first_reading
+from twinloop.campaign.identify_and_plan import learning
 from twinloop.faces.result import summary
 from twinloop.law.noise import Noise
 
@@ -399,6 +402,29 @@ def test_the_band_of_exact_readings_is_that_of_what_the_twin_leaves_of_the_fligh
         np.testing.assert_array_equal(twin.noise.sensors, np.median(nine_of_ten, axis=0) / 1.645)
         assert twin.inflation == 1.0 and twin.noise.sensors.max() < 1e-12
     assert min(shares) > 0.5
+
+
+def test_where_more_flights_make_a_worse_twin_the_one_of_before_is_kept(begin, pendulum, monkeypatch):
+    campaign = told(begin(), pendulum)
+    test = campaign.ask()
+    before = campaign.twin.equations()
+    identify, nothing = learning.identify_runs, "r3 = r3 + 0.0"
+
+    def worse(*arguments, **given):
+        found = identify(*arguments, **given)
+        program = _core.Program.parse(program_text(3, 1, 4, [[nothing]]))
+        still = _core.Model(program, "acceleration", SIGNALS.engine)
+        return replace(found, model=still, members=[still] * len(found.members))
+
+    monkeypatch.setattr(learning, "identify_runs", worse)
+    campaign.tell(test, pendulum.run(test))
+    assert campaign.twin.equations() == before
+    assert [remark.code for remark in campaign.twin.remarks].count("known-before") == 1
+    monkeypatch.setattr(learning, "identify_runs", identify)
+    test = campaign.ask()
+    campaign.tell(test, pendulum.run(test))
+    assert campaign.twin.equations() != before
+    assert "known-before" not in [remark.code for remark in campaign.twin.remarks]
 
 
 def test_gusts_are_reported_unless_the_readings_were_taken_for_exact(begin, monkeypatch):

@@ -31,7 +31,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.objectives import closed_loop, normalised_error
-from twinloop.remarks import serious
+from twinloop.remarks import Remark, note, serious
 from twinloop.steps import Watch
 from twinloop.streams import Unit
 
@@ -45,6 +45,12 @@ ROUGH = serious(
     " terms only: it follows them roughly, which may do to tune gains, and is no simulator.",
 )
 """What is said of a twin that is linear because no other one follows."""
+BEFORE = note(
+    "known-before",
+    "What all flights teach misses some of them, flown by itself; what was known before the last of them misses none."
+    " The twin is the one of before.",
+)
+"""What is said of a twin that has not learnt all flights and follows them, where the one that has does not."""
 WRONG = 0.5
 """Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
 
@@ -74,6 +80,11 @@ class Answer:
     def worst(self) -> float:
         """Mean square of the best member on the flight that it misses most, over that of the model that never moves."""
         return self.followed.worst(0)
+
+    @property
+    def explained(self) -> bool:
+        """Whether it follows the flights, and noise and disturbances explain what its free runs miss."""
+        return self.follows and not any(self.missed)
 
 
 @dataclass(frozen=True)
@@ -127,10 +138,14 @@ class Learner:
             keep=keep,
         )
         answer = self._flown(identified, book)
-        if (not answer.follows or any(answer.missed)) and self.options.plain != self.options:
+        if not answer.explained and asked is not None:
+            # It has not learnt the flights since: where it explains all of them, it knows more.
+            known = self._flown(as_known_before(asked.identified), book)
+            answer = known if known.explained else answer
+        if not answer.explained and self.options.plain != self.options:
             # What is too coarse for a simulator may still tell better gains from worse.
             plain = identified_from(self.options.plain, iteration=PLAIN + told)
-            rough = self._flown(replace(plain, remarks=[*plain.remarks, ROUGH]), book)
+            rough = self._flown(with_remark(plain, ROUGH), book)
             if rough.follows and (not answer.follows or rough.worst < answer.worst):
                 answer = rough
         identified, follows = answer.identified, answer.follows
@@ -250,6 +265,17 @@ class Learner:
             ),
             recurring=tuple(recurring),
         )
+
+
+def as_known_before(identified: Identified) -> Identified:
+    """What was known before the last flights, which says so."""
+    known = replace(identified, remarks=[each for each in identified.remarks if each.code != BEFORE.code])
+    return with_remark(known, BEFORE)
+
+
+def with_remark(identified: Identified, remark: Remark) -> Identified:
+    """The same with a remark more."""
+    return replace(identified, remarks=[*identified.remarks, remark])
 
 
 def believed_members(followed: Following) -> list[int]:
