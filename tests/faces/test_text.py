@@ -78,7 +78,10 @@ def result_of_default(**advice):
             "ignored": 0, "remarks": ["Fly another test before you trust it."],
             "states": [{"name": "angle", "unit": "rad", "error": 2e-3, "sensor": 1e-3}],
             "disturbances": [
-                {"name": "rate", "unit": "rad/s", "white": 0.0, "correlated": 0.5, "correlation_time": 0.2},
+                {
+                    "name": "rate", "unit": "rad/s", "white": 0.0, "correlated": 0.5, "correlation_time": 0.2,
+                    "recurs": False,
+                },
             ],
             "actuators": [{"name": "torque", "lag": 0.03, "delay": 1}],
             "hidden": [{"commands": ["torque"], "squared": True, "rest": 0.0, "time": 0.8}],

@@ -231,14 +231,14 @@ def test_the_noise_that_made_a_record_is_found(states, form, sensors, white):
 
 def test_what_a_record_sees_as_a_constant_is_no_correlated_disturbance():
     """Each record drifts its own way; a disturbance is forgotten four times within one at least."""
-    dense, steps = Dense(1, True), 200
+    dense, steps = Dense(1, "acceleration"), 200
     nothing, drift = np.zeros((steps, 1)), DT * np.arange(steps + 1.0)
     noise = 1e-3 * np.random.default_rng(0).standard_normal((2, steps + 1))
     records = [
         ((sign * drift + noise[i])[:, np.newaxis], np.ones((steps + 1, 1)), nothing, nothing, nothing)
         for i, sign in enumerate((1.0, -2.0))
     ]
-    regression = _core.Regression(dense.states, DT, True, records)
+    regression = _core.Regression(dense.states, DT, dense.form, records)
     problem = (regression, [0.0], [1e-6], (1e-9, 1.0, 10.0 * DT), [1e-12], (1e-12, 1e-12, DT))
     ((_, motion, _),) = _core.most_likely_noises([problem])
     assert motion[1] > 0.01 and motion[2] == pytest.approx(0.25 * DT * (steps + 1))

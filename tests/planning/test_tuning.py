@@ -397,7 +397,7 @@ def test_a_gust_that_is_predicted_is_that_of_a_kalman_filter():
         speed += DT * (u + gust[-1])
         gust.append(kept * gust[-1] + np.sqrt(1.0 - kept * kept) * size * random.standard_normal())
     readings = np.array(readings)
-    chain = [([0], [SENSOR], (1e-12, size * size, time), True)]
+    chain = [([0], [SENSOR], (1e-12, size * size, time), "acceleration")]
     [(_, states, gusts)] = _core.predictions(model, LIMITS, chain, [(readings, np.ones((121, 1)), commands)])
     moves, believed = np.array([[1.0, DT], [0.0, kept]]), []
     mean, covariance = np.array([readings[0, 0], 0.0]), np.diag([np.abs(readings).max() ** 2, size * size])
