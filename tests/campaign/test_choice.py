@@ -10,7 +10,7 @@ import twinloop as tl
 from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign import standing
-from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed, confirmed_once
+from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed, nearly_confirmed
 from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
@@ -182,5 +182,9 @@ def test_no_other_family_has_starts_by_lqr():
 )
 def test_a_prediction_comes_true_within_two_spreads_or_a_tenth(predicted, spread, quality, true):
     run = SimpleNamespace(test=SimpleNamespace(predicted=predicted, spread=spread), quality=quality)
-    assert confirmed_once([run]) is true
-    assert confirmed_once([SimpleNamespace(test=None, quality=1.0), run]) is true
+    assert nearly_confirmed([run]) is true
+    assert nearly_confirmed([SimpleNamespace(test=None, quality=1.0), run]) is true
+    came_true = SimpleNamespace(test=SimpleNamespace(predicted=1.0, spread=0.1), quality=1.0)
+    unasked = SimpleNamespace(test=None, quality=5.0)
+    assert nearly_confirmed([came_true, run, unasked]) is (true or predicted is None)
+    assert nearly_confirmed([run, came_true]) is True

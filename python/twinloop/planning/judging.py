@@ -38,7 +38,7 @@ class Committee:
         members: m of them.
         sds: of each state's sensor (n_x,).
         trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
-        delayed: models with more delay than was seen; gains have to bear it as long as no prediction has come true.
+        delayed: models with more delay than was seen; gains have to bear it until the last prediction came true.
     """
 
     members: Sequence[_core.Model]

@@ -193,20 +193,28 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
     Args:
         experiments: in the order of `tell`.
     """
-    for run in reversed(experiments):
-        test = run.test
-        if test is not None and test.predicted is not None and not np.isnan(test.predicted):
-            return _came_true(run, 0.0)
-    return True
+    run = _last_predicted(experiments)
+    return run is None or _came_true(run, 0.0)
 
 
-def confirmed_once(experiments: Sequence[Experiment]) -> bool:
-    """Whether the quality of some flight came out as predicted: within two spreads, or within a tenth of it.
+def nearly_confirmed(experiments: Sequence[Experiment]) -> bool:
+    """Whether the last flight that something was predicted of came within two spreads of it, or a tenth of itself.
+
+    Where nothing was predicted yet, nothing is confirmed.
 
     Args:
         experiments: in the order of `tell`.
     """
-    return any(_came_true(run, NEARLY) for run in experiments)
+    run = _last_predicted(experiments)
+    return run is not None and _came_true(run, NEARLY)
+
+
+def _last_predicted(experiments: Sequence[Experiment]) -> Experiment | None:
+    for run in reversed(experiments):
+        test = run.test
+        if test is not None and test.predicted is not None and not np.isnan(test.predicted):
+            return run
+    return None
 
 
 def _came_true(run: Experiment, share: float) -> bool:

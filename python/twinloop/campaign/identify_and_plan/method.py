@@ -15,7 +15,7 @@ from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import (
     calibrated,
 )
-from twinloop.campaign.identify_and_plan.choice import Choice, confirmed_once
+from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -233,7 +233,8 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        slower = [] if confirmed_once(book.experiments) else [delayed(latest.believed[0], self.setup.signals)]
+        confirmed = nearly_confirmed(book.experiments)
+        slower = [] if confirmed else [delayed(latest.believed[0], self.setup.signals)]
         return Committee(latest.believed, sensors, latest.follows, delayed=slower)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
