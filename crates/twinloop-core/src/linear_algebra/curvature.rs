@@ -30,7 +30,7 @@ pub(crate) fn covariance(curvature: &[f64], values: &[f64]) -> Option<Vec<f64>> 
             matrix[i * size + j] = curvature[i * size + j] * scales[i] * scales[j];
         }
         let prior = scales[i] / values[i].abs().max(f64::MIN_POSITIVE.sqrt());
-        matrix[i * size + i] += 1e-9 + (prior * prior).min(1e12);
+        matrix[i * size + i] += 1e-9 + (prior * prior).min(1e280);
     }
     let inverse = Cholesky::new(&matrix, size, 0.0)?.inverse();
     Some((0..size * size).map(|ij| inverse[ij] * scales[ij / size] * scales[ij % size]).collect())
@@ -78,5 +78,8 @@ mod tests {
             signs[0] * signs[0] * alike[0] + 2.0 * signs[0] * signs[1] * alike[1] + alike[3]
         };
         assert!(of([1.0, 1.0]) < 1e-7 && (of([1.0, -1.0]) - 2.0).abs() < 0.5, "{alike:?}");
+        // One that no reading answers to is as unsure as it is large.
+        let dead = covariance(&[4.0, 0.0, 0.0, 0.0], &[2.0, 0.1]).expect("positive definite");
+        assert!((dead[0] - 1.0 / 4.25).abs() < 1e-8 && (dead[3] - 0.01).abs() < 1e-8, "{dead:?}");
     }
 }

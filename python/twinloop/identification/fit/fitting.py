@@ -9,6 +9,7 @@ import numpy as np
 from twinloop.identification.context import Context
 from twinloop.identification.fit.models import bounds_of, layout, model_of
 from twinloop.identification.fit.predictions import without_outliers
+from twinloop.identification.fit.support import supported
 from twinloop.identification.fit.tuning import tune
 from twinloop.identification.hypothesis import Fit, Hypothesis
 from twinloop.identification.search.structure import Sum, Weights, prices
@@ -36,6 +37,14 @@ def fitted(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         if not pruned.chi_squared - fit.chi_squared < saved:
             break
         best, fit = other, pruned
+    for _ in range(PRUNINGS):
+        fewer = supported(context, best)
+        if fewer is best:
+            break
+        other, _ = _tuned(context, fewer)
+        if not other.evidence.stable:
+            break
+        best = other
     return best
 
 
