@@ -83,7 +83,7 @@ def likelihood(residual: np.ndarray, about: np.ndarray) -> float:
 def report(smoke: bool) -> Section:
     section = Section(f"Whitening: a chain of two states with gusts, {STEPS} steps, {FEATURES} features")
     readings, coefficients, features = record(np.random.default_rng(2))
-    regression = _core.Regression(2, DT, True, [(readings, np.ones_like(readings), *features)])
+    regression = _core.Regression(2, DT, "acceleration", [(readings, np.ones_like(readings), *features)])
     motion, workers = (PROCESS, GUST, MEMORY), _core.Workers(1)
     [residual] = regression.residuals(coefficients)
     about = spread(readings)

@@ -105,7 +105,7 @@ def report(smoke: bool) -> Section:
         f"Tuning: 4 constants on {RUNS} runs of {STEPS} steps, predictions whitened by an observer"
     )
     records, runs = flights(np.random.default_rng(4))
-    chains = [([1, 0], SENSORS.tolist(), (PROCESS, 0.0, 1.0), True)]
+    chains = [([1, 0], SENSORS.tolist(), (PROCESS, 0.0, 1.0), "acceleration")]
     limits, start, workers = _core.Limits(SIGNALS), model(START), _core.Workers(1)
 
     def ours() -> tuple[np.ndarray, float]:

@@ -22,7 +22,7 @@ def library(rng: np.random.Generator) -> tuple[_core.Gram, np.ndarray]:
     readings = np.concatenate([[0.0], np.cumsum(increments)])[:, None]
     record = (readings, np.ones_like(readings), features, features, features)
     # What disturbs a period is all the noise there is: whitening is then the difference of neighbours.
-    gram = _core.Regression(1, DT, False, [record]).gram([1e-12], (0.05**2, 0.0, 1.0))
+    gram = _core.Regression(1, DT, "increment", [record]).gram([1e-12], (0.05**2, 0.0, 1.0))
     columns = np.concatenate([features, np.diff(readings, axis=0)], axis=1) / 0.05
     return gram, columns.T @ columns
 
