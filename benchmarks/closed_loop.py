@@ -41,7 +41,8 @@ def report(smoke: bool) -> Section:
 def _programs(count: int, selected: _core.SelectedTests):
     """Programs and models; one that diverges on a test is drawn again, for its run would end early."""
     rng = np.random.default_rng(1)
-    programs, models = [], []
+    programs: list[np.ndarray] = []
+    models: list[_core.Model] = []
     while len(programs) < count:
         program = random_program(rng, INPUTS, OUTPUTS)
         model = _core.Model(native(program, INPUTS, OUTPUTS), "acceleration", loop.SIGNALS)

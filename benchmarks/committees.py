@@ -1,5 +1,8 @@
 """Committees: how well candidates fly on every member, and where members disagree, beside NumPy over all at once."""
 
+from collections.abc import Callable
+from typing import Any
+
 import loop
 import numpy as np
 from measure import Line, Section, check_agreement, interleaved, ratio
@@ -83,7 +86,7 @@ def report(smoke: bool) -> Section:
     flights = _core.Flights(loop.FAR, gains, np.zeros((count, 6)), np.tile(TARGET, (count, 1)), loop.STEPS)
     quality = _core.Quality("iae", np.ones(6), effort=EFFORT)
     envelope = [(-HALF_WIDTH, HALF_WIDTH)] * 6
-    cases = {
+    cases: dict[str, dict[str, Callable[[], Any]]] = {
         f"qualities, {DRAWS} draws of noise": {
             OURS: lambda: _core.qualities(members, flights, quality, envelope, noise=noise, workers=workers),
             NUMPY: lambda: qualities(weights, gains, noise),

@@ -1,5 +1,8 @@
 """Whitening: Gram matrices and likelihoods of noise, which one filter gives, beside that filter in NumPy."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from measure import Line, Section, check_agreement, interleaved, ratio
 
@@ -94,7 +97,7 @@ def report(smoke: bool) -> Section:
     check_agreement(
         "Gram, least squares", solved[0], np.linalg.solve(expected[:8, :8], expected[:8, -1]), 1e-6
     )
-    cases = {
+    cases: dict[str, dict[str, Callable[[], Any]]] = {
         "Gram": {
             OURS: lambda: regression.gram(SENSORS, motion, workers),
             NUMPY: lambda: products(readings, features),

@@ -21,7 +21,7 @@ def report(smoke: bool) -> Section:
     test = campaign.test(system.default_gains)
     flight = system.run(test)
     horizons = (0.0, 0.4) if smoke else (0.0, 0.2, 0.4, 0.8)
-    controllers = {ALONE: test.controller()}
+    controllers: dict[str, tl.controllers.Controller | Guard] = {ALONE: test.controller()}
     for horizon in horizons:
         controllers[f"guard, {horizon:g} s ahead"] = campaign.guard(test, horizon=horizon, clock=None)
     sent = {name: _flown(controller, test, flight.states) for name, controller in controllers.items()}

@@ -9,6 +9,7 @@ import json
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -119,7 +120,7 @@ def learnt(name, noise, changes, seed=0):
     found = identify_runs([Run.of(readings, nothing)], signals, options, seed=seed, workers=_core.Workers(1))
     seconds = time.process_time() - begun
     law = Law.of(found.model, signals)
-    script = {}
+    script: dict[str, Any] = {}
     exec(sympy_source(law), script)  # the package's own text
     locals_ = {symbol.name: symbol for symbol in script["STATES"]}
     truths = [sp.sympify(text, locals=locals_) for text in system.equations.values()]

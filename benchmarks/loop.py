@@ -11,12 +11,14 @@ ARM, THRUST, DRAG, MASS = 0.23, 3.13e-5, 7.5e-7, 0.65
 HOVER = float(np.sqrt(MASS * 9.81 / 4 / THRUST))
 BOUNDS = (0.0, 300.0)
 MIX = np.linalg.inv(
-    [
-        [0, -ARM * THRUST, 0, ARM * THRUST],
-        [ARM * THRUST, 0, -ARM * THRUST, 0],
-        [-DRAG, DRAG, -DRAG, DRAG],
-        [1, 1, 1, 1],
-    ]
+    np.array(
+        [
+            [0, -ARM * THRUST, 0, ARM * THRUST],
+            [ARM * THRUST, 0, -ARM * THRUST, 0],
+            [-DRAG, DRAG, -DRAG, DRAG],
+            [1, 1, 1, 1],
+        ]
+    )
 )
 MATRIX = np.ascontiguousarray(MIX[:, :3])
 OFFSET = MIX[:, 3] * 4 * HOVER**2

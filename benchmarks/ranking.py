@@ -58,7 +58,7 @@ def _check_selection(objectives: np.ndarray, theirs: np.ndarray) -> None:
     for rows in (ours, theirs):
         if ranks[rows].max() != last:
             raise Disagreement("ranking: the last fronts differ.")
-    cut = [np.sort(crowding[rows[ranks[rows] == last]]) for rows in (ours, theirs)]
-    check_agreement("crowding of the last front", *cut)
-    whole = [np.sort(rows[ranks[rows] < last]) for rows in (ours, theirs)]
-    check_agreement("rows of the fronts before", *whole)
+    cut, their_cut = (np.sort(crowding[rows[ranks[rows] == last]]) for rows in (ours, theirs))
+    check_agreement("crowding of the last front", cut, their_cut)
+    whole, their_whole = (np.sort(rows[ranks[rows] < last]) for rows in (ours, theirs))
+    check_agreement("rows of the fronts before", whole, their_whole)

@@ -62,7 +62,8 @@ def _baseline(name: str, over_numpy: Spread) -> str:
 
 def _programs(rng: np.random.Generator, count: int, tests: _core.SelectedTests):
     """Programs and models; one at the cap of the error is drawn again, for at the cap all agree."""
-    programs, models = [], []
+    programs: list[np.ndarray] = []
+    models: list[_core.Model] = []
     while len(programs) < count:
         program = random_program(rng, INPUTS, OUTPUTS)
         model = _core.Model(native(program, INPUTS, OUTPUTS), "absolute", loop.SIGNALS)
