@@ -8,9 +8,10 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
-from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, distinct, other_commands
-from twinloop.campaign.identify_and_plan.following import unexplained
+from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, distinct
+from twinloop.campaign.identify_and_plan.misses import Miss, unexplained
 from twinloop.campaign.identify_and_plan.readings import froze, ratio
+from twinloop.campaign.identify_and_plan.sent import other_commands
 
 DT, STEPS = 0.02, 200
 SIGNALS = tl.Signals(
@@ -94,12 +95,28 @@ def remarked(*runs, **found):
 
 
 def test_a_free_run_that_noise_does_not_explain_is_a_serious_remark():
-    assert remarked(flown(), missed=[0.0]) == []
-    assert remarked(flown(), missed=[4.5]) == [("free-run", True)]
-    assert remarked(flown(), flown(1), missed=[0.0, np.inf]) == [("free-run", True)]
+    assert remarked(flown(), misses=[]) == []
+    assert remarked(flown(), misses=[Miss(1, 1, 0.2, 4.5, False)]) == [("free-run", True)]
+    assert remarked(flown(), flown(1), misses=[Miss(1, 1, np.inf, np.inf, False)]) == [("free-run", True)]
     assert remarked(flown(), unmoved=["yaw_rate"]) == [("unmoved", True)]
     assert remarked(flown(), recurring=["yaw_rate"]) == [("model-error", False)]
     assert remarked(flown(), others=[3]) == [("other-commands", True)]
+
+
+def test_the_states_that_a_free_run_misses_are_named():
+    angle, rate = Miss(1, 1, 0.25, 4.5, False), Miss(2, 2, 0.04, 9.0, True)
+    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, True, STEPS, misses=[angle, rate])
+    assert (
+        "over the 2 runs" in remark.sentence and "Something acts that no term describes." in remark.sentence
+    )
+    assert (
+        "rate on 2 (up to 4 % of how far it goes, 9 times what is explained), angle on 1 (up to 25 %"
+        in remark.sentence
+    )
+    (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[rate])
+    assert "may come from outside or be an error of the law" in remark.sentence
+    (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(0, 1, np.inf, np.inf, False)])
+    assert "the twin diverges on 1." in remark.sentence
 
 
 def test_what_noise_and_disturbances_explain_is_held_against_no_twin():

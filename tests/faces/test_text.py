@@ -80,7 +80,7 @@ def result_of_default(**advice):
             "disturbances": [
                 {
                     "name": "rate", "unit": "rad/s", "white": 0.0, "correlated": 0.5, "correlation_time": 0.2,
-                    "recurs": False,
+                    "cause": "disturbance",
                 },
             ],
             "actuators": [{"name": "torque", "lag": 0.03, "delay": 1}],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twinloop.arrays import Floats
-from twinloop.campaign.history import Experiment, Lesson
+from twinloop.campaign.history import Cause, Experiment, Lesson
 from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.identification.sensors.noise import exact
@@ -106,8 +106,8 @@ class Disturbance:
         white: what is added in a period, in its unit; 0: nothing that is felt.
         correlated: what is added in a second by one that is forgotten slowly, in its unit; 0: nothing that is felt.
         correlation_time: after which that is forgotten to 1/e, s.
-        recurs: whether it comes again at the same times in flight after flight: then it is an error of the law, and no
-            disturbance.
+        cause: of the correlated one: "disturbance"; "law", an error of the law, which comes again at the same times in
+            flight after flight; or "undecided", where flights so far do not tell. None where there is none.
     """
 
     name: str
@@ -115,7 +115,7 @@ class Disturbance:
     white: float
     correlated: float
     correlation_time: float
-    recurs: bool = False
+    cause: Cause | None = None
 
 
 def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
@@ -139,8 +139,8 @@ def disturbances(twin: Twin, lesson: Lesson) -> tuple[Disturbance, ...]:
         white = white if white > least else 0.0
         size = size if size * max(time, twin.signals.dt) > least else 0.0
         if white or size:
-            recurs = size > 0.0 and state.name in lesson.recurring
-            found.append(Disturbance(state.name, state.unit, white, size, time, recurs))
+            cause = lesson.cause(state.name) if size else None
+            found.append(Disturbance(state.name, state.unit, white, size, time, cause))
     return tuple(found)
 
 

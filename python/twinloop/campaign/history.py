@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from twinloop import _core
 from twinloop.arrays import Floats
@@ -13,6 +14,9 @@ from twinloop.remarks import Remark
 from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+
+Cause = Literal["disturbance", "law", "undecided"]
+"""Of what disturbs for long: something from outside; an error of the law; or what flights so far do not tell apart."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +179,7 @@ class Lesson(Recorded, kind="lesson"):
         remarks: diagnostics.
         recurring: states whose correlated disturbance comes again at the same times in flight after flight: the law is
             wrong there, and nothing disturbs.
+        undecided: states whose correlated disturbance may as well be an error of the law: flights so far do not tell.
         asked: the tests planned after it.
     """
 
@@ -195,7 +200,14 @@ class Lesson(Recorded, kind="lesson"):
     follows: bool
     remarks: tuple[Remark, ...]
     recurring: tuple[str, ...] = ()
+    undecided: tuple[str, ...] = ()
     asked: tuple[Planned, ...] = ()
+
+    def cause(self, state: str) -> Cause:
+        """What causes the correlated disturbance of a state, by its name."""
+        if state in self.recurring:
+            return "law"
+        return "undecided" if state in self.undecided else "disturbance"
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -59,6 +59,12 @@ class Noise(Recorded, kind="noise"):
                 _renewed_disturbance(each) if isinstance(each, dict) else each for each in found["correlated"]
             ]
         return found
+
+    def without(self, states: Collection[int]) -> Noise:
+        """The same without the correlated disturbances that drive some states."""
+        return replace(
+            self, correlated=tuple(each for each in self.correlated if each.states[0] not in states)
+        )
 
     def drawn(self, draws: int, steps: int, stream: _core.Stream) -> tuple[Floats, Floats]:
         """Draws of sensor noise (draws, steps + 1, n_x) and of disturbances of the states (draws, steps, n_x)."""

@@ -34,7 +34,7 @@ def found(twin: Twin, lesson: Lesson) -> list[str]:
         "actuator": any(lesson.lags) or any(lesson.delays),
         "offset": any(lesson.offsets),
         "hidden": bool(lesson.hidden),
-        "lasting": any(each.correlated > 0.0 and not each.recurs for each in disturbances(twin, lesson)),
+        "lasting": any(each.cause == "disturbance" for each in disturbances(twin, lesson)),
     }
     return [name for name, is_there in present.items() if is_there]
 

@@ -6,22 +6,17 @@ does not always.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from twinloop import _core
-from twinloop.campaign.history import Experiment
-from twinloop.campaign.identify_and_plan.diagnostics import in_pulses
-from twinloop.campaign.identify_and_plan.following import (
-    Following,
-    expected_misses,
-    following,
-    in_pieces,
-    unexplained,
-)
-from twinloop.campaign.identify_and_plan.recurring import recurring_states
+from twinloop.campaign.history import Cause, Experiment
+from twinloop.campaign.identify_and_plan.causes import causes_of
+from twinloop.campaign.identify_and_plan.following import Following, following, in_pieces
+from twinloop.campaign.identify_and_plan.misses import Miss, misses_any, misses_of
+from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
@@ -41,18 +36,19 @@ class Answer:
         identified: a model and a committee.
         followed: free runs of the members.
         follows: whether the best of them follows at least half of the flights.
-        recurring: states that an error of the law moves, and no disturbance.
+        causes: of the correlated disturbances, by the state that each drives.
         unmoved: states that move, and nothing moves them by the law.
-        missed: times further from each flight than noise and disturbances explain that the best one is; 0 where they
-            do.
+        missed: whether the best one misses a flight by more than noise and whatever may disturb explains.
+        misses: states that it misses by more than noise and known disturbances explain.
     """
 
     identified: Identified
     followed: Following
     follows: bool
-    recurring: Sequence[int]
+    causes: Mapping[int, Cause]
     unmoved: Sequence[int]
-    missed: Sequence[float]
+    missed: bool
+    misses: Sequence[Miss]
 
     @property
     def worst(self) -> float:
@@ -61,8 +57,8 @@ class Answer:
 
     @property
     def explained(self) -> bool:
-        """Whether it follows the flights, and noise and disturbances explain what its free runs miss."""
-        return self.follows and not any(self.missed)
+        """Whether it follows the flights, and noise and whatever may disturb explain what its free runs miss."""
+        return self.follows and not self.missed
 
     @staticmethod
     def of(
@@ -80,11 +76,14 @@ class Answer:
         unmoved = unmoved_states(identified, flights, setup)
         if not np.isfinite(identified.chi_squared):
             # Of a model that diverges no more is known.
-            return Answer(identified, followed, False, [], unmoved, [])
-        recurring = recurring_states(identified, flights, setup.signals, setup.limits, workers)
-        missed = _missed(identified, followed, flights, recurring, setup, workers)
+            return Answer(identified, followed, False, {}, unmoved, False, [])
+        causes = causes_of(identified, flights, setup.signals, setup.limits, workers)
+        model, noise = identified.members[0], identified.noise(setup.signals)
+        unit = Unit(setup.seed).part(len(flights))
+        missed = misses_any(model, followed, flights, noise, causes, unit.part(1), setup.limits, workers)
+        misses = misses_of(model, flights, noise, causes, unit.part(2), setup.limits, workers)
         lost = _lost(identified, followed, flights, setup, workers)
-        return Answer(identified, followed, 2 * lost <= len(flights), recurring, unmoved, missed)
+        return Answer(identified, followed, 2 * lost <= len(flights), causes, unmoved, missed, misses)
 
     @property
     def believed(self) -> list[_core.Model]:
@@ -120,27 +119,3 @@ def _lost(
         model = identified.members[0]
         lost[again] = in_pieces(model, [flights[j] for j in again], setup.limits, workers) > WRONG
     return int(lost.sum())
-
-
-def _missed(
-    identified: Identified,
-    followed: Following,
-    flights: Sequence[Experiment],
-    recurring: Sequence[int],
-    setup: Setup,
-    workers: _core.Workers,
-) -> list[float]:
-    """By how much more than noise and disturbances explain the best member misses each flight.
-
-    Nothing of what recurs is a disturbance. A flight whose commands were sent in pulses is judged piece by piece alone.
-    """
-    noise = identified.noise(setup.signals)
-    noise = replace(
-        noise, correlated=tuple(each for each in noise.correlated if each.states[0] not in recurring)
-    )
-    unit = Unit(setup.seed).part(len(flights), 1)
-    expected = expected_misses(identified.members[0], flights, noise, unit, setup.limits, workers)
-    steered = np.array([run.test is not None for run in flights])
-    missed = unexplained(followed.free[0], followed.frozen, expected, steered)
-    pulsed = in_pulses([run for run, off in zip(flights, missed, strict=True) if off])
-    return [0.0 if run.number in pulsed else off for run, off in zip(flights, missed.tolist(), strict=True)]

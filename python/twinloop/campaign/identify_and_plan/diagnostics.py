@@ -8,12 +8,12 @@ import numpy as np
 
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.misses import Miss
 from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
-from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 MOVED = 20.0
@@ -22,15 +22,8 @@ AS_FAST = (0.5, 2.0)
 """Times as fast as its derivative says, between which a state is taken to do what was declared."""
 ALIKE = 0.5
 """Correlation with its integrated derivative below which a state is taken to do something else."""
-
-OTHER = 0.5
-"""Share of what commands do that may differ from what their controller gives, squared."""
-LITTLE = 0.02
-"""Share of their bounds by which commands may differ whatever they do."""
-LEVELS = 5
-"""Values that commands have at most that are sent in pulses."""
-PULSES = 2.0
-"""Times the span of a command that pulses may be behind or ahead of it."""
+NAMED = 3
+"""States that are named of those that a free run misses, those that it misses most."""
 
 
 def diagnostics_of(
@@ -38,7 +31,7 @@ def diagnostics_of(
     signals: Signals,
     follows: bool,
     steps: int,
-    missed: Sequence[float] = (),
+    misses: Sequence[Miss] = (),
     others: Sequence[int] = (),
     recurring: Sequence[str] = (),
     unmoved: Sequence[str] = (),
@@ -50,7 +43,7 @@ def diagnostics_of(
         signals: of the system.
         follows: whether the twin follows them when it is flown by itself.
         steps: of a whole run.
-        missed: times further from each run than noise and disturbances explain that the free run is; 0 where they do.
+        misses: states that its free runs miss by more than noise and known disturbances explain.
         others: numbers of the tests whose recorded commands are none that their controllers give.
         recurring: states whose disturbance comes again in flight after flight.
         unmoved: states that move though their equations say that nothing moves them.
@@ -90,21 +83,8 @@ def diagnostics_of(
                 f"Flown by itself the twin does not follow the runs that it was learnt from: {cause}.",
             )
         )
-    elif any(missed):
-        worst = max(missed)
-        how = (
-            f"by {worst:.3g} times what noise and disturbances explain"
-            if np.isfinite(worst)
-            else "until it diverges"
-        )
-        said.append(
-            serious(
-                "free-run",
-                f"Flown by itself the twin misses {sum(map(bool, missed))} of the {len(missed)} runs that it was"
-                f" learnt from, {how}: something acts that no term describes. Do not believe it beyond the"
-                " flights that were made.",
-            )
-        )
+    elif misses:
+        said.append(_free_run(misses, len(experiments), signals))
     if recurring:
         said.append(
             note(
@@ -134,57 +114,29 @@ def diagnostics_of(
     return said
 
 
-def other_commands(experiments: Sequence[Experiment]) -> list[int]:
-    """Numbers of the tests whose recorded commands have little to do with those of their controllers.
-
-    Args:
-        experiments: that were learnt from; controllers are run on the readings.
-    """
-    return [number for number, pulsed in _unlike(experiments).items() if not pulsed]
-
-
-def in_pulses(experiments: Sequence[Experiment]) -> list[int]:
-    """Numbers of the tests whose commands were sent in pulses, as a relay sends them: right in their sum alone.
-
-    Args:
-        experiments: that were learnt from; controllers are run on the readings.
-    """
-    return [number for number, pulsed in _unlike(experiments).items() if pulsed]
-
-
-def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
-    """Tests in which what was sent is not what the controller gives, by number: whether it was sent in pulses."""
-    found: dict[int, bool] = {}
-    for run in experiments:
-        if run.test is None or run.test.number in found:
-            continue
-        sent, given = run.trajectory.commands, _given(run.test, run.trajectory.states)
-        span = _span(run.test)
-        size = np.square((given - given.mean(axis=0)) / span).mean()
-        off = np.square((sent - given) / span).mean()
-        if off > OTHER * size and off > LITTLE * LITTLE:
-            found[run.test.number] = _pulses(sent, given, span)
-    return found
-
-
-def _pulses(sent: Floats, given: Floats, span: Floats) -> bool:
-    """Whether few levels were sent, and until any time as much as the controller gives, up to a pulse or two."""
-    if any(len(np.unique(command)) > LEVELS for command in sent.T):
-        return False
-    return bool((np.abs(np.cumsum(sent - given, axis=0)) <= PULSES * span).all())
-
-
-def _given(test: Test, states: Floats) -> Floats:
-    """What a test's controller gives on some readings, without an excitation (n, n_u)."""
-    controller = test.controller()
-    controller.reset()
-    return np.array([controller.command(state, test.target(k)) for k, state in enumerate(states[:-1])])
-
-
-def _span(test: Test) -> Floats:
-    """From the smallest to the largest value of each command (n_u,)."""
-    low, high = np.array([command.bounds for command in test.family.signals.commands]).T
-    return np.asarray(high - low)
+def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Remark:
+    """Which states the twin misses when it is flown by itself, on how many runs, and by how much."""
+    worst = sorted(misses, key=lambda miss: (not miss.diverges, -miss.times))
+    if worst[0].diverges:
+        what = f"diverges on {max(miss.flights for miss in worst if miss.diverges)}"
+    else:
+        named = [
+            f"{signals.state_names[miss.state]} on {miss.flights} (up to {100.0 * miss.share:.2g} % of how far it goes,"
+            f" {miss.times:.2g} times what is explained)"
+            for miss in worst[:NAMED]
+        ]
+        others = [f"and {len(worst) - NAMED} more"] if len(worst) > NAMED else []
+        what = f"misses more than noise and known disturbances explain: {', '.join([*named, *others])}"
+    why = (
+        "What disturbs them may come from outside or be an error of the law; flights under other gains would tell."
+        " Until then trust it no further than that."
+        if all(miss.undecided for miss in misses)
+        else "Something acts that no term describes. Do not believe it beyond the flights that were made."
+    )
+    return serious(
+        "free-run",
+        f"Flown by itself over the {runs} run{'s' if runs > 1 else ''} that it was learnt from, the twin {what}. {why}",
+    )
 
 
 def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]:

@@ -7,27 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.errors import engine_input
 from twinloop.law.flight import drawn_runs
-from twinloop.law.noise import Noise
 from twinloop.limits import Limits
 from twinloop.replay import Replay
-from twinloop.streams import Unit
 from twinloop.test import Test
 
-DRAWS = 8
-"""Of noise and disturbances, by which it is said how far these take a flight."""
-TIMES = 3.0
-"""Times further from a flight than these that a free run is no more explained by them."""
 PIECES = 5
 """Of a flight, each of which is followed from its own first reading where commands were sent in pulses."""
-RELEVANT = 0.03
-"""Misses below this share of how far a flight went do not matter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +72,10 @@ def following(
     frozen = np.empty(len(flights))
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
-        frozen[j] = _squares(states[1:], states[0], limits).mean()
+        frozen[j] = squares(states[1:], states[0], limits).mean()
         for i, model in enumerate(models):
-            flown = _cut(flight.replayed, _start(model, states[0]), steps)
-            missed, length = _missed(model, flown, states[1:], limits, workers)
+            flown = cut(flight.replayed, start_of(model, states[0]), steps)
+            missed, length = missed_by(model, flown, states[1:], limits, workers)
             lasted[i, j] = length / steps
             free[i, j] = missed.mean() if length == steps else np.inf
     return Following(free, lasted, frozen)
@@ -113,97 +104,44 @@ def in_pieces(
         for first in range(0, len(commands), most):
             piece = commands[first : first + most]
             read = states[first + 1 : first + 1 + len(piece)]
-            flown = Replay(limits.signals, _start(model, states[first]), piece)
-            missed, length = _missed(model, flown, read, limits, workers)
+            flown = Replay(limits.signals, start_of(model, states[first]), piece)
+            missed, length = missed_by(model, flown, read, limits, workers)
             off += float(missed.sum()) if length == len(piece) else np.inf
-            moved += float(_squares(read, states[first], limits).sum())
+            moved += float(squares(read, states[first], limits).sum())
         found[j] = off / moved if moved > 0.0 else np.inf
     return found
 
 
-def expected_misses(
-    model: _core.Model,
-    flights: Sequence[Experiment],
-    noise: Noise,
-    unit: Unit,
-    limits: Limits,
-    workers: _core.Workers,
-) -> Floats:
-    """How far noise and disturbances alone take flights from a model's free run.
+def missed_by(
+    model: _core.Model, flown: Test | Replay, read: Floats, limits: Limits, workers: _core.Workers
+) -> tuple[Floats, int]:
+    """Squares of what a free run misses of the readings after its start (n, n_x), and how many steps it lasts.
 
     Args:
         model: that is flown.
-        flights: N of them, at least one.
-        noise: of the sensors, and disturbances.
-        unit: of which the draws are a part.
+        flown: from where, and under which controller or commands.
+        read: of the flight (n, n_x).
         limits: where a run counts as diverged.
         workers: how the work is carried out.
-
-    Returns:
-        Mean squares over draws, steps and states, in units of the states' scales (N,), as `Following.free`; infinite
-        where a run diverges, in which the free run may be anywhere.
     """
-    found = np.empty(len(flights))
-    for j, flight in enumerate(flights):
-        steps = flight.trajectory.steps
-        seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
-        runs = drawn_runs(
-            model,
-            _cut(flight.replayed, _start(model, flight.trajectory.states[0]), steps),
-            limits,
-            noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
-            disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
-            workers=workers,
-        )
-        lasted = bool((runs.lasted == steps).all())
-        with np.errstate(invalid="ignore"):
-            off = _squares(runs.measured[1:], runs.read[0], limits).mean()
-        found[j] = off if lasted else np.inf
-    return found
-
-
-def unexplained(free: Floats, frozen: Floats, expected: Floats, steered: NDArray[np.bool_]) -> Floats:
-    """Times further from its flights than noise and disturbances explain that a free run is, where that matters.
-
-    Args:
-        free: mean squares of the free run (N,), infinite where it diverges.
-        frozen: of the model that never moves (N,).
-        expected: of noise and disturbances (N,), infinite where these make it diverge.
-        steered: whether a flight had its controller, who kept it from diverging (N,). Under recorded commands alone
-            any free run of an unstable system may.
-
-    Returns:
-        Ratios of roots (N,); 0 where the free run does as can be expected, or is within 3 % of how far the flight went.
-    """
-    lost = steered & np.isinf(free)
-    matters = (free > RELEVANT * RELEVANT * frozen) & (free > TIMES * TIMES * expected)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(lost, np.inf, np.where(matters, np.sqrt(free / expected), 0.0))
-
-
-def _missed(
-    model: _core.Model, flown: Test | Replay, read: Floats, limits: Limits, workers: _core.Workers
-) -> tuple[Floats, int]:
-    """Squares of what a free run misses of the n readings after its start (n, n_x), and how many steps it lasts."""
     runs = drawn_runs(model, flown, limits, workers=workers)
-    return _squares(runs.read[0, 1:], read, limits), int(runs.lasted[0])
+    return squares(runs.read[0, 1:], read, limits), int(runs.lasted[0])
 
 
-def _squares(states: Floats, others: Floats, limits: Limits) -> Floats:
+def squares(states: Floats, others: Floats, limits: Limits) -> Floats:
     """Squares of differences between states, in units of their scales (…, n_x)."""
     scales = np.array([state.scale for state in limits.signals.states])
-    squares: Floats = np.square(limits.signals.difference(states, others) / scales)
-    return squares
+    return np.asarray(np.square(limits.signals.difference(states, others) / scales))
 
 
-def _start(model: _core.Model, reading: Floats) -> Floats:
+def start_of(model: _core.Model, reading: Floats) -> Floats:
     """The state of a model that is read so (n_x,)."""
     with engine_input():
         start: Floats = model.states_of(reading[np.newaxis])[0]
     return start
 
 
-def _cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:
+def cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:
     """The first steps of what was flown, from a state."""
     if isinstance(test, Replay):
         return dataclasses.replace(test, initial_state=start, commands=test.commands[:steps])

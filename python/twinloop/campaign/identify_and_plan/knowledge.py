@@ -14,8 +14,8 @@ from twinloop.campaign.identify_and_plan.calibration import (
     needed_factor,
     residuals_of_flights,
 )
+from twinloop.campaign.identify_and_plan.causes import observed
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
-from twinloop.campaign.identify_and_plan.recurring import observed
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup

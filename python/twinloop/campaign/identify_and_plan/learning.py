@@ -12,10 +12,11 @@ from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
-from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, other_commands
+from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.selection import learnt_from
+from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -129,7 +130,11 @@ class Learner:
     def _lesson(self, answer: Answer, book: Logbook) -> Lesson:
         identified, follows = answer.identified, answer.follows
         free = closed_loop(identified.members[:1], book.selected, self.workers)[0].tolist()
-        recurring = [self.setup.signals.state_names[state] for state in answer.recurring]
+        names = self.setup.signals.state_names
+        recurring, undecided = (
+            tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
+            for kind in ("law", "undecided")
+        )
         return Lesson(
             iteration=len(book.experiments),
             tests=tuple(run.number for run in book.experiments),
@@ -159,13 +164,14 @@ class Learner:
                     follows
                     or not np.isfinite(identified.chi_squared),  # of one that diverges it is said already
                     self.setup.steps,
-                    answer.missed,
+                    answer.misses,
                     () if follows else other_commands(book.experiments),
                     recurring,
-                    [self.setup.signals.state_names[state] for state in answer.unmoved],
+                    [names[state] for state in answer.unmoved],
                 ),
             ),
-            recurring=tuple(recurring),
+            recurring=recurring,
+            undecided=undecided,
         )
 
 

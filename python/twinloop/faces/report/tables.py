@@ -17,6 +17,12 @@ from twinloop.faces.text import cell, counted, held_at, quality_words
 
 RIVALS = 3
 """Rivals of each equation that are shown."""
+CAUSES = {
+    "disturbance": "a disturbance",
+    "law": "an error of the law",
+    "undecided": "not decided yet",
+}
+"""What a correlated disturbance is, by its cause."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +108,7 @@ def disturbances(result: Mapping[str, Any]) -> Table | None:
             each["white"] or None,
             each["correlated"] or None,
             each["correlation_time"] or None,
-            ("an error of the law" if each["recurs"] else "a disturbance") if each["correlated"] else None,
+            CAUSES[each["cause"]] if each["correlated"] else None,
         ]
         for each in found
     ]

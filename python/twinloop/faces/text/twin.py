@@ -9,6 +9,12 @@ from twinloop.faces.text.table import cell, table
 
 A_DAY = 86_400.0
 """Seconds: what takes longer to fade does not fade within a flight."""
+CAUSES = {
+    "disturbance": "",
+    "law": ", an error of the law",
+    "undecided": ", from outside or an error of the law",
+}
+"""What is added to a correlated disturbance, by its cause."""
 
 
 def equations_text(result: Mapping[str, Any]) -> str:
@@ -76,8 +82,8 @@ def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
         parts = [f"{found['white']:.2g} {unit} a period"] if found["white"] else []
         if found["correlated"]:
             size, time = found["correlated"], found["correlation_time"]
-            law = ", an error of the law" if found["recurs"] else ""
-            parts.append(f"{size:.2g} ({unit})/s with a correlation time of {time:.2g} s{law}")
+            cause = CAUSES[found["cause"]]
+            parts.append(f"{size:.2g} ({unit})/s with a correlation time of {time:.2g} s{cause}")
         words.append(f"{name} {' and '.join(parts)}")
     return f"Disturbances (standard deviations): {'; '.join(words)}."
 

@@ -1,0 +1,214 @@
+"""Misses: what a twin, flown by itself, is off from the flights that it was learnt from, beyond what disturbed them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twinloop import _core
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Cause, Experiment
+from twinloop.campaign.identify_and_plan.following import Following, cut, missed_by, squares, start_of
+from twinloop.campaign.identify_and_plan.sent import in_pulses
+from twinloop.law.flight import drawn_runs
+from twinloop.law.noise import Noise
+from twinloop.limits import Limits
+from twinloop.streams import Unit
+
+DRAWS = 8
+"""Of noise and disturbances, by which it is said how far these take a flight."""
+TIMES = 3.0
+"""Times further from a flight than these that a free run is no more explained by them."""
+RELEVANT = 0.03
+"""Misses below this share of how far a flight went do not matter."""
+
+
+@dataclass(frozen=True)
+class Miss:
+    """A state that the twin, flown by itself, misses by more than is explained; root mean squares.
+
+    Args:
+        state: its number.
+        flights: on how many it is missed so.
+        share: of how far the state went, on the flight where this is most; infinite where the twin diverges.
+        times: what noise and disturbances explain, on the flight where this is most; infinite where the twin diverges.
+        undecided: whether it would be explained if all were disturbances that are not told from an error of the law.
+    """
+
+    state: int
+    flights: int
+    share: float
+    times: float
+    undecided: bool
+
+    @property
+    def diverges(self) -> bool:
+        """Whether the twin does not last as long as one of the flights."""
+        return math.isinf(self.share) and math.isinf(self.times)
+
+
+def misses_of(
+    model: _core.Model,
+    flights: Sequence[Experiment],
+    noise: Noise,
+    causes: Mapping[int, Cause],
+    unit: Unit,
+    limits: Limits,
+    workers: _core.Workers,
+) -> list[Miss]:
+    """States that a model misses, in order; none on a flight whose commands were sent in pulses.
+
+    Only what is known to come from outside explains anything: a disturbance that may as well be an error of the law
+    would explain whatever the law is wrong about.
+
+    Args:
+        model: that is flown.
+        flights: N of them, at least one.
+        noise: of the sensors, and disturbances.
+        causes: of its correlated disturbances, by the state that each drives.
+        unit: of which the draws are a part.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    off, frozen = _off(model, flights, limits, workers)
+    steered = np.array([[run.test is not None] for run in flights])
+    missed, at_least = (
+        unexplained(
+            off,
+            frozen,
+            expected_misses(model, flights, noise.without(without), part, limits, workers),
+            steered,
+        )
+        for without, part in (
+            (_caused(causes, "law", "undecided"), unit.part(0)),
+            (_caused(causes, "law"), unit.part(1)),
+        )
+    )
+    pulsed = in_pulses([run for run, row in zip(flights, missed, strict=True) if row.any()])
+    judged = [j for j, run in enumerate(flights) if run.number not in pulsed]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(missed > 0.0, np.sqrt(off / frozen), 0.0)[judged]
+    missed, at_least = missed[judged], at_least[judged]
+    return [
+        Miss(
+            int(state),
+            int((missed[:, state] > 0.0).sum()),
+            float(shares[:, state].max()),
+            float(missed[:, state].max()),
+            not at_least[:, state].any(),
+        )
+        for state in np.flatnonzero((missed > 0.0).any(axis=0))
+    ]
+
+
+def misses_any(
+    model: _core.Model,
+    followed: Following,
+    flights: Sequence[Experiment],
+    noise: Noise,
+    causes: Mapping[int, Cause],
+    unit: Unit,
+    limits: Limits,
+    workers: _core.Workers,
+) -> bool:
+    """Whether a model misses a flight, over all states, by more than noise and whatever may disturb explains.
+
+    Args:
+        model: that is flown, the first of those that were followed.
+        followed: free runs.
+        flights: N of them, at least one.
+        noise: of the sensors, and disturbances.
+        causes: of its correlated disturbances; an error of the law for certain explains nothing.
+        unit: of which the draws are a part.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    expected = expected_misses(model, flights, noise.without(_caused(causes, "law")), unit, limits, workers)
+    steered = np.array([run.test is not None for run in flights])
+    missed = unexplained(followed.free[0], followed.frozen, expected.mean(axis=1), steered)
+    off = [run for run, times in zip(flights, missed, strict=True) if times]
+    return len(in_pulses(off)) < len(off)
+
+
+def expected_misses(
+    model: _core.Model,
+    flights: Sequence[Experiment],
+    noise: Noise,
+    unit: Unit,
+    limits: Limits,
+    workers: _core.Workers,
+) -> Floats:
+    """How far noise and disturbances alone take flights from a model's free run.
+
+    Args:
+        model: that is flown.
+        flights: N of them, at least one.
+        noise: of the sensors, and disturbances.
+        unit: of which the draws are a part.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+
+    Returns:
+        Mean squares over draws and steps, in units of the states' scales (N, n_x); infinite where a run diverges, in
+        which the free run may be anywhere.
+    """
+    found = np.empty((len(flights), limits.signals.n_x))
+    for j, flight in enumerate(flights):
+        steps = flight.trajectory.steps
+        seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
+        runs = drawn_runs(
+            model,
+            cut(flight.replayed, start_of(model, flight.trajectory.states[0]), steps),
+            limits,
+            noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
+            disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
+            workers=workers,
+        )
+        lasted = bool((runs.lasted == steps).all())
+        with np.errstate(invalid="ignore"):
+            off = squares(runs.measured[1:], runs.read[0], limits).mean(axis=(0, 1))
+        found[j] = off if lasted else np.inf
+    return found
+
+
+def unexplained(free: Floats, frozen: Floats, expected: Floats, steered: NDArray[np.bool_]) -> Floats:
+    """Times further from its flights than noise and disturbances explain that a free run is, where that matters.
+
+    Args:
+        free: mean squares of the free run, of flights or of each state on them, infinite where it diverges.
+        frozen: of the model that never moves, alike.
+        expected: of noise and disturbances, alike, infinite where these make it diverge.
+        steered: whether a flight had its controller, who kept it from diverging. Under recorded commands alone any
+            free run of an unstable system may.
+
+    Returns:
+        Ratios of roots, alike; 0 where the free run does as can be expected, or is within 3 % of how far the flight
+        went.
+    """
+    lost = steered & np.isinf(free)
+    matters = (free > RELEVANT * RELEVANT * frozen) & (free > TIMES * TIMES * expected)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(lost, np.inf, np.where(matters, np.sqrt(free / expected), 0.0))
+
+
+def _caused(causes: Mapping[int, Cause], *by: Cause) -> list[int]:
+    """States whose correlated disturbance has one of some causes."""
+    return [state for state, found in causes.items() if found in by]
+
+
+def _off(
+    model: _core.Model, flights: Sequence[Experiment], limits: Limits, workers: _core.Workers
+) -> tuple[Floats, Floats]:
+    """Mean squares of each state's free run, infinite where that diverges, and of the one that never moves (N, n_x)."""
+    off, frozen = np.empty((2, len(flights), limits.signals.n_x))
+    for j, flight in enumerate(flights):
+        states, steps = flight.trajectory.states, flight.trajectory.steps
+        flown = cut(flight.replayed, start_of(model, states[0]), steps)
+        missed, lasted = missed_by(model, flown, states[1:], limits, workers)
+        off[j] = missed.mean(axis=0) if lasted == steps else np.inf
+        frozen[j] = squares(states[1:], states[0], limits).mean(axis=0)
+    return off, frozen

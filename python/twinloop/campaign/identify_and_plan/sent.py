@@ -1,0 +1,73 @@
+"""Sent: the commands on record, beside those that the controller gives for the recorded states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.arrays import Floats
+from twinloop.campaign.history import Experiment
+from twinloop.test import Test
+
+OTHER = 0.5
+"""Share of what commands do that may differ from what their controller gives, squared."""
+LITTLE = 0.02
+"""Share of their bounds by which commands may differ whatever they do."""
+LEVELS = 5
+"""Values that commands have at most that are sent in pulses."""
+PULSES = 2.0
+"""Times the span of a command that pulses may be behind or ahead of it."""
+
+
+def other_commands(experiments: Sequence[Experiment]) -> list[int]:
+    """Numbers of the tests whose recorded commands have little to do with those of their controllers.
+
+    Args:
+        experiments: that were learnt from; controllers are run on the readings.
+    """
+    return [number for number, pulsed in _unlike(experiments).items() if not pulsed]
+
+
+def in_pulses(experiments: Sequence[Experiment]) -> list[int]:
+    """Numbers of the tests whose commands were sent in pulses, as a relay sends them: right in their sum alone.
+
+    Args:
+        experiments: that were learnt from; controllers are run on the readings.
+    """
+    return [number for number, pulsed in _unlike(experiments).items() if pulsed]
+
+
+def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
+    """Tests in which what was sent is not what the controller gives, by number: whether it was sent in pulses."""
+    found: dict[int, bool] = {}
+    for run in experiments:
+        if run.test is None or run.test.number in found:
+            continue
+        sent, given = run.trajectory.commands, _given(run.test, run.trajectory.states)
+        span = _span(run.test)
+        size = np.square((given - given.mean(axis=0)) / span).mean()
+        off = np.square((sent - given) / span).mean()
+        if off > OTHER * size and off > LITTLE * LITTLE:
+            found[run.test.number] = _pulses(sent, given, span)
+    return found
+
+
+def _pulses(sent: Floats, given: Floats, span: Floats) -> bool:
+    """Whether few levels were sent, and until any time as much as the controller gives, up to a pulse or two."""
+    if any(len(np.unique(command)) > LEVELS for command in sent.T):
+        return False
+    return bool((np.abs(np.cumsum(sent - given, axis=0)) <= PULSES * span).all())
+
+
+def _given(test: Test, states: Floats) -> Floats:
+    """What a test's controller gives on some readings, without an excitation (n, n_u)."""
+    controller = test.controller()
+    controller.reset()
+    return np.array([controller.command(state, test.target(k)) for k, state in enumerate(states[:-1])])
+
+
+def _span(test: Test) -> Floats:
+    """From the smallest to the largest value of each command (n_u,)."""
+    low, high = np.array([command.bounds for command in test.family.signals.commands]).T
+    return np.asarray(high - low)

@@ -1,0 +1,83 @@
+"""An error of the law comes again in flight after flight; gusts do not; what may be either is said to be."""
+
+import numpy as np
+import pytest
+
+from twinloop.campaign.identify_and_plan.causes import cause
+
+STEPS = 300
+
+
+def gusts(seed, correlation_time, steps=STEPS):
+    """A Gauss-Markov process of variance 1."""
+    random, kept = np.random.default_rng(seed), np.exp(-1.0 / correlation_time)
+    series = [random.standard_normal()]
+    for _ in range(steps - 1):
+        series.append(kept * series[-1] + np.sqrt(1.0 - kept * kept) * random.standard_normal())
+    return np.array(series)
+
+
+def rubbing(stroke=40):
+    """Friction of a motor that moves to and fro, then rests."""
+    times = np.arange(STEPS)
+    return np.where(times < 200, np.where(times // stroke % 2 == 0, 1.0, -1.0), 0.0)
+
+
+@pytest.mark.parametrize(("correlation_time", "known"), [(3.0, 1.0), (20.0, 1.0), (75.0, 0.8)])
+def test_gusts_do_not_know_when_a_flight_begins(correlation_time, known):
+    found = [
+        cause([[gusts(100 * trial + flight, correlation_time) for flight in range(4)]]) for trial in range(60)
+    ]
+    assert found.count("law") <= 1
+    # The slower they are, the more flights it takes to see that they have nothing to do with each other.
+    assert found.count("disturbance") >= known * len(found)
+
+
+def wandering(seed):
+    """What a law is wrong about by, over a flight: slow, of mean square 1."""
+    found = np.cumsum(gusts(seed, 20.0))
+    return found / np.sqrt(np.square(found).mean())
+
+
+@pytest.mark.parametrize("flights", [2, 4, 8])
+def test_an_error_of_the_law_is_seldom_taken_for_a_disturbance(flights):
+    found = [
+        cause([[wandering(seed) + 0.5 * gusts(1000 * seed + flight, 3.0) for flight in range(flights)]])
+        for seed in range(40)
+    ]
+    assert found.count("disturbance") == 0
+    # It takes more than two flights to be certain, for it changes slowly.
+    assert flights == 2 or found.count("law") >= 36
+
+
+def test_an_error_of_the_law_comes_again_in_every_flight():
+    noisy = [rubbing() + 0.5 * gusts(flight, 5.0) for flight in range(3)]
+    assert cause([noisy]) == "law"
+    assert cause([[3.0 * rubbing(), 5.0 * rubbing(41)[: STEPS // 2], rubbing(39)]]) == "law"
+
+
+def test_one_flight_of_a_task_tells_nothing():
+    one, other = rubbing(), -rubbing()
+    assert cause([]) == cause([[one]]) == cause([[one], [one]]) == "undecided"
+    assert cause([[one, one, one], [other, other, other]]) == "law"
+    assert cause([[one, one, other, other]]) != "law"
+
+
+def test_two_flights_that_are_alike_by_luck_tell_nothing():
+    """Of two constants the signs alone can be compared, and these are alike in every second case."""
+    assert cause([[np.ones(STEPS), 2.0 * np.ones(STEPS)]]) == "undecided"
+    assert cause([[np.ones(STEPS), -2.0 * np.ones(STEPS)]]) == "disturbance"
+    slow = [cause([[gusts(seed, 300.0), gusts(100 + seed, 300.0)]]) for seed in range(40)]
+    assert slow.count("law") == 0
+
+
+def test_a_trace_of_it_is_not_enough():
+    """With many flights a share of a tenth is certain, and still a small part of what disturbs."""
+    flights = [0.3 * rubbing() + gusts(flight, 3.0) for flight in range(12)]
+    assert cause([flights]) == "disturbance"
+
+
+def test_many_readings_are_taken_in_pieces():
+    long = np.repeat(rubbing(), 40)
+    assert cause([[long, 2.0 * long, long]]) == "law"
+    assert cause([[gusts(1, 900.0, 12000), gusts(2, 900.0, 12000)]]) != "law"
