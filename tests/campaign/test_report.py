@@ -3,6 +3,7 @@
 import json
 import warnings
 import xml.etree.ElementTree as ElementTree
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ import pytest
 import twinloop as tl
 from lives import PLANT, begun, by_hand, cut, made
 from lives import new as new_of
+from twinloop.campaign.assessment import advice as assessed
 from twinloop.errors import RemarkWarning
 from twinloop.faces.result import summary, to_json
-from twinloop.remarks import Remark
+from twinloop.remarks import Remark, note, serious
 
 GAINS = {"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3}
 
@@ -126,6 +128,20 @@ def test_advice_is_a_value_of_the_campaign():
     first = plant_of_paper.test(GAINS)
     plant_of_paper.tell(first, PLANT.run(first))
     assert plant_of_paper.advice is None
+
+
+def test_a_twin_that_is_not_to_be_believed_now_gives_no_advice():
+    plan = SimpleNamespace(test=1, gain=0.1, predicted=1.0)
+
+    def trusted(*lessons):
+        return assessed(None, None, lessons, None).trusted
+
+    def lesson(*remarks, follows=True):
+        return SimpleNamespace(asked=[plan], follows=follows, remarks=remarks)
+
+    said, grave = note("known-before", "The twin is the one of before."), serious("free-run", "It misses.")
+    assert trusted(lesson()) and trusted(lesson(grave), lesson(said))
+    assert not trusted(lesson(), lesson(said, grave)) and not trusted(lesson(), lesson(follows=False))
 
 
 def test_the_errors_of_the_report_are_those_of_whole_flights():

@@ -119,7 +119,9 @@ def test_a_result_of_default_says_what_a_person_must_know():
         ({"gain": 0.01, "share": None, "stop": True}, "by 0.01 rad s.\nThat is below the scatter"),
         ({"gain": 0.0, "stop": True}, "would not have improved\nthe quality. For the controller, stop."),
         ({"gain": 0.0, "stop": True}, "stop.\nThe scatter of one measurement is 0.1 rad s."),
-        ({"trusted": False}, "it cannot say. Fly another."),
+        ({"gain": 0.0, "stop": True}, "Next: fly this controller, then stop; another flight"),
+        ({"trusted": False}, "Next: look into the remarks, then fly another test"),
+        ({"trusted": False}, "it cannot say. Look into the remarks, and fly another."),
         ({"gain": None}, "No committee was asked for a flight yet"),
     ],
 )

@@ -61,5 +61,6 @@ def _next(result: Mapping[str, Any]) -> str:
     if not advice["trusted"]:
         return "look into the remarks, then fly another test: the twin cannot say what it would bring."
     if advice["stop"]:
-        return "stop; another flight would bring no more than one measurement scatters."
+        last = "fly this controller, then stop" if result["controller"]["measured"] is None else "stop"
+        return f"{last}; another flight would bring no more than one measurement scatters."
     return f"another flight may bring {with_unit(advice['gain'], result['quality']['unit'])}."
