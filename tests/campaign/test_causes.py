@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twinloop.campaign.identify_and_plan.causes import cause
+from twinloop.campaign.identify_and_plan.causes import acts_in_motion, cause
 
 STEPS = 300
 
@@ -81,3 +81,39 @@ def test_many_readings_are_taken_in_pieces():
     long = np.repeat(rubbing(), 40)
     assert cause([[long, 2.0 * long, long]]) == "law"
     assert cause([[gusts(1, 900.0, 12000), gusts(2, 900.0, 12000)]]) != "law"
+
+
+def fast(seed=0):
+    """How fast a system moves that goes to its target and rests there."""
+    return np.exp(-np.arange(STEPS) / 60.0) * (1.0 + 0.2 * np.sin(0.3 * np.arange(STEPS) + seed))
+
+
+@pytest.mark.parametrize("correlation_time", [3.0, 10.0, 30.0])
+@pytest.mark.parametrize("flights", [1, 3])
+def test_gusts_act_at_rest_as_well(correlation_time, flights):
+    falsely = sum(
+        acts_in_motion(
+            [
+                (np.abs(gusts(100 * trial + flight, correlation_time)), fast(flight))
+                for flight in range(flights)
+            ]
+        )
+        for trial in range(60)
+    )
+    assert falsely <= 4
+
+
+@pytest.mark.parametrize("flights", [2, 4])
+def test_what_acts_in_motion_alone_is_found_though_each_flight_has_another(flights):
+    found = sum(
+        acts_in_motion(
+            [
+                (np.abs(gusts(100 * trial + flight, 5.0) * fast(flight) + 0.05 * gusts(trial, 3.0)), fast(flight))
+                for flight in range(flights)
+            ]
+        )
+        for trial in range(60)
+    )  # fmt: skip
+    assert found >= 55
+    # By their products these are unrelated.
+    assert cause([[gusts(flight, 5.0) * fast(flight) for flight in range(6)]]) == "disturbance"

@@ -211,11 +211,14 @@ def _empty(campaigns: Sequence[Measured]) -> Found:
 
 
 def _missed(campaigns: Sequence[Measured]) -> Found:
-    rows = [row for row in _rows(campaigns) if number(row["missed"]) > 1.0]
-    share, count = _share(bool(row["serious"]) for row in rows)
-    return Found(
-        f"{_percent(share)} of {count}" if count else "none missed", share >= 0.95 or not count, share
+    missed, others = (
+        [row for row in _rows(campaigns) if (number(row["missed"]) > 1.0) is off] for off in (True, False)
     )
+    share, count = _share(bool(row["serious"]) for row in missed)
+    # A remark that is always made says nothing.
+    falsely = sum("free-run" in row["serious"] for row in others)
+    text = f"{_percent(share)} of {count}" if count else "none missed"
+    return Found(f"{text}; said of {falsely} of {len(others)} that do not", share >= 0.95 or not count, share)
 
 
 def _confident(campaigns: Sequence[Measured]) -> Found:

@@ -5,6 +5,9 @@ same states at much the same times. So the disturbances that the twin's observer
 flights, time by time. The sum of the products is compared with the scatter that it has if the flights have nothing to
 do with each other, however slowly each of them changes (Bartlett 1935). One flight tells nothing, and neither do two in
 which a disturbance changes so slowly that its sign alone decides.
+
+Nor does a gust know when a system moves, as play and friction do, which are other ones under other gains. So its
+size is multiplied in the same way with the speed of the twin's free run, which no gust has touched.
 """
 
 from __future__ import annotations
@@ -17,6 +20,8 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Cause, Experiment
+from twinloop.campaign.identify_and_plan.following import cut, free_run, start_of
+from twinloop.campaign.identify_and_plan.likeness import Likeness
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.errors import engine_input
 from twinloop.identification.identified import Identified
@@ -29,16 +34,12 @@ Predictions = Sequence[tuple[Floats, Floats, Floats]]
 """Of each run whitened errors and states (n + 1, n_x), and correlated disturbances (n + 1, chains)."""
 SURE = 3.0
 """Standard deviations of unrelated flights by which the products of an error of the law must be larger."""
-SHARE = 0.3
-"""Correlation between flights from which that is more than a trace."""
 AT_MOST = 0.5
 """Correlation between flights that something from outside must not have, even if the products are too small by luck."""
 BY_LUCK = 2.0
-"""Standard deviations of unrelated flights by which products may be too small by luck."""
+"""Standard deviations of unrelated series by which products may be too small by luck, or too large."""
 LATEST = 12
 """Flights that are compared, the last ones."""
-PIECES = 200
-"""Pieces into which a flight is cut, in each of which a disturbance is taken at its mean."""
 
 
 def observed(
@@ -99,10 +100,18 @@ def causes_of(
     for run, (_, _, gusts) in zip(flights, found, strict=True):
         assert run.test is not None
         tasks.setdefault(run.test.target_state.tobytes(), []).append(gusts)
-    return {
-        state: cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
-        for state, place in disturbed.items()
-    }
+    speeds = [speed(identified.members[0], run, limits, workers) for run in flights]
+    causes: dict[int, Cause] = {}
+    for state, place in disturbed.items():
+        causes[state] = cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
+        moving = [
+            (np.abs(gusts[1:, place]), fast)
+            for (_, _, gusts), fast in zip(found, speeds, strict=True)
+            if fast is not None
+        ]
+        if causes[state] == "disturbance" and acts_in_motion(moving):
+            causes[state] = "undecided"
+    return causes
 
 
 def cause(tasks: Sequence[Sequence[Floats]]) -> Cause:
@@ -111,29 +120,39 @@ def cause(tasks: Sequence[Sequence[Floats]]) -> Cause:
     Args:
         tasks: of each task a series for each of its flights; of two flights the longer one is cut.
     """
-    product = scatter = size = 0.0
-    for series in tasks:
-        for one, other in combinations(series, 2):
-            n = min(len(one), len(other))
-            first, second = _in_pieces(one[:n]), _in_pieces(other[:n])
-            product += float((first * second).sum())
-            size += float(np.sqrt(np.square(first).sum() * np.square(second).sum()))
-            # The variance of a sum of products of two unrelated series is that of their autocovariances' products.
-            both = _autocovariances(first) * _autocovariances(second) * np.arange(len(first), 0, -1)
-            scatter += float(both[0] + 2.0 * both[1:].sum())
-    by_luck = float(np.sqrt(max(scatter, 0.0)))
-    if product > SHARE * size and product > SURE * by_luck:
+    alike = Likeness.of(pair for series in tasks for pair in combinations(series, 2))
+    if alike.certain(SURE):
         return "law"
-    return "disturbance" if product + BY_LUCK * by_luck < AT_MOST * size else "undecided"
+    foreign = alike.product + BY_LUCK * alike.by_luck < AT_MOST * alike.size
+    return "disturbance" if foreign else "undecided"
 
 
-def _in_pieces(series: Floats) -> Floats:
-    """Means over pieces of a series, each as long as the next one; what is left at its end is not used."""
-    length = max(1, len(series) // PIECES)
-    return np.asarray(series[: len(series) // length * length].reshape(-1, length).mean(axis=1))
+def acts_in_motion(flights: Sequence[tuple[Floats, Floats]]) -> bool:
+    """Whether what disturbs is the larger the faster a system moves.
+
+    Args:
+        flights: of each, how large the disturbance is and how fast the system, at the same times.
+    """
+    return Likeness.of((size - size.mean(), fast - fast.mean()) for size, fast in flights).certain(BY_LUCK)
 
 
-def _autocovariances(series: Floats) -> Floats:
-    """About 0, for all shifts from 0 on."""
-    n = len(series)
-    return np.array([(series[: n - shift] * series[shift:]).sum() / n for shift in range(n)])
+def speed(model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers) -> Floats | None:
+    """How fast a model flown by itself moves in each period, over all states in units of their mean (n,).
+
+    Args:
+        model: that is flown.
+        flight: from where, and under which controller or commands.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+
+    Returns:
+        Root mean squares; None where it does not last as long as the flight.
+    """
+    steps = flight.trajectory.steps
+    flown = cut(flight.replayed, start_of(model, flight.trajectory.states[0]), steps)
+    states, lasted = free_run(model, flown, limits, workers)
+    if lasted < steps:
+        return None
+    moved = np.square(limits.signals.difference(states[1:], states[:-1]))
+    most = moved.mean(axis=0)
+    return np.asarray(np.sqrt((moved / np.where(most > 0.0, most, 1.0)).sum(axis=1)))

@@ -112,6 +112,21 @@ def in_pieces(
     return found
 
 
+def free_run(
+    model: _core.Model, flown: Test | Replay, limits: Limits, workers: _core.Workers
+) -> tuple[Floats, int]:
+    """A model flown by itself: the states as sensors read them without noise (n + 1, n_x), and how many steps it lasts.
+
+    Args:
+        model: that is flown.
+        flown: from where, and under which controller or commands.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    runs = drawn_runs(model, flown, limits, workers=workers)
+    return np.asarray(runs.read[0]), int(runs.lasted[0])
+
+
 def missed_by(
     model: _core.Model, flown: Test | Replay, read: Floats, limits: Limits, workers: _core.Workers
 ) -> tuple[Floats, int]:
@@ -124,8 +139,8 @@ def missed_by(
         limits: where a run counts as diverged.
         workers: how the work is carried out.
     """
-    runs = drawn_runs(model, flown, limits, workers=workers)
-    return squares(runs.read[0, 1:], read, limits), int(runs.lasted[0])
+    states, lasted = free_run(model, flown, limits, workers)
+    return squares(states[1:], read, limits), lasted
 
 
 def squares(states: Floats, others: Floats, limits: Limits) -> Floats:
