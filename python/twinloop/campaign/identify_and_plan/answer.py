@@ -39,7 +39,6 @@ class Answer:
         causes: of the correlated disturbances, by the state that each drives.
         unmoved: states that move, and nothing moves them by the law.
         missed: whether the best one misses a flight by more than noise and whatever may disturb explains.
-        misses: states that it misses by more than noise and known disturbances explain.
     """
 
     identified: Identified
@@ -48,7 +47,6 @@ class Answer:
     causes: Mapping[int, Cause]
     unmoved: Sequence[int]
     missed: bool
-    misses: Sequence[Miss]
 
     @property
     def worst(self) -> float:
@@ -76,14 +74,30 @@ class Answer:
         unmoved = unmoved_states(identified, flights, setup)
         if not np.isfinite(identified.chi_squared):
             # Of a model that diverges no more is known.
-            return Answer(identified, followed, False, {}, unmoved, False, [])
+            return Answer(identified, followed, False, {}, unmoved, False)
         causes = causes_of(identified, flights, setup.signals, setup.limits, workers)
         model, noise = identified.members[0], identified.noise(setup.signals)
-        unit = Unit(setup.seed).part(len(flights))
-        missed = misses_any(model, followed, flights, noise, causes, unit.part(1), setup.limits, workers)
-        misses = misses_of(model, flights, noise, causes, unit.part(2), setup.limits, workers)
+        unit = Unit(setup.seed).part(len(flights), 1)
+        missed = misses_any(model, followed, flights, noise, causes, unit, setup.limits, workers)
         lost = _lost(identified, followed, flights, setup, workers)
-        return Answer(identified, followed, 2 * lost <= len(flights), causes, unmoved, missed, misses)
+        return Answer(identified, followed, 2 * lost <= len(flights), causes, unmoved, missed)
+
+    def misses(self, flights: Sequence[Experiment], setup: Setup, workers: _core.Workers) -> list[Miss]:
+        """States that the best member misses by more than noise and known disturbances explain.
+
+        Args:
+            flights: that it was learnt from.
+            setup: of the campaign.
+            workers: how the work is carried out.
+
+        Returns:
+            None where the twin diverges on what it was learnt from: of such a one that is said already.
+        """
+        if not np.isfinite(self.identified.chi_squared):
+            return []
+        model, noise = self.identified.members[0], self.identified.noise(setup.signals)
+        unit = Unit(setup.seed).part(len(flights), 2)
+        return misses_of(model, flights, noise, self.causes, unit, setup.limits, workers)
 
     @property
     def believed(self) -> list[_core.Model]:

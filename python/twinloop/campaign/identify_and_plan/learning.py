@@ -164,7 +164,7 @@ class Learner:
                     follows
                     or not np.isfinite(identified.chi_squared),  # of one that diverges it is said already
                     self.setup.steps,
-                    answer.misses,
+                    answer.misses(book.experiments, self.setup, self.workers),
                     () if follows else other_commands(book.experiments),
                     recurring,
                     [names[state] for state in answer.unmoved],

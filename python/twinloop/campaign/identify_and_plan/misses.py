@@ -76,18 +76,14 @@ def misses_of(
     """
     off, frozen = _off(model, flights, limits, workers)
     steered = np.array([[run.test is not None] for run in flights])
-    missed, at_least = (
-        unexplained(
-            off,
-            frozen,
-            expected_misses(model, flights, noise.without(without), part, limits, workers),
-            steered,
-        )
-        for without, part in (
-            (_caused(causes, "law", "undecided"), unit.part(0)),
-            (_caused(causes, "law"), unit.part(1)),
-        )
-    )
+
+    def beyond(part: int, *causes_out: Cause) -> Floats:
+        known = noise.without(_caused(causes, *causes_out))
+        expected = expected_misses(model, flights, known, unit.part(part), limits, workers)
+        return unexplained(off, frozen, expected, steered)
+
+    missed = beyond(0, "law", "undecided")
+    at_least = beyond(1, "law") if "undecided" in causes.values() and missed.any() else missed
     pulsed = in_pulses([run for run, row in zip(flights, missed, strict=True) if row.any()])
     judged = [j for j, run in enumerate(flights) if run.number not in pulsed]
     with np.errstate(divide="ignore", invalid="ignore"):
