@@ -22,7 +22,7 @@ def test_every_verb_has_it():
                 assert "as_json" in [option.name for option in verb.params], name
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def room(tmp_path_factory):
     folder = tmp_path_factory.mktemp("room")
     store = begun(folder / "rig.db")
@@ -45,8 +45,7 @@ def room(tmp_path_factory):
         (("check", "flight1.csv", "signals.toml"), {"fit", "rows", "remarks"}),
         (("tell", "rig.db", "1", "flight1.csv"), {"test", "status", "quality", "experiments"}),
         (("learn", "rig.db"), {"learnt"}),
-        (("ask", "rig.db"), {"test"}),
-        (("abandon", "rig.db", "2"), {"test", "status"}),
+        (("abandon", "rig.db", "1"), {"test", "status"}),
         (("new", "other.toml"), {"files", "store"}),
     ],
     ids=lambda each: " ".join(each[:1]) if isinstance(each, tuple) else "",
@@ -58,3 +57,9 @@ def test_a_verb_prints_one_object_that_says_what_was_done(room, monkeypatch, wor
     assert keys <= set(found) and done.exit_code in (0, 1)
     for file in found.get("files", ()):
         assert (room / file).exists()
+
+
+def test_ask_prints_the_test_that_is_to_be_flown(room, monkeypatch):
+    monkeypatch.chdir(room)
+    assert invoke("tell", "rig.db", "1", "flight1.csv").exit_code == 0
+    assert "test" in json.loads(invoke("ask", "rig.db", "--json").stdout)
