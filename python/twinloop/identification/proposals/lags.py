@@ -20,6 +20,8 @@ from twinloop.signals import Signals
 
 LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 """Time constants that are tried, in periods."""
+FINER = 2.0**0.5
+"""Ratio of the lags that are tried beside the best of them."""
 MOST_DELAY = 50
 """Periods beyond which no delay is tried."""
 GRID = 0
@@ -66,16 +68,24 @@ def _best_lag(
     context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int
 ) -> Hypothesis:
     """The best so far, or a better one with this delay."""
-    rising = 0
+    found: dict[float, Hypothesis] = {}
+    now, worse = LAGS[0], 0
     for lag in LAGS:
-        if lag == 0.0 and delay == 0:
-            continue
-        found = strongest([best, _at(context, trial, best, group, delay, lag)])
-        best, rising = found, 0 if found is not best else rising + 1
+        at_once = lag == 0.0 and delay == 0
+        found[lag] = (
+            trial(best.actuation.at_once(group)) if at_once else _at(context, trial, best, group, delay, lag)
+        )
+        now, worse = (
+            (lag, 0) if found[lag].evidence.beats(found[now].evidence) else (now, worse + (lag != now))
+        )
         # Past the best lag the fit only gets worse.
-        if rising >= 2:
+        if worse >= 2:
             break
-    return best
+    if now:
+        # A period of delay is less than the steps of the grid: between them it would stand in for a lag.
+        for lag in (now / FINER, now * FINER):
+            found[lag] = _at(context, trial, best, group, delay, lag)
+    return strongest([best, *found.values()])
 
 
 def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:

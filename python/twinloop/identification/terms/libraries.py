@@ -11,6 +11,8 @@ from twinloop.signals import Signals
 Terms = list[int]
 FRICTION = 30.0
 """Steepness of dry friction at rest, in units of a speed's scale."""
+LIKELIER = 1.0
+"""Nats by which |x| x of a rate or a command is shorter than its square."""
 CUBIC_INPUTS = 13
 """States and commands, together, of which there are products of three: 455."""
 
@@ -29,10 +31,21 @@ def quadratic(pool: Pool, signals: Signals) -> Terms:
 
 
 def damping(pool: Pool, signals: Signals) -> Terms:
-    """|x| x of inputs with two signs that are no angles: what slows a motion both ways, as its square does not."""
+    """|x| x of inputs with two signs that are no angles: what slows a motion both ways, as its square does not.
+
+    Where a rate had one sign only the readings do not tell drag from its square, which would drive the machine on as
+    soon as it turns; where a command had, they do not tell a thruster that can turn round from one that cannot. So |x| x
+    is taken to be the likelier of the two.
+    """
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
-    return [pool.product(pool.add("abs", i), i) for i in signed]
+    likelier = rates(signals) | set(range(signals.n_x, pool.inputs))
+    terms: Terms = []
+    for i in signed:
+        terms.append(pool.product(pool.add("abs", i), i))
+        if i in likelier:
+            pool.found[terms[-1]] = pool.length(pool.product(i, i)) - LIKELIER
+    return terms
 
 
 def roots(pool: Pool, signals: Signals) -> Terms:
