@@ -11,6 +11,7 @@ from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise
+from twinloop.identification.sensors.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.sensors.offsets import late_groups, moved, search_offsets
 
@@ -149,3 +150,50 @@ def test_what_was_found_is_flown_on_the_twin_as_well():
             errors.append(np.square(off).mean() / np.square(readings - readings[0]).mean())
     late, in_time = np.median(np.reshape(errors, (4, 2)), axis=0)
     assert late < 1e-6 and in_time > 100.0 * late
+
+
+SERVO = tl.Signals(
+    [
+        tl.State("angle", "rad", 1.0),
+        tl.State("rate", "rad/s", 4.0, derivative_of="angle"),
+    ],
+    [tl.Command("asked", "rad", (-1.0, 1.0))],
+    DT,
+)
+
+
+def served(late, seed=0, n=400):
+    """A servo whose rate is damped within 17 ms, read with noise; its angle is read so many seconds late."""
+    draw = np.random.default_rng(seed)
+    asked = np.repeat(draw.uniform(-1.0, 1.0, n // 8), 8)
+
+    def law(t, x, u):
+        return [x[1], 900.0 * (u - x[0]) - 60.0 * x[1]]
+
+    states, angles = [np.zeros(2)], [0.0]
+    for u in asked:
+        run = solve_ivp(law, (0.0, DT), states[-1], args=(u,), rtol=1e-10, atol=1e-12, dense_output=True)
+        angles.append(run.sol(DT - late)[0])
+        states.append(run.y[:, -1])
+    readings = np.array(states)
+    readings[:, 0] = angles
+    noise = draw.normal(size=readings.shape) * [2e-4, 2e-3]
+    return Run.of(readings + noise, asked[:, None])
+
+
+def test_damping_within_a_period_is_no_late_sensor_once_a_law_is_there():
+    scales = np.array([1.0, 4.0])
+    for seed in range(3):
+        run = served(0.0, seed)
+        every = chains(SERVO, "acceleration", guessed_noise([run], scales))
+        found = offsets_of([run], SERVO)
+        assert found[0] < 0.0, "without a law the damping passes for a sensor that is early"
+        assert not that_hold([run], SERVO, every, found, WORKERS).any()
+
+
+def test_a_sensor_that_is_late_is_late_behind_a_law_as_well():
+    run = served(0.7 * DT)
+    every = chains(SERVO, "acceleration", guessed_noise([run], np.array([1.0, 4.0])))
+    found = offsets_of([run], SERVO)
+    assert found[0] > 0.0 and found[1] == 0.0
+    np.testing.assert_array_equal(that_hold([run], SERVO, every, found, WORKERS), found)

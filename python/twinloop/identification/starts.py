@@ -16,6 +16,7 @@ from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import guessed_noise
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import Sum
+from twinloop.identification.sensors.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.sensors.noise import declared_noise, given_noise, kinematic_noise
 from twinloop.identification.sensors.offsets import moved, search_offsets
@@ -82,6 +83,7 @@ def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         scales = np.array([state.scale for state in signals.states])
         every = [*hypothesis.driven, *hypothesis.given]
         offsets = search_offsets(runs, signals, every, scales, context.workers)
+        offsets = that_hold(runs, signals, every, offsets, context.workers)
     at_once = tuple(moved(runs, signals, offsets))
     given = tuple(kinematic_noise(chain, at_once, signals) for chain in hypothesis.given)
     return replace(hypothesis, offsets=offsets, runs=at_once, given=given)
