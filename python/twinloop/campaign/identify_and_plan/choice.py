@@ -105,11 +105,20 @@ class Choice:
             return "the twin does not follow the runs that it was learnt from"
         if nearby(self.planner.family, tuned[np.newaxis], standing.unfit(self.book))[0]:
             return "a flight with gains close to those that the twin prefers failed or was cut"
+        if self._no_gains_count(members, tuned):
+            return "the twin flies the same whatever the gains are, so that no command acts in it"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
             return "a model sees those that the twin prefers leave the envelope"
         return ""
+
+    def _no_gains_count(self, members: Sequence[_core.Model], tuned: Floats) -> bool:
+        """Whether every member flies to the bit as well with the gains in either corner of their box."""
+        family = self.planner.family
+        corners = [family.from_unit(np.full(family.size, place)) for place in (0.0, 1.0)]
+        qualities = self._judge(members, np.stack([tuned, *corners])).qualities
+        return bool((qualities == qualities[:, :, :1]).all())
 
     def _not_preferred(
         self, members: Sequence[_core.Model], recorded: Floats, tuned: Floats, flown: Test, better: float
