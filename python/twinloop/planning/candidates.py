@@ -12,6 +12,9 @@ from twinloop.planning.judging import Ends, Judge
 from twinloop.planning.proposal import Flown
 from twinloop.planning.settings import PlanningOptions
 
+STRONGER = 4.0
+"""Ratio of an excitation to the one before where that taught no law and the next is held back."""
+
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
@@ -41,7 +44,13 @@ class Candidates:
 
 
 def candidates(
-    judge: Judge, options: PlanningOptions, tuned: Floats, flown: Flown, goal: str, number: int
+    judge: Judge,
+    options: PlanningOptions,
+    tuned: Floats,
+    flown: Flown,
+    goal: str,
+    number: int,
+    trusted: bool = True,
 ) -> Candidates:
     """Draws candidates; the first one is the tuned gains as they are.
 
@@ -52,6 +61,7 @@ def candidates(
         flown: so far.
         goal: "both", "model" or "control".
         number: of the test, for its streams.
+        trusted: whether the committee is; otherwise the test is held back as a first one is.
 
     Returns:
         The candidates.
@@ -65,6 +75,11 @@ def candidates(
     places[: count // 4] = place
     if goal == "model":
         places[count // 2 :] = stream.uniforms(count - count // 2, family.size)
+    else:
+        # Where the tuned gains go further than the committee is believed, some on the way to them do not.
+        way = count - count // 4
+        back = stream.uniforms(count - way)[:, np.newaxis]
+        places[way:] += back * (family.to_unit(flown.best) - place)
     genes = family.from_unit(places)
     genes[0] = tuned
     genes[count - again :] = flown.best
@@ -75,8 +90,10 @@ def candidates(
     excitation = np.zeros((count, steps, judge.signals.n_u))
     most = options.excitation_most
     if most > 0.0 and options.excitation > 0.0:
-        # Gains that have flown bear more of it than before, and once more the same would tell little.
-        stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
+        # Gains that have flown bear more of it than before, and once more the same would tell little. What told too
+        # little for a law, and is held back again, may be stronger at once.
+        growth = STRONGER if options.hold_back and not trusted else 2.0
+        stronger = min(growth ** max(1, flown.times) * options.excitation, most)
         for i in range(1, count):
             amplitude = stronger if i >= count - again else most * stream.uniform()
             excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)

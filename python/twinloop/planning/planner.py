@@ -170,7 +170,7 @@ class Planner(Judge):
         Returns:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
-        drafts = candidates(self, self.options, tuned, flown, goal, number)
+        drafts = candidates(self, self.options, tuned, flown, goal, number, committee.trusted)
         self.watch("candidates")
         wanted = Wanted(goal, number, exploit)
         found = Comparison(self, self.options, committee, drafts, flown, wanted).proposal()
