@@ -9,11 +9,13 @@ from late_sensors import BODY, PENDULUM, read, swinging, turning
 from late_sensors import DT as LATE_DT
 from twinloop import _core
 from twinloop.campaign.presets import options_of
-from twinloop.identification.forms import candidates
+from twinloop.identification.context import Context
+from twinloop.identification.forms import _described, brief_look, candidates
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.euler_steps import euler_form
 from twinloop.law.forms import FORMS
+from twinloop.streams import Unit
 
 WORKERS = _core.Workers(1)
 FAST = {"moves": 2000, "starts": 2, "generations": 0, "lags": False, "committee_size": 2, "tuning_steps": 8}
@@ -247,3 +249,27 @@ def test_formulas_of_a_user_mean_one_form():
     run = recorded(flow)
     assert candidates(told, signals_of("x"), [run], WORKERS) == ("acceleration",)
     assert candidates(told, signals_of(), [run], WORKERS) == ("increment",)
+
+
+@pytest.mark.parametrize("rate", [-0.04, -0.004, 0.01])
+@pytest.mark.parametrize("noise", [0.05, 0.5])
+def test_of_a_linear_system_both_forms_are_described_alike(rate, noise):
+    """Its exact step is linear, too: neither form knows more, and the readings cannot prefer one."""
+    dt, count, runs = 3.0, 120, []
+    signals = tl.Signals([tl.State("air", "K", 50.0)], [tl.Command("power", "W", (0.0, 1.0), scale=1.0)], dt)
+    growth = np.exp(rate * dt)
+    for seed in range(3):
+        stream = np.random.default_rng(seed)
+        power, air = np.repeat(stream.uniform(0.0, 1.0, count // 10), 10), [0.0]
+        for u in power:
+            air.append(growth * air[-1] + (growth - 1.0) / rate * 2.5 * u)
+        readings = np.array(air)[:, None]
+        runs.append(Run.of(readings + noise * stream.normal(size=readings.shape), power[:, None]))
+    context = Context(
+        [run.continued(signals) for run in runs], signals, options_of("default", {}), Unit(0), WORKERS
+    )
+    first, other = (brief_look(context, form, 1) for form in ("acceleration", "increment"))
+    stepping = 12.0
+    assert _described(context, other) - _described(context, first) == pytest.approx(stepping, abs=6.0)
+    # A law of derivatives is read at both ends of a period, which residuals alone do not show.
+    assert other.length - first.length == pytest.approx(rate * dt * count * len(runs), abs=6.0)

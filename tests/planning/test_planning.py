@@ -483,7 +483,7 @@ def test_gains_that_fly_again_are_excited_more_each_time_up_to_a_limit():
         amplitudes.append(float(np.abs(repeated).max()))
     most = planner.options.excitation_most
     assert amplitudes == pytest.approx([0.02, 0.04, most, most], rel=0.05)
-    # What taught no law, and is held back in flight, is four times as strong at once; where nothing holds it back it is not.
+    # What taught no law, and is held back in flight, is four times as strong at once.
     flown, first = Flown(TUNED, True, [1.0], 1.0), []
     for options in (planner.options, replace(planner.options, hold_back=False)):
         drafts = drawn(planner, options, TUNED, flown, "both", 3, trusted=False)

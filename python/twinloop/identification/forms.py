@@ -8,17 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+
+import numpy as np
 
 from twinloop import _core
+from twinloop.elementary import log
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import STEPPING
+from twinloop.identification.fit.models import model_of
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.records import Run
-from twinloop.identification.search.description import shorter
+from twinloop.identification.identified import Identified
+from twinloop.identification.proposals.hidden import with_hidden
+from twinloop.identification.records import Run, stages
+from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
 from twinloop.identification.sensors.euler_steps import euler_form
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import FORMS, begun, with_offsets
+from twinloop.law.actuation import Actuation
 from twinloop.law.forms import EULER
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
@@ -31,6 +39,10 @@ MEANINGS = {
     "semi-implicit-euler": "derivatives in one semi-implicit Euler step a period",
 }
 """Forms in words."""
+APART = 1e-4
+"""Of a state's scale, on either side: where slopes of a law are taken."""
+LEAST = 1e-6
+"""The least share of a reading that is left in a residual."""
 LATE = 18.0
 """What late sensors must gain over a step of Euler, each: an offset, and that of all offsets it is half a period."""
 HALF_A_PERIOD = (
@@ -89,10 +101,14 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
     context.watch("form")
     aligned = forms[-1] in EULER
     looks = [brief_look(context, form, FORMS + place, aligned) for place, form in enumerate(forms)]
+    known = context.earlier
+    if known is not None and known.actuation != Actuation.direct(context.signals):
+        behind = [behind_known(context, known, look) for look in looks]
+        looks = [shortest(pair, partial(_described, context)) for pair in zip(looks, behind, strict=True)]
     best, other = looks
-    if shorter(_described(other), _described(best)):
+    if shorter(_described(context, other), _described(context, best)):
         best, other = other, best
-    return best.form, [_said(best, other)]
+    return best.form, [_said(context, best, other)]
 
 
 def brief_look(context: Context, form: str, start: int, aligned: bool = False) -> Hypothesis:
@@ -113,14 +129,57 @@ def brief_look(context: Context, form: str, start: int, aligned: bool = False) -
     return undisturbed(brief, climbed(brief, from_both_sides(brief, first)))
 
 
-def _described(look: Hypothesis) -> float:
+def behind_known(context: Context, known: Identified, look: Hypothesis) -> Hypothesis:
+    """What a brief look finds under the same form behind the lags and the hidden state that were known.
+
+    It does not look for them itself, and what steps would stand in for them.
+
+    Args:
+        context: of the identification.
+        known: what was learnt earlier.
+        look: what it finds without them.
+    """
+    brief = replace(context.brief(context.runs), earlier=known, as_integrated=True)
+    behind = begun(brief, look.form, brief.first_pool(), look.start)
+    behind = replace(behind, actuation=known.actuation, searches=look.searches)
+    if known.actuation.hidden:
+        behind = replace(behind, candidates=with_hidden(brief, behind.candidates))
+    return undisturbed(brief, climbed(brief, from_both_sides(brief, behind)))
+
+
+def _described(context: Context, look: Hypothesis) -> float:
     """Description length of the readings, with what is late in it priced."""
-    return look.evidence.length + LATE * len(set(look.offsets[look.offsets != 0.0].tolist()))
+    late = LATE * len(set(look.offsets[look.offsets != 0.0].tolist()))
+    return look.evidence.length + late + _read_at_the_end(context, look)
 
 
-def _said(best: Hypothesis, other: Hypothesis) -> Remark:
+def _read_at_the_end(context: Context, look: Hypothesis) -> float:
+    """What the description length of residuals lacks of that of the readings, −2 log |∂ residuals / ∂ readings|.
+
+    Derivatives are read at both ends of a period, half of them at the end where the residual is: its density is that of
+    the reading times 1 − dt/2 ∂f/∂x, for each state that is driven. What steps is read at the start alone.
+    """
+    if look.form != "acceleration":
+        return 0.0
+    signals, program = context.signals, model_of(context, look).program
+    rows = stages(look.runs, signals, look.actuation).middle[:, : program.inputs]
+    total = 0.0
+    for output, chain in enumerate(look.driven):
+        driven = chain.states[0]
+        step = np.zeros(rows.shape[1])
+        step[driven] = APART * signals.states[driven].scale
+        slopes = (program.run(rows + step) - program.run(rows - step))[:, output] / (2.0 * step[driven])
+        shares = np.abs(1.0 - 0.5 * signals.dt * slopes[np.isfinite(slopes)])
+        total -= 2.0 * float(log(np.maximum(shares, LEAST)).sum())
+    return total
+
+
+def _said(context: Context, best: Hypothesis, other: Hypothesis) -> Remark:
     step = best.form in EULER or other.form in EULER
-    gain = _described(other) - _described(best) if step else other.length - best.length
+    gain = _described(context, other) - _described(context, best)
+    if not step:
+        # What a step costs is named in the sentence.
+        gain -= other.evidence.length - other.length - (best.evidence.length - best.length)
     than = "longer" if gain > 0.0 else "shorter"
     decided = f", where {STEPPING:g} would decide. The option form fixes it."
     if step:

@@ -1,9 +1,9 @@
 """Whether a sensor is late once a law moves the states: what damps a rate within a period looks like an offset, too.
 
-A search for offsets takes disturbances for all that drives a state, held over each period. Under a law the drive changes
-within it: of a rate that is damped with a time constant T the trapezoid of its readings errs as if it were early by
-dt²/(12 T). So an offset has to describe the readings more briefly behind a linear law as well, for which nothing has to
-be selected.
+A search for offsets takes disturbances for all that drives a state, held over each period. Under a law the drive
+changes within it: of a rate that is damped with a time constant T the trapezoid of its readings errs as if it were
+early by dt²/(12 T). So an offset has to describe the readings more briefly behind a linear law as well, for which
+nothing has to be selected.
 """
 
 from __future__ import annotations

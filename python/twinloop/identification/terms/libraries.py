@@ -34,8 +34,8 @@ def damping(pool: Pool, signals: Signals) -> Terms:
     """|x| x of inputs with two signs that are no angles: what slows a motion both ways, as its square does not.
 
     Where a rate had one sign only the readings do not tell drag from its square, which would drive the machine on as
-    soon as it turns; where a command had, they do not tell a thruster that can turn round from one that cannot. So |x| x
-    is taken to be the likelier of the two.
+    soon as it turns; where a command had, they do not tell a thruster that can turn round from one that cannot. So
+    |x| x is taken to be the likelier of the two.
     """
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
