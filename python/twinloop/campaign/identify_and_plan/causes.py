@@ -7,7 +7,8 @@ do with each other, however slowly each of them changes (Bartlett 1935). One fli
 which a disturbance changes so slowly that its sign alone decides.
 
 Nor does a gust know when a system moves, as play and friction do, which are other ones under other gains. So its
-size is multiplied in the same way with the speed of the twin's free run, which no gust has touched.
+size is multiplied in the same way with the speed of the twin's free run, which no gust has touched. And what is small
+may be the inaccuracy of the law (`exactness.py`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Cause, Experiment
+from twinloop.campaign.identify_and_plan.exactness import driven, inexact_by_more, shows
 from twinloop.campaign.identify_and_plan.following import cut, free_run, start_of
 from twinloop.campaign.identify_and_plan.likeness import Likeness
 from twinloop.campaign.identify_and_plan.selection import distinct
@@ -100,16 +102,22 @@ def causes_of(
     for run, (_, _, gusts) in zip(flights, found, strict=True):
         assert run.test is not None
         tasks.setdefault(run.test.target_state.tobytes(), []).append(gusts)
-    speeds = [speed(identified.members[0], run, limits, workers) for run in flights]
+    drives = driven(identified, flights, signals)
+    frees = [alone(identified.members[0], run, limits, workers) for run in flights]
     causes: dict[int, Cause] = {}
     for state, place in disturbed.items():
         causes[state] = cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
-        moving = [
-            (np.abs(gusts[1:, place]), fast)
-            for (_, _, gusts), fast in zip(found, speeds, strict=True)
-            if fast is not None
+        known = [
+            (run, gusts[1:, place], free)
+            for run, (_, _, gusts), free in zip(flights, found, frees, strict=True)
+            if free is not None
         ]
-        if causes[state] == "disturbance" and acts_in_motion(moving):
+        moving = [(np.abs(disturbing), speed(free, limits)) for _, disturbing, free in known]
+        missed = [(run.trajectory.states, free) for run, _, free in known]
+        chain = identified.chains[place]
+        if causes[state] == "disturbance" and (
+            acts_in_motion(moving) or inexact_by_more(chain, drives) or not shows(missed, chain, limits)
+        ):
             causes[state] = "undecided"
     return causes
 
@@ -136,23 +144,27 @@ def acts_in_motion(flights: Sequence[tuple[Floats, Floats]]) -> bool:
     return Likeness.of((size - size.mean(), fast - fast.mean()) for size, fast in flights).certain(BY_LUCK)
 
 
-def speed(model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers) -> Floats | None:
-    """How fast a model flown by itself moves in each period, over all states in units of their mean (n,).
+def alone(model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers) -> Floats | None:
+    """States of a model flown by itself (n + 1, n_x); None where it does not last as long as the flight.
 
     Args:
         model: that is flown.
         flight: from where, and under which controller or commands.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
-
-    Returns:
-        Root mean squares; None where it does not last as long as the flight.
     """
     steps = flight.trajectory.steps
     flown = cut(flight.replayed, start_of(model, flight.trajectory.states[0]), steps)
     states, lasted = free_run(model, flown, limits, workers)
-    if lasted < steps:
-        return None
+    return None if lasted < steps else states
+
+
+def speed(states: Floats, limits: Limits) -> Floats:
+    """How fast states (n + 1, n_x) move in each period, over all of them in units of their mean (n,).
+
+    Returns:
+        Root mean squares.
+    """
     moved = np.square(limits.signals.difference(states[1:], states[:-1]))
     most = moved.mean(axis=0)
     return np.asarray(np.sqrt((moved / np.where(most > 0.0, most, 1.0)).sum(axis=1)))

@@ -35,7 +35,8 @@ def damping(pool: Pool, signals: Signals) -> Terms:
 
     Where a rate had one sign only the readings do not tell drag from its square, which would drive the machine on as
     soon as it turns; where a command had, they do not tell a thruster that can turn round from one that cannot. So
-    |x| x is taken to be the likelier of the two.
+    |x| x is taken to be the likelier of the two. Neither is as likely as the input itself, which a command that is only
+    switched over does not tell from |x| x.
     """
     signed = [i for i in range(signals.n_x) if i not in angles(signals)]
     signed += [signals.n_x + j for j, u in enumerate(signals.commands) if u.bounds[0] < 0.0 < u.bounds[1]]
@@ -44,7 +45,7 @@ def damping(pool: Pool, signals: Signals) -> Terms:
     for i in signed:
         terms.append(pool.product(pool.add("abs", i), i))
         if i in likelier:
-            pool.found[terms[-1]] = pool.length(pool.product(i, i)) - LIKELIER
+            pool.found[pool.product(i, i)] = pool.length(terms[-1]) + LIKELIER
     return terms
 
 
