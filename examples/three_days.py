@@ -150,10 +150,10 @@ twinloop("ask", "rig.db")
 twinloop("tell", "rig.db", "2", "--failed", "the motor cut out at the start")
 
 # Wednesday. Two alternatives, of which one is flown; then the best gains, and what to take away.
-first, _ = tests(twinloop("ask", "rig.db", "--batch", "2"))
+first, other = tests(twinloop("ask", "rig.db", "--batch", "2"))
 fly(first, seed=3)
-twinloop("tell", "rig.db", "3", "flight-3.csv")
-twinloop("abandon", "rig.db", "4")
+twinloop("tell", "rig.db", f"{first[0]}", f"flight-{first[0]}.csv")
+twinloop("abandon", "rig.db", f"{other[0]}")
 fly(tests(twinloop("ask", "rig.db", "--last"))[0], seed=5)
 twinloop("tell", "rig.db", "5", "flight-5.csv")
 twinloop("show", "rig.db")

@@ -20,6 +20,7 @@ from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
 from twinloop.identification.outliers import cleaned
+from twinloop.identification.proposals.at_once import at_once
 from twinloop.identification.proposals.calm import calm
 from twinloop.identification.proposals.contacts import contacts
 from twinloop.identification.proposals.friction import friction
@@ -40,7 +41,7 @@ from twinloop.streams import Unit
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
-PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, friction, contacts, second_look, parts, calm)
+PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, friction, contacts, second_look, parts, at_once, calm)
 """In the order in which they are made."""
 
 

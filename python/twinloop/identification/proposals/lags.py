@@ -67,25 +67,27 @@ def _trials(context: Context, hypothesis: Hypothesis) -> Trial:
 def _best_lag(
     context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int
 ) -> Hypothesis:
-    """The best so far, or a better one with this delay."""
-    found: dict[float, Hypothesis] = {}
-    now, worse = LAGS[0], 0
-    for lag in LAGS:
-        at_once = lag == 0.0 and delay == 0
-        found[lag] = (
-            trial(best.actuation.at_once(group)) if at_once else _at(context, trial, best, group, delay, lag)
-        )
-        now, worse = (
-            (lag, 0) if found[lag].evidence.beats(found[now].evidence) else (now, worse + (lag != now))
-        )
+    """The best so far, or a better one with this delay.
+
+    Without a delay a short lag may describe runs worse than none does, and a longer one better. A delay has to be
+    better soon: behind one or two periods more even runs of a machine without any find some lag that suits their noise.
+    """
+    found = best if delay else trial(best.actuation.at_once(group))
+    lag, worse = None if delay else 0.0, 0
+    for tried in LAGS if delay else LAGS[1:]:
+        other = _at(context, trial, best, group, delay, tried)
+        if other.evidence.beats(found.evidence):
+            found, lag, worse = other, tried, 0
+        else:
+            worse += lag != 0.0
         # Past the best lag the fit only gets worse.
         if worse >= 2:
             break
-    if now:
-        # A period of delay is less than the steps of the grid: between them it would stand in for a lag.
-        for lag in (now / FINER, now * FINER):
-            found[lag] = _at(context, trial, best, group, delay, lag)
-    return strongest([best, *found.values()])
+    several = [best, found]
+    if lag:
+        # Of the steps of the grid one is larger than a period of delay, which would stand in for a lag between them.
+        several += [_at(context, trial, best, group, delay, lag * by) for by in (1.0 / FINER, FINER)]
+    return strongest(several)
 
 
 def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:

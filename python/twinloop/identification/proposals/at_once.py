@@ -1,0 +1,26 @@
+"""At once: a lag that tuning has shown to be nothing is none, and need not be paid for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from twinloop.identification.context import Context
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.hypothesis import Hypothesis
+
+NOTHING = 0.05
+"""Periods below which a lag is none: within them a command has arrived by 1 − e⁻²⁰."""
+
+
+def at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The hypothesis with groups of commands that act at once where they hardly lag, fitted again."""
+    if hypothesis.fit is None or not hypothesis.fit.stable or not context.options.lags:
+        return
+    actuation = hypothesis.actuation
+    for group in hypothesis.alike:
+        lag, delay, _ = actuation.actuators[group[0]]
+        if 0.0 < lag < NOTHING * context.signals.dt and delay == 0:
+            actuation = actuation.at_once(group)
+    if actuation is not hypothesis.actuation:
+        yield fitted(context, replace(hypothesis, actuation=actuation, fit=None))

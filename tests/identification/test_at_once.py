@@ -1,0 +1,58 @@
+"""A lag that tuning has shown to be nothing is none; one that is there stays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from twinloop import _core
+from twinloop.campaign.presets import options_of
+from twinloop.identification.context import Context
+from twinloop.identification.evidence import LAGGING
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.proposals.at_once import NOTHING, at_once
+from twinloop.identification.records import Run
+from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.starts import ANEW, begun
+from twinloop.law.actuation import Actuation, Actuator
+from twinloop.streams import Unit
+
+DT = 0.05
+SIGNALS = tl.Signals([tl.State("speed", "m/s", 2.0)], [tl.Command("u", "1", (-1.0, 1.0), scale=1.0)], DT)
+
+
+def found(lag):
+    """A fitted hypothesis of a motor with such a lag (s), begun with it."""
+    stream = np.random.default_rng(1)
+    commands = np.repeat(stream.uniform(-1.0, 1.0, (30, 1)), 8, axis=0)
+    speed, effect, speeds = 0.0, commands[0, 0], [0.0]
+    for u in commands[:, 0]:
+        for _ in range(200):
+            effect = u if lag == 0.0 else effect + DT / 200 * (u - effect) / lag
+            speed += DT / 200 * (3.0 * effect - 0.8 * speed)
+        speeds.append(speed)
+    readings = np.array(speeds)[:, None]
+    run = Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands).continued(SIGNALS)
+    context = Context(
+        [run], SIGNALS, options_of("default", {"generations": 0, "moves": 2000}), Unit(0), _core.Workers(1)
+    )
+    first = begun(context, "acceleration", context.first_pool(), ANEW)
+    first = replace(first, actuation=Actuation((Actuator(lag or 0.3 * DT, 0, None),)))
+    return context, fitted(context, from_both_sides(context, first))
+
+
+def test_a_lag_that_is_tuned_to_nothing_saves_its_price():
+    context, hypothesis = found(0.0)
+    assert 0.0 < hypothesis.actuation.actuators[0].lag < NOTHING * DT
+    (other,) = at_once(context, hypothesis)
+    assert other.actuation == Actuation.direct(SIGNALS) and other.evidence.beats(hypothesis.evidence)
+    assert hypothesis.evidence.length - other.evidence.length == pytest.approx(LAGGING, abs=1.0)
+    np.testing.assert_allclose(other.fit.model.constants, [-0.8, 3.0], rtol=0.01)
+    assert list(at_once(context, other)) == []
+
+
+def test_a_lag_that_is_there_stays():
+    context, hypothesis = found(0.1)
+    assert hypothesis.actuation.actuators[0].lag == pytest.approx(0.1, rel=0.02)
+    assert list(at_once(context, hypothesis)) == []
