@@ -10,7 +10,13 @@ import twinloop as tl
 from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign import standing
-from twinloop.campaign.identify_and_plan.choice import SURE, Choice, confirmed, nearly_confirmed
+from twinloop.campaign.identify_and_plan.choice import (
+    SURE,
+    Choice,
+    confirmed,
+    nearly_confirmed,
+    over_promised,
+)
 from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
@@ -98,6 +104,34 @@ def test_where_the_last_flight_was_not_as_predicted_others_must_be_better_by_two
     assert chosen(1.01 * enough, experiments=missed)[0] == "flown"
     assert "not what had been predicted" in chosen(1.01 * enough, experiments=missed)[1]
     assert chosen(1.01 * enough)[0] == "tuned"
+
+
+@pytest.mark.parametrize(
+    ("ratios", "answer"),
+    [
+        ([], 1.0),
+        ([1.3], 1.0),
+        ([1.3, 0.9], 1.0),
+        ([0.9, 1.3], 1.0),
+        ([1.1, 1.3], 1.1),
+        ([0.5, 1.3, 1.05], 1.05),
+    ],
+)
+def test_two_flights_in_a_row_that_were_worse_than_promised_count(ratios, answer):
+    runs = [experiment(0.8, 0.8 * ratio) for ratio in ratios]
+    assert over_promised([experiment(None), *runs, experiment(None), experiment(np.nan)]) == pytest.approx(
+        answer
+    )
+    # A flight that was cut has no quality.
+    assert over_promised([*runs, experiment(0.8, None)]) == pytest.approx(answer)
+
+
+def test_a_twin_that_has_promised_too_much_twice_must_promise_more_by_as_much():
+    twice = [experiment(0.9, 1.0, 0.2), experiment(0.94, 1.0, 0.2)]
+    assert chosen(0.9, experiments=twice)[0] == "tuned"
+    answer, reason = chosen(0.95, experiments=twice)
+    assert answer == "flown" and "both by 6.4 % or more" in reason
+    assert chosen(0.95, experiments=twice[:1])[0] == "tuned"
 
 
 @pytest.mark.parametrize(

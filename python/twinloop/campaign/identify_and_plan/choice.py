@@ -129,6 +129,15 @@ class Choice:
         measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
         without = share_of(self.planner, self.committee, flown, self.draws)
         alone = None if measured is None else measured * without
+        promised = over_promised(self.book.experiments)
+        if alone is not None and promised > 1.0:
+            predicted, _ = expected(recorded[:, :, 0])
+            if not predicted * promised < alone:
+                return (
+                    f"the last two flights were worse than promised, both by {100 * (promised - 1):.2g} % or more, and"
+                    f" others that the twin promises {predicted:.3g} of would then be no better than the {alone:.3g} of"
+                    " these"
+                )
         if measured is not None and self._doubtful(members, flown, recorded, measured, without):
             return (
                 "the twin expects worse of others than was measured of these, but of these it expects worse, too, and"
@@ -194,6 +203,26 @@ class Choice:
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None
     ) -> Judged:
         return self.planner.judge(members, genes, self.committee.sds, self.draws, measured=measured, off=off)
+
+
+def over_promised(experiments: Sequence[Experiment]) -> float:
+    """Ratio by which both of the last two flights that something was predicted of were worse; 1 if they were not.
+
+    Gains that are tuned on a twin are those that its errors flatter most. One flight that misses its prediction teaches
+    the twin; two in a row show that it is flattered again.
+
+    Args:
+        experiments: in the order of `tell`.
+    """
+    ratios = [
+        run.quality / run.test.predicted
+        for run in experiments
+        if run.test is not None
+        and run.test.predicted
+        and np.isfinite(run.test.predicted)
+        and run.quality is not None
+    ]
+    return max(1.0, min(ratios[-2:])) if len(ratios) > 1 else 1.0
 
 
 def confirmed(experiments: Sequence[Experiment]) -> bool:
