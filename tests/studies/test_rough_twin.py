@@ -12,7 +12,7 @@ from twinloop_exam.zoo.plants import plant
 def learnt():
     """One flight of a motor whose load stands behind play and is not logged."""
     motor = plant("motor-backlash-hidden")
-    task, system = motor.asked, motor.make(1)
+    task, system = motor.asked, motor.make(2)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", tl.RemarkWarning)
         campaign = tl.Campaign(
