@@ -16,13 +16,12 @@ from twinloop import _core
 from twinloop.elementary import log
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import STEPPING
-from twinloop.identification.fit.models import model_of
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
 from twinloop.identification.proposals.hidden import with_hidden
-from twinloop.identification.records import Run, stages
+from twinloop.identification.records import Run
 from twinloop.identification.search.description import shorter, shortest
-from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
+from twinloop.identification.search.selection import climbed, from_both_sides, posed, undisturbed
 from twinloop.identification.sensors.euler_steps import euler_form
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import FORMS, begun, with_offsets
@@ -39,8 +38,6 @@ MEANINGS = {
     "semi-implicit-euler": "derivatives in one semi-implicit Euler step a period",
 }
 """Forms in words."""
-APART = 1e-4
-"""Of a state's scale, on either side: where slopes of a law are taken."""
 LEAST = 1e-6
 """The least share of a reading that is left in a residual."""
 LATE = 18.0
@@ -103,15 +100,27 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
     looks = [brief_look(context, form, FORMS + place, aligned) for place, form in enumerate(forms)]
     known = context.earlier
     if known is not None and known.actuation != Actuation.direct(context.signals):
-        behind = [behind_known(context, known, look) for look in looks]
-        looks = [shortest(pair, partial(_described, context)) for pair in zip(looks, behind, strict=True)]
+        looks = [
+            shortest(
+                (look, brief_look(context, look.form, look.start, aligned, known, look.searches)),
+                partial(_described, context),
+            )
+            for look in looks
+        ]
     best, other = looks
     if shorter(_described(context, other), _described(context, best)):
         best, other = other, best
     return best.form, [_said(context, best, other)]
 
 
-def brief_look(context: Context, form: str, start: int, aligned: bool = False) -> Hypothesis:
+def brief_look(
+    context: Context,
+    form: str,
+    start: int,
+    aligned: bool = False,
+    known: Identified | None = None,
+    searches: int = 0,
+) -> Hypothesis:
     """What a short search finds under a form, with what disturbs explained by terms as far as they can.
 
     Args:
@@ -120,31 +129,20 @@ def brief_look(context: Context, form: str, start: int, aligned: bool = False) -
         start: its number.
         aligned: whether late sensors are looked for: where another form is a step of Euler, for which they may be
             taken. Quotients are not then, for a period of any law resembles one.
+        known: what was learnt earlier, to look behind its lags and hidden state, which a short search does not look for
+            itself; None: commands act at once.
+        searches: how many searches from the same start were made before.
     """
-    brief = replace(context.brief(context.runs), as_integrated=True)
-    first = begun(brief, form, brief.first_pool(), start)
+    brief = replace(context.brief(context.runs), earlier=known, as_integrated=True)
+    first = replace(begun(brief, form, brief.first_pool(), start), searches=searches)
     if aligned:
         brief = replace(brief, options=replace(brief.options, implicit=False))
         first = with_offsets(brief, first)
+    if known is not None:
+        first = replace(first, actuation=known.actuation)
+        if known.actuation.hidden:
+            first = replace(first, candidates=with_hidden(brief, first.candidates))
     return undisturbed(brief, climbed(brief, from_both_sides(brief, first)))
-
-
-def behind_known(context: Context, known: Identified, look: Hypothesis) -> Hypothesis:
-    """What a brief look finds under the same form behind the lags and the hidden state that were known.
-
-    It does not look for them itself, and what steps would stand in for them.
-
-    Args:
-        context: of the identification.
-        known: what was learnt earlier.
-        look: what it finds without them.
-    """
-    brief = replace(context.brief(context.runs), earlier=known, as_integrated=True)
-    behind = begun(brief, look.form, brief.first_pool(), look.start)
-    behind = replace(behind, actuation=known.actuation, searches=look.searches)
-    if known.actuation.hidden:
-        behind = replace(behind, candidates=with_hidden(brief, behind.candidates))
-    return undisturbed(brief, climbed(brief, from_both_sides(brief, behind)))
 
 
 def _described(context: Context, look: Hypothesis) -> float:
@@ -156,30 +154,29 @@ def _described(context: Context, look: Hypothesis) -> float:
 def _read_at_the_end(context: Context, look: Hypothesis) -> float:
     """What the description length of residuals lacks of that of the readings, −2 log |∂ residuals / ∂ readings|.
 
-    Derivatives are read at both ends of a period, half of them at the end where the residual is: its density is that of
-    the reading times 1 − dt/2 ∂f/∂x, for each state that is driven. What steps is read at the start alone.
+    Derivatives are read at both ends of a period. Where a share J of a reading is in its own prediction, the residual
+    has 1 − J of it. What steps is read at the start alone.
     """
     if look.form != "acceleration":
         return 0.0
-    signals, program = context.signals, model_of(context, look).program
-    rows = stages(look.runs, signals, look.actuation).middle[:, : program.inputs]
-    total = 0.0
-    for output, chain in enumerate(look.driven):
-        driven = chain.states[0]
-        step = np.zeros(rows.shape[1])
-        step[driven] = APART * signals.states[driven].scale
-        slopes = (program.run(rows + step) - program.run(rows - step))[:, output] / (2.0 * step[driven])
-        shares = np.abs(1.0 - 0.5 * signals.dt * slopes[np.isfinite(slopes)])
-        total -= 2.0 * float(log(np.maximum(shares, LEAST)).sum())
+    problem, total = posed(context, look), 0.0
+    for found in look.sums:
+        fixed = dict.fromkeys(problem.priors.fixed.get(found.chain.states[0], ()), 1.0)
+        weights = fixed | found.weights
+        if terms := problem.usable(list(weights)):
+            fed = problem.feedthrough(found.chain, terms) * np.array([weights[term] for term in terms])
+            total -= 2.0 * float(log(np.maximum(np.abs(1.0 - fed.sum(axis=1)), LEAST)).sum())
     return total
 
 
 def _said(context: Context, best: Hypothesis, other: Hypothesis) -> Remark:
     step = best.form in EULER or other.form in EULER
-    gain = _described(context, other) - _described(context, best)
-    if not step:
-        # What a step costs is named in the sentence.
-        gain -= other.evidence.length - other.length - (best.evidence.length - best.length)
+    # What steps, lags and hidden states cost is in the one, and not in the other: there the sentence says it.
+    best_length, other_length = (
+        _described(context, look) if step else look.length + _read_at_the_end(context, look)
+        for look in (best, other)
+    )
+    gain = other_length - best_length
     than = "longer" if gain > 0.0 else "shorter"
     decided = f", where {STEPPING:g} would decide. The option form fixes it."
     if step:

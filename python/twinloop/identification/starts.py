@@ -83,7 +83,7 @@ def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         scales = np.array([state.scale for state in signals.states])
         every = [*hypothesis.driven, *hypothesis.given]
         offsets = search_offsets(runs, signals, every, scales, context.workers)
-        offsets = that_hold(runs, signals, every, offsets, context.workers)
+        offsets = that_hold(context, hypothesis, offsets)
     at_once = tuple(moved(runs, signals, offsets))
     given = tuple(kinematic_noise(chain, at_once, signals) for chain in hypothesis.given)
     return replace(hypothesis, offsets=offsets, runs=at_once, given=given)

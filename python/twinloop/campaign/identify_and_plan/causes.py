@@ -21,7 +21,7 @@ import numpy as np
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.campaign.history import Cause, Experiment
-from twinloop.campaign.identify_and_plan.exactness import driven, inexact_by_more, shows
+from twinloop.campaign.identify_and_plan.exactness import driven, may_be_inexactness, shows
 from twinloop.campaign.identify_and_plan.following import cut, free_run, start_of
 from twinloop.campaign.identify_and_plan.likeness import Likeness
 from twinloop.campaign.identify_and_plan.selection import distinct
@@ -44,6 +44,18 @@ LATEST = 12
 """Flights that are compared, the last ones."""
 
 
+def runs_of(identified: Identified, experiments: Sequence[Experiment], signals: Signals) -> list[Run]:
+    """Flights as a twin takes them: with all sensors read at once.
+
+    Args:
+        identified: with the sensors' offsets.
+        experiments: that were flown.
+        signals: of the system.
+    """
+    runs = [Run.of(run.trajectory.states, run.trajectory.commands).continued(signals) for run in experiments]
+    return moved(runs, signals, identified.offsets)
+
+
 def observed(
     identified: Identified,
     experiments: Sequence[Experiment],
@@ -60,13 +72,13 @@ def observed(
         limits: where a run counts as diverged.
         workers: how the work is carried out.
     """
-    runs = [Run.of(run.trajectory.states, run.trajectory.commands).continued(signals) for run in experiments]
+    runs = runs_of(identified, experiments, signals)
     with engine_input():
         return _core.predictions(
             identified.model,
             limits.engine,
             [chain.engine for chain in identified.chains],
-            [(run.states, run.weights, run.commands) for run in moved(runs, signals, identified.offsets)],
+            [(run.states, run.weights, run.commands) for run in runs],
             workers=workers,
         )
 
@@ -102,21 +114,22 @@ def causes_of(
     for run, (_, _, gusts) in zip(flights, found, strict=True):
         assert run.test is not None
         tasks.setdefault(run.test.target_state.tobytes(), []).append(gusts)
-    drives = driven(identified, flights, signals)
+    drives = driven(identified.model, runs_of(identified, flights, signals), signals)
     frees = [alone(identified.members[0], run, limits, workers) for run in flights]
+    known = [
+        (run.trajectory.states, gusts[1:], free)
+        for run, (_, _, gusts), free in zip(flights, found, frees, strict=True)
+        if free is not None
+    ]
+    missed = [(read, free) for read, _, free in known]
+    speeds = [speed(free, limits) for _, free in missed]
     causes: dict[int, Cause] = {}
     for state, place in disturbed.items():
-        causes[state] = cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
-        known = [
-            (run, gusts[1:, place], free)
-            for run, (_, _, gusts), free in zip(flights, found, frees, strict=True)
-            if free is not None
-        ]
-        moving = [(np.abs(disturbing), speed(free, limits)) for _, disturbing, free in known]
-        missed = [(run.trajectory.states, free) for run, _, free in known]
         chain = identified.chains[place]
+        causes[state] = cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
+        moving = [(np.abs(gusts[:, place]), fast) for (_, gusts, _), fast in zip(known, speeds, strict=True)]
         if causes[state] == "disturbance" and (
-            acts_in_motion(moving) or inexact_by_more(chain, drives) or not shows(missed, chain, limits)
+            acts_in_motion(moving) or may_be_inexactness(chain, drives) or not shows(missed, chain, limits)
         ):
             causes[state] = "undecided"
     return causes

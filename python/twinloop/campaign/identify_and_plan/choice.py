@@ -105,7 +105,7 @@ class Choice:
             return "the twin does not follow the runs that it was learnt from"
         if nearby(self.planner.family, tuned[np.newaxis], standing.unfit(self.book))[0]:
             return "a flight with gains close to those that the twin prefers failed or was cut"
-        if self._no_gains_count(members, tuned):
+        if self._no_gains_count(members, judged):
             return "the twin flies the same whatever the gains are, so that no command acts in it"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
@@ -113,12 +113,11 @@ class Choice:
             return "a model sees those that the twin prefers leave the envelope"
         return ""
 
-    def _no_gains_count(self, members: Sequence[_core.Model], tuned: Floats) -> bool:
-        """Whether every member flies to the bit as well with the gains in either corner of their box."""
+    def _no_gains_count(self, members: Sequence[_core.Model], judged: Judged) -> bool:
+        """Whether every member flies to the bit as well in two corners of the gains' box as with the tuned ones."""
         family = self.planner.family
-        corners = [family.from_unit(np.full(family.size, place)) for place in (0.0, 1.0)]
-        qualities = self._judge(members, np.stack([tuned, *corners])).qualities
-        return bool((qualities == qualities[:, :, :1]).all())
+        corners = np.stack([family.from_unit(np.full(family.size, place)) for place in (0.0, 1.0)])
+        return bool((self._judge(members, corners).qualities == judged.qualities[:, :, :1]).all())
 
     def _not_preferred(
         self, members: Sequence[_core.Model], recorded: Floats, tuned: Floats, flown: Test, better: float
@@ -215,12 +214,9 @@ def over_promised(experiments: Sequence[Experiment]) -> float:
         experiments: in the order of `tell`.
     """
     ratios = [
-        run.quality / run.test.predicted
-        for run in experiments
-        if run.test is not None
-        and run.test.predicted
-        and np.isfinite(run.test.predicted)
-        and run.quality is not None
+        run.quality / predicted
+        for run, predicted in _predicted(experiments)
+        if run.quality is not None and np.isfinite(predicted) and predicted > 0.0
     ]
     return max(1.0, min(ratios[-2:])) if len(ratios) > 1 else 1.0
 
@@ -247,12 +243,15 @@ def nearly_confirmed(experiments: Sequence[Experiment]) -> bool:
     return run is not None and _came_true(run, NEARLY)
 
 
+def _predicted(experiments: Sequence[Experiment]) -> list[tuple[Experiment, float]]:
+    """Flights that something was predicted of, each with that."""
+    asked = [(run, run.test.predicted) for run in experiments if run.test is not None]
+    return [(run, predicted) for run, predicted in asked if predicted is not None and not np.isnan(predicted)]
+
+
 def _last_predicted(experiments: Sequence[Experiment]) -> Experiment | None:
-    for run in reversed(experiments):
-        test = run.test
-        if test is not None and test.predicted is not None and not np.isnan(test.predicted):
-            return run
-    return None
+    found = _predicted(experiments)
+    return found[-1][0] if found else None
 
 
 def _came_true(run: Experiment, share: float) -> bool:

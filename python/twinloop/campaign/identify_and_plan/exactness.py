@@ -10,12 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twinloop import _core
 from twinloop.arrays import Floats
-from twinloop.campaign.history import Experiment
-from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run, stages
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.sensors.offsets import moved
 from twinloop.law.actuation import Actuation
 from twinloop.limits import Limits
 from twinloop.signals import Signals
@@ -41,7 +39,7 @@ def shows(flights: Sequence[tuple[Floats, Floats]], chain: Chain, limits: Limits
     return not missed or bool((np.mean(missed, axis=0) > SEEN**2 * chain.sensors).any())
 
 
-def inexact_by_more(chain: Chain, drives: Floats) -> bool:
+def may_be_inexactness(chain: Chain, drives: Floats) -> bool:
     """Whether the correlated disturbance of a chain is a small share of what its law drives.
 
     Args:
@@ -51,16 +49,14 @@ def inexact_by_more(chain: Chain, drives: Floats) -> bool:
     return chain.output is not None and bool(chain.motion.correlated < EXACT**2 * drives[chain.output])
 
 
-def driven(identified: Identified, experiments: Sequence[Experiment], signals: Signals) -> Floats:
+def driven(model: _core.Model, runs: Sequence[Run], signals: Signals) -> Floats:
     """Variances over flights of what the outputs of a law drive, from the readings.
 
     Args:
-        identified: with the law's model.
-        experiments: that were flown.
+        model: of the law.
+        runs: with all sensors read at once.
         signals: of the system.
     """
-    model = identified.model
-    runs = [Run.of(run.trajectory.states, run.trajectory.commands).continued(signals) for run in experiments]
-    rows = stages(moved(runs, signals, identified.offsets), signals, Actuation.of(model, signals)).middle
+    rows = stages(runs, signals, Actuation.of(model, signals)).middle
     outputs = model.program.run(rows[:, : model.program.inputs])
     return np.asarray(np.where(np.isfinite(outputs).all(axis=0), outputs.var(axis=0), 0.0))

@@ -69,8 +69,8 @@ def _best_lag(
 ) -> Hypothesis:
     """The best so far, or a better one with this delay.
 
-    Without a delay a short lag may describe runs worse than none does, and a longer one better. A delay has to be
-    better soon: behind one or two periods more even runs of a machine without any find some lag that suits their noise.
+    From no lag on a short one may describe runs worse, and a longer one better. A delay has to be better soon: behind
+    one or two periods more even runs of a machine without any find some lag that suits their noise.
     """
     found = best if delay else trial(best.actuation.at_once(group))
     lag, worse = None if delay else 0.0, 0

@@ -8,35 +8,32 @@ nothing has to be selected.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.arrays import Floats
 from twinloop.errors import engine_input
-from twinloop.identification.records import Run, Stages, stages
+from twinloop.identification.context import Context
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import posed
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import RIDGE, floor_of
 from twinloop.identification.sensors.offsets import PRICE, moved
-from twinloop.law.actuation import Actuation
-from twinloop.signals import Signals
 
 ROUNDS = 3
 """Times that weights and noise are estimated in turn."""
 
 
-def that_hold(
-    runs: Sequence[Run], signals: Signals, chains: Sequence[Chain], offsets: Floats, workers: _core.Workers
-) -> Floats:
+def that_hold(context: Context, hypothesis: Hypothesis, offsets: Floats) -> Floats:
     """The offsets that shorten the description of the readings behind a linear law by more than they cost.
 
     Args:
-        runs: as recorded.
-        signals: of the system.
-        chains: all of them.
+        context: of the identification.
+        hypothesis: with chains, before it has terms.
         offsets: that were found where nothing but disturbances drives the states (n_x,), s.
-        workers: how the work is carried out.
 
     Returns:
         The same with 0 for those that do not; those of states that no output drives stay, for no law moves them (n_x,).
@@ -44,48 +41,33 @@ def that_hold(
     held = offsets
     for size in dict.fromkeys(offsets[offsets != 0.0].tolist()):
         late = set(np.flatnonzero(offsets == size).tolist())
-        touched = [chain for chain in chains if late & set(chain.states)]
+        touched = [chain for chain in (*hypothesis.driven, *hypothesis.given) if late & set(chain.states)]
         if any(chain.output is None for chain in touched):
             continue
         without = np.where(offsets == size, 0.0, held)
-        lengths = [
-            _described(moved(runs, signals, tried), signals, touched, workers) for tried in (held, without)
-        ]
+        lengths = []
+        for tried in (held, without):
+            runs = tuple(moved(context.runs, context.signals, tried))
+            problem = posed(context, replace(hypothesis, runs=runs))
+            lengths.append(sum(_length(problem, chain) for chain in touched))
         if not lengths[0] < lengths[1] - PRICE:
             held = without
     return held
 
 
-def _described(
-    runs: Sequence[Run], signals: Signals, chains: Sequence[Chain], workers: _core.Workers
-) -> float:
-    """−2 log of the likelihood of the readings of some chains behind a linear law with the most likely noise."""
-    seen = stages(runs, signals, Actuation.direct(signals))
-    return sum(_length(runs, seen, signals, chain, workers) for chain in chains)
-
-
-def _length(
-    runs: Sequence[Run], seen: Stages, signals: Signals, chain: Chain, workers: _core.Workers
-) -> float:
-    start, middle, end = (
-        np.column_stack([np.ones(len(stage)), stage]) for stage in (seen.start, seen.middle, seen.end)
-    )
-    columns = list(chain.states)
-    records = [
-        (run.states[:, columns], run.weights[:, columns], start[rows], middle[rows], end[rows])
-        for run, rows in zip(runs, seen.runs, strict=True)
-    ]
-    low, slow = floor_of(chain, signals.dt, float(seen.integration[columns[0]]))
+def _length(problem: Problem, chain: Chain) -> float:
+    """−2 log of the likelihood of a chain's readings behind a linear law with the most likely noise."""
+    terms = problem.usable([problem.pool.one, *range(problem.pool.inputs)])
+    regression = problem.regression(chain, problem.values(terms))
+    low, slow = floor_of(chain, problem.dt, problem.integration(chain))
+    sensors, length = np.maximum(chain.rough, low), np.inf
+    motion = (max(float(chain.rough[0]) / problem.dt, slow.white), slow.correlated, 10.0 * problem.dt)
     with engine_input():
-        regression = _core.Regression(len(columns), signals.dt, chain.form, records)
-        sensors = np.maximum(chain.rough, low)
-        motion = (max(float(chain.rough[0]) / signals.dt, slow.white), slow.correlated, 10.0 * signals.dt)
-        length = np.inf
         for _ in range(ROUNDS):
-            solved = regression.gram(sensors, motion, workers).solve(list(range(start.shape[1])), RIDGE)
+            solved = regression.gram(sensors, motion, problem.workers).solve(list(range(len(terms))), RIDGE)
             if solved is None:
                 break
             ((sensors, motion, length),) = _core.most_likely_noises(
-                [(regression, solved[0], sensors, motion, low, slow)], workers
+                [(regression, solved[0], sensors, motion, low, slow)], problem.workers
             )
     return float(length)
