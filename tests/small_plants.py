@@ -1,4 +1,4 @@
-"""Runs of small plants under commands that change now and then: a pendulum, and fans that set the air moving."""
+"""Runs of small plants under commands that change now and then: a pendulum, a motor, fans that set the air moving."""
 
 import numpy as np
 
@@ -31,6 +31,22 @@ def swung(slope, seed, steps=100, dt=0.02, start=(0.5, 0.0), noise=0.0, amplitud
 
 def gravity(angle, rate, torque):
     return -9.0 * np.sin(angle) - 0.4 * rate + 5.0 * torque
+
+
+def lagging_motor(commands, dt, lag, push, stream, steps=50):
+    """A run of a motor whose speed fades by 0.8/s and is driven by `push(acting)`, in fine steps.
+
+    The last command acts behind a lag (s), the others at once; the speed is read to 1e-3.
+    """
+    acting, speed, speeds = commands[0].copy(), 0.0, [0.0]
+    for asked in commands:
+        acting[:-1] = asked[:-1]
+        for _ in range(steps):
+            acting[-1] = acting[-1] + dt / steps * (asked[-1] - acting[-1]) / lag if lag else asked[-1]
+            speed += dt / steps * (push(*acting) - 0.8 * speed)
+        speeds.append(speed)
+    readings = np.array(speeds)[:, None]
+    return Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands)
 
 
 def fans(runs, fading, seed=3, noise=1e-3):

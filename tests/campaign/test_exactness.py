@@ -1,14 +1,13 @@
 """What is no more than the inaccuracy of a law is not called a disturbance from outside."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 import twinloop as tl
 from strategies import program_text
 from twinloop import _core
-from twinloop.campaign.identify_and_plan.exactness import driven, inexact_by_more, shows
+from twinloop.campaign.identify_and_plan.exactness import driven, may_be_inexactness, shows
+from twinloop.identification.records import Run
 from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.law.actuation import Actuation
 from twinloop.limits import Limits
@@ -45,11 +44,12 @@ def test_what_a_law_drives_is_the_variance_of_its_output_over_the_flights():
         _core.Program.parse(program_text(3, 1, 5, [lines])), "acceleration", SIGNALS.engine,
         Actuation.direct(SIGNALS).actuators,
     )  # fmt: skip
-    flight = SimpleNamespace(trajectory=SimpleNamespace(states=states, commands=force))
-    (drive,) = driven(SimpleNamespace(model=model, offsets=np.zeros(2)), [flight], SIGNALS)
+    (drive,) = driven(model, [Run.of(states, force).continued(SIGNALS)], SIGNALS)
     between = 0.5 * (states[1:, 1] + states[:-1, 1])
     assert drive == pytest.approx((4.0 * force[:, 0] / 10.0 - 0.5 * between).var(), rel=1e-6)
     # A hundredth of what it drives it may be wrong by, a tenth it may not.
-    assert inexact_by_more(chain(1e-4 * drive), [drive]) and not inexact_by_more(chain(1e-2 * drive), [drive])
-    assert not inexact_by_more(chain(1e-9, output=None), [drive])
-    assert not inexact_by_more(chain(1e-9), [0.0])
+    assert may_be_inexactness(chain(1e-4 * drive), [drive]) and not may_be_inexactness(
+        chain(1e-2 * drive), [drive]
+    )
+    assert not may_be_inexactness(chain(1e-9, output=None), [drive])
+    assert not may_be_inexactness(chain(1e-9), [0.0])

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from small_plants import lagging_motor
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import LAGGING
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.proposals.at_once import NOTHING, at_once
-from twinloop.identification.records import Run
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.starts import ANEW, begun
 from twinloop.law.actuation import Actuation, Actuator
@@ -26,14 +26,7 @@ def found(lag):
     """A fitted hypothesis of a motor with such a lag (s), begun with it."""
     stream = np.random.default_rng(1)
     commands = np.repeat(stream.uniform(-1.0, 1.0, (30, 1)), 8, axis=0)
-    speed, effect, speeds = 0.0, commands[0, 0], [0.0]
-    for u in commands[:, 0]:
-        for _ in range(200):
-            effect = u if lag == 0.0 else effect + DT / 200 * (u - effect) / lag
-            speed += DT / 200 * (3.0 * effect - 0.8 * speed)
-        speeds.append(speed)
-    readings = np.array(speeds)[:, None]
-    run = Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands).continued(SIGNALS)
+    run = lagging_motor(commands, DT, lag, lambda u: 3.0 * u, stream, steps=200).continued(SIGNALS)
     context = Context(
         [run], SIGNALS, options_of("default", {"generations": 0, "moves": 2000}), Unit(0), _core.Workers(1)
     )

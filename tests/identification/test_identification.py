@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import UNARY, operate, rk4, same_bits
 from sameness import same
-from small_plants import fans, gravity, pendulum_like, swung
+from small_plants import fans, gravity, lagging_motor, pendulum_like, swung
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.fit import fitting
@@ -354,14 +354,14 @@ def flown_in_gusts(seed):
     return rig.signals, [Run.of(flight.states, flight.commands) for flight in flights]
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_from_above_gusts_are_told_from_terms_where_from_below_they_are_not(seed):
     signals, runs = flown_in_gusts(seed)
     changes = {"libraries": ("linear", "quadratic", "damping"), "moves": 50_000}
     changes |= {"hidden": False, "directions": False}
     both, below = (identified(runs, signals, noise_from_above=above, **changes) for above in (True, False))
-    assert both.description_length < below.description_length - 50.0
-    assert both.terms < 10 <= below.terms
+    assert both.description_length < below.description_length - 100.0
+    assert both.terms < 10 < below.terms
     gusts = np.sqrt([found.chain.motion.correlated for found in both.sums])
     assert ((gusts > 0.2) & (gusts < 2.0)).all()
 
@@ -395,14 +395,7 @@ def test_a_lag_of_the_actuator_is_found():
     signals = tl.Signals([tl.State("speed", "m/s", 3.0)], [tl.Command("u", "V", (-2.0, 2.0), scale=1.0)], dt)
     for _ in range(2):
         commands = np.repeat(stream.uniform(-2.0, 2.0, (12, 1)), 10, axis=0)
-        effect, speed, states = commands[0, 0], 0.0, [0.0]
-        for u in commands[:, 0]:
-            for _ in range(50):
-                effect += dt / 50 * (u - effect) / lag
-                speed += dt / 50 * (3.0 * effect - 0.8 * speed)
-            states.append(speed)
-        readings = np.array(states)[:, None]
-        runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands))
+        runs.append(lagging_motor(commands, dt, lag, lambda u: 3.0 * u, stream))
     found = identified(runs, signals, lags=True, form="acceleration", longest_delay=1)
     [(time, delay, _)] = found.actuation.actuators
     assert time == pytest.approx(lag, rel=0.1) and delay == 0
@@ -419,14 +412,7 @@ def test_a_thruster_that_lags_by_what_no_grid_has_and_turns_round_is_found(least
     signals = tl.Signals([tl.State("speed", "m/s", 2.0)], [tl.Command("u", "1", (-1.0, 1.0), scale=1.0)], dt)
     for _ in range(2):
         commands = np.repeat(stream.uniform(least, 1.0, (16, 1)), 12, axis=0)
-        effect, speed, states = commands[0, 0], 0.0, [0.0]
-        for u in commands[:, 0]:
-            for _ in range(50):
-                effect += dt / 50 * (u - effect) / lag
-                speed += dt / 50 * (3.0 * effect * abs(effect) - 0.8 * speed)
-            states.append(speed)
-        readings = np.array(states)[:, None]
-        runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands))
+        runs.append(lagging_motor(commands, dt, lag, lambda u: 3.0 * u * abs(u), stream))
     found = identified(runs, signals, lags=True, form="acceleration", longest_delay=2)
     [(time, delay, _)] = found.actuation.actuators
     assert time == pytest.approx(lag, rel=0.02) and delay == 0
@@ -458,14 +444,7 @@ def test_of_two_groups_of_commands_only_the_one_that_lags_is_believed_to(seed):
     signals = tl.Signals([tl.State("speed", "m/s", 3.0)], commands, dt)
     for _ in range(2):
         given = np.repeat(stream.uniform((0.0, -2.0), (4.0, 2.0), (12, 2)), 10, axis=0)
-        effect, speed, states = given[0, 1], 0.0, [0.0]
-        for heat, u in given:
-            for _ in range(50):
-                effect += dt / 50 * (u - effect) / lag
-                speed += dt / 50 * (3.0 * effect + 0.7 * heat - 0.8 * speed)
-            states.append(speed)
-        readings = np.array(states)[:, None]
-        runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), given))
+        runs.append(lagging_motor(given, dt, lag, lambda heat, u: 3.0 * u + 0.7 * heat, stream))
     found = identified(runs, signals, lags=True, form="acceleration", longest_delay=1)
     at_once, late = found.actuation.actuators
     assert at_once.direct and late.lag == pytest.approx(lag, rel=0.1) and late.delay == 0

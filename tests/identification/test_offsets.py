@@ -9,11 +9,14 @@ from late_sensors import BODY, DT, PENDULUM, flown, loop_of, read, swinging, tur
 from oracles import same_bits
 from twinloop import _core
 from twinloop.campaign.presets import options_of
+from twinloop.identification.context import Context
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.sensors.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.sensors.offsets import late_groups, moved, search_offsets
+from twinloop.identification.starts import ANEW, begun
+from twinloop.streams import Unit
 
 WORKERS = _core.Workers()
 FAST = {"moves": 2000, "starts": 2, "generations": 0, "lags": False, "committee_size": 3, "tuning_steps": 8}
@@ -181,19 +184,22 @@ def served(late, seed=0, n=400):
     return Run.of(readings + noise, asked[:, None])
 
 
+def behind_a_law(run, found):
+    """The offsets of those found for the servo that hold behind a linear law."""
+    context = Context([run.continued(SERVO)], SERVO, options_of("default", FAST), Unit(0), WORKERS)
+    return that_hold(context, begun(context, "acceleration", context.first_pool(), ANEW), found)
+
+
 def test_damping_within_a_period_is_no_late_sensor_once_a_law_is_there():
-    scales = np.array([1.0, 4.0])
     for seed in range(3):
         run = served(0.0, seed)
-        every = chains(SERVO, "acceleration", guessed_noise([run], scales))
         found = offsets_of([run], SERVO)
         assert found[0] < 0.0, "without a law the damping passes for a sensor that is early"
-        assert not that_hold([run], SERVO, every, found, WORKERS).any()
+        assert not behind_a_law(run, found).any()
 
 
 def test_a_sensor_that_is_late_is_late_behind_a_law_as_well():
     run = served(0.7 * DT)
-    every = chains(SERVO, "acceleration", guessed_noise([run], np.array([1.0, 4.0])))
     found = offsets_of([run], SERVO)
     assert found[0] > 0.0 and found[1] == 0.0
-    np.testing.assert_array_equal(that_hold([run], SERVO, every, found, WORKERS), found)
+    np.testing.assert_array_equal(behind_a_law(run, found), found)

@@ -459,6 +459,8 @@ def test_no_flight_is_planned_that_is_worse_than_the_best_one_flown():
         cost(planner, committee, found) <= 0.05 < 1.0 < cost(planner, committee, replace(found, genes=poor))
     )
     assert np.abs(found.genes - TUNED).max() < np.abs(found.genes - poor).max()
+    # Where nothing that the twin promises is as good, what was flown flies again.
+    assert "again" in proposed(planner, committee, poor, best=TUNED, good=0.5 * quality).reason
 
 
 def test_where_the_tuned_gains_go_further_than_is_believed_some_on_the_way_to_them_fly():
