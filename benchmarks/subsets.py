@@ -4,7 +4,7 @@ import numpy as np
 from measure import Disagreement, Line, Section, check_agreement, interleaved, ratio
 
 from twinloop import _core
-from twinloop.streams import Unit
+from twinloop._ground.streams import Unit
 
 DT, STEPS, SIGNALS, LARGEST, COLDEST = 0.02, 400, 9, 16, 2.0
 PRICE = 12.0

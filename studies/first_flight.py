@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import twinloop as tl
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.law.flight import fly
 from twinloop.planning.excitation import chirps
-from twinloop.streams import Unit
 
 HELD_OUT = 12
 """Controllers that nobody flew."""

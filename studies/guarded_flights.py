@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import twinloop as tl
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.guard import Guard
 from twinloop.guard.guarded import led_by
 from twinloop_exam.systems import SUBJECTS, Subject, why_missing

@@ -2,6 +2,7 @@
 
 from twinloop import autopilots, contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
+from twinloop._experiment.replay import Replay
 from twinloop.campaign import Campaign, identify
 from twinloop.errors import (
     InvalidInput,
@@ -16,7 +17,6 @@ from twinloop.errors import (
 from twinloop.law.twin import Twin, load_twin
 from twinloop.logs import load
 from twinloop.remarks import Remark
-from twinloop.replay import Replay
 from twinloop.signals import Command, RigidBody, Signals, State
 from twinloop.systems import System
 from twinloop.test import Test

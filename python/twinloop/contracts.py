@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import TwinloopError
-from twinloop.limits import Limits
 from twinloop.signals import Signals
 from twinloop.systems import System
 from twinloop.test import Test

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, Integers, floats
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats, Integers, floats
 from twinloop.controllers import Family
 from twinloop.errors import engine_input
-from twinloop.hold_back import HoldBack
-from twinloop.limits import Limits
 from twinloop.signals import Signals
 
 

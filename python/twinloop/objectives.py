@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, Integers, floats, number
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats, Integers, floats, number
 from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
-from twinloop.limits import Limits
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory

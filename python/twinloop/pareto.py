@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, Integers, floats, whole
+from twinloop._ground.arrays import Floats, Integers, floats, whole
 from twinloop.errors import engine_input
 
 Archive = _core.Archive

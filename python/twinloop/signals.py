@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, number
+from twinloop._ground.arrays import Floats, number
 from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.records import Recorded
 

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, whole
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats, floats, whole
+from twinloop._ground.showing import Shown
 from twinloop.controllers.family import Controller, Family
 from twinloop.errors import InvalidInput
-from twinloop.hold_back import HoldBack
 from twinloop.records import Recorded
-from twinloop.replay import Replay
-from twinloop.showing import Shown
 from twinloop.signals import Signals
 
 

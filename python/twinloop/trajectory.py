@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinloop.arrays import Floats, floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats, floats
+from twinloop._ground.showing import Shown
 from twinloop.errors import InvalidInput, unknown
-from twinloop.limits import Limits
 from twinloop.records import Recorded
-from twinloop.showing import Shown
 from twinloop.signals import Signals
 
 ENDINGS = ("completed", "aborted", "diverged")

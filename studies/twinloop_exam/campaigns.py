@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from twinloop._ground.streams import Unit
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
-from twinloop.streams import Unit
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 from twinloop_exam import quality

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import click
 
-from twinloop.arrays import whole
+from twinloop._ground.arrays import whole
 from twinloop.campaign.remaining import duration
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.faces.files import write_text

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import unknown
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory

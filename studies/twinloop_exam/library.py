@@ -9,7 +9,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input, unknown
 from twinloop.signals import Signals
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 from twinloop_exam.quality import true_states

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.law.parsing import program_of
 from twinloop.signals import Signals

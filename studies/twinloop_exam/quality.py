@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import unknown
 from twinloop.signals import Signals
 from twinloop.test import Test, final_distance

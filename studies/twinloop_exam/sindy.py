@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 from twinloop_exam.integrals import regression

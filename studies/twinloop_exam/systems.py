@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import systems
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family, UnboundFamily
 from twinloop.errors import NotAvailable, unknown
 from twinloop.signals import Signals

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats
-from twinloop.streams import Unit
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop_exam import quality
 from twinloop_exam.campaigns import Measured, of_flight
 from twinloop_exam.kinds import Optimum, Tuner

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import metadata
 
-from twinloop.versions import WHAT_DECIDES, commit
+from twinloop._ground.versions import WHAT_DECIDES, commit
 
 
 def version() -> str:

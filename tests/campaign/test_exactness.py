@@ -6,11 +6,11 @@ import pytest
 import twinloop as tl
 from strategies import program_text
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.campaign.identify_and_plan.exactness import driven, may_be_inexactness, shows
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.law.actuation import Actuation
-from twinloop.limits import Limits
 
 SIGNALS = tl.Signals(
     [tl.State("x", "m", 1.0), tl.State("v", "m/s", 2.0, derivative_of="x")],

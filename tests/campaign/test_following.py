@@ -9,9 +9,9 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS
 from strategies import program_text
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.campaign.identify_and_plan.following import in_pieces
 from twinloop.campaign.identify_and_plan.sent import in_pulses, other_commands
-from twinloop.limits import Limits
 
 DT, STEPS = 0.02, 250
 SIGNALS = tl.Signals(

@@ -8,11 +8,11 @@ import pytest
 import twinloop as tl
 from strategies import program_text
 from twinloop import _core
+from twinloop._experiment.limits import Limits
+from twinloop._ground.streams import Unit
 from twinloop.campaign.identify_and_plan.following import following
 from twinloop.campaign.identify_and_plan.misses import misses_any, misses_of
 from twinloop.law.noise import CorrelatedDisturbance, Noise
-from twinloop.limits import Limits
-from twinloop.streams import Unit
 
 DT, STEPS, SENSOR, GUST, CALM = 0.02, 200, 1e-4, 0.5, 0.4
 SIGNALS = tl.Signals(

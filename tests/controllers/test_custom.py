@@ -9,9 +9,9 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS, TINY
 from oracles import same_bits
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.contracts import check_controller, check_system
 from twinloop.controllers import Custom
-from twinloop.limits import Limits
 
 threads = set()
 

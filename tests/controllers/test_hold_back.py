@@ -11,8 +11,8 @@ from conftest import PENDULUM_GAINS, pendulum_step
 from lives import CONTROLLER, SIGNALS, made
 from oracles import same_bits
 from twinloop import _core
+from twinloop._experiment.hold_back import BEGINS, ENDS, HoldBack
 from twinloop.flights import candidates, qualities, quality
-from twinloop.hold_back import BEGINS, ENDS, HoldBack
 from twinloop.law.flight import fly
 from twinloop.objectives import closed_loop, selected_tests
 

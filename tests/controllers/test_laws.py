@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import Pid, same_bits
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.contracts import check_controller
 from twinloop.controllers import PID, Cascade, Mixer, StateFeedback
 from twinloop.faces.result import summary
 from twinloop.faces.text import render
-from twinloop.limits import Limits
 
 ANGLES = ("roll", "pitch", "yaw")
 SYSTEM = tl.systems.Quadrotor()

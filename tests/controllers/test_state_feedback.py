@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import same_bits
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.contracts import check_controller, check_system
 from twinloop.controllers import Mixer, StateFeedback
-from twinloop.limits import Limits
 
 
 class Feedback:

@@ -12,13 +12,13 @@ import twinloop as tl
 from conftest import TINY, pendulum_step
 from oracles import rk4, same_bits
 from twinloop import _core, flights
+from twinloop._experiment.limits import Limits
 from twinloop.campaign.presets import options_of
 from twinloop.controllers import PID, Cascade, StateFeedback
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.terms.libraries import LIBRARIES, rungs
 from twinloop.identification.terms.pool import Pool
-from twinloop.limits import Limits
 from twinloop.objectives import closed_loop, frozen_error, open_loop, selected_tests
 from twinloop.test import final_distance
 from twinloop.trajectory import check_recorded, continued

@@ -9,10 +9,10 @@ import twinloop as tl
 from conftest import PENDULUM_GAINS, TINY
 from oracles import same_bits
 from twinloop import _core, flights
+from twinloop._experiment.limits import Limits
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input
 from twinloop.law.flight import drawn_runs, fly
-from twinloop.limits import Limits
 from twinloop.objectives import closed_loop, selected_tests
 from twinloop.planning.quality import quality_of
 from twinloop.test import final_distance

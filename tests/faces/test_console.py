@@ -5,11 +5,11 @@ import io
 import pytest
 from rich.console import Console
 
+from twinloop._ground.steps import STEPS
 from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import options_of
 from twinloop.campaign.remaining import USUAL, StepEstimate
 from twinloop.faces.console import Watch
-from twinloop.steps import STEPS
 
 
 def progress(phase, told, tests=(), errors=()):

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop.elementary import cos, exp, log, power, sin, tanh
+from twinloop._ground.elementary import cos, exp, log, power, sin, tanh
 
 
 @given(st.lists(st.floats(1e-300, 1e300), min_size=1, max_size=20))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop import _core, streams
-from twinloop.streams import Purpose, Unit
+from twinloop import _core
+from twinloop._ground import streams
+from twinloop._ground.streams import Purpose, Unit
 from twinloop.systems.sensors import run_stream
 from twinloop_exam.campaigns import random_gains
 from twinloop_exam.systems import Draw, subject

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from twinloop import versions
+from twinloop._ground import versions
 from twinloop.campaign.keeping import as_typed
 from twinloop.faces.report.source import source
 
@@ -28,7 +28,7 @@ def test_a_command_is_what_a_person_would_type(words, typed):
 
 
 def test_the_commit_is_that_of_the_checkout_the_package_stands_in():
-    top = Path(versions.__file__).parents[2]
+    top = Path(versions.__file__).parents[3]
     if not (top / ".git").exists():
         pytest.skip("no checkout")
     asked = ["git", "-C", str(top), "rev-parse", "HEAD"]
@@ -38,7 +38,7 @@ def test_the_commit_is_that_of_the_checkout_the_package_stands_in():
 
 
 def test_a_package_that_is_no_checkout_has_no_commit(tmp_path, monkeypatch):
-    monkeypatch.setattr(versions, "__file__", str(tmp_path / "lib" / "twinloop" / "versions.py"))
+    monkeypatch.setattr(versions, "__file__", str(tmp_path / "lib" / "twinloop" / "_ground" / "versions.py"))
     versions.commit.cache_clear()
     assert "commit" not in versions.versions() and "twinloop" in versions.versions()
     versions.commit.cache_clear()

@@ -13,10 +13,10 @@ from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, pend
 from lives import THOROUGH
 from oracles import same_bits
 from twinloop import _core
+from twinloop._experiment.hold_back import HoldBack
 from twinloop.guard import Guard, Guarded, band
 from twinloop.guard.band import DRAWS, BandWatch
 from twinloop.guard.guarded import led_by
-from twinloop.hold_back import HoldBack
 
 ANGLE, RATE = PENDULUM_SIGNALS.states
 SIGNALS = dataclasses.replace(

@@ -8,6 +8,7 @@ import pytest
 import twinloop as tl
 from small_plants import lagging_motor
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import LAGGING
@@ -16,7 +17,6 @@ from twinloop.identification.proposals.at_once import NOTHING, at_once
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.starts import ANEW, begun
 from twinloop.law.actuation import Actuation, Actuator
-from twinloop.streams import Unit
 
 DT = 0.05
 SIGNALS = tl.Signals([tl.State("speed", "m/s", 2.0)], [tl.Command("u", "1", (-1.0, 1.0), scale=1.0)], DT)

@@ -7,13 +7,13 @@ import pytest
 
 from small_plants import pendulum_like, swung
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.identify import PROPOSALS, Found, decided
 from twinloop.identification.proposals.calm import calm
 from twinloop.identification.search.selection import posed
 from twinloop.identification.starts import starts
-from twinloop.streams import Unit
 
 WITHOUT = tuple(proposal for proposal in PROPOSALS if proposal is not calm)
 QUICK = {"moves": 2000, "starts": 2, "generations": 2, "population": 30, "committee_size": 4}

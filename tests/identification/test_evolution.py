@@ -5,14 +5,14 @@ import pytest
 
 import twinloop as tl
 from twinloop import _core
-from twinloop.elementary import log
+from twinloop._ground.elementary import log
+from twinloop._ground.streams import Unit
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.search import selection
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.evolution import _drawn, _whole
 from twinloop.identification.terms.pool import Pool
-from twinloop.streams import Unit
 
 SIGNALS = tl.Signals(
     states=[tl.State("angle", "rad", 1.0), tl.State("rate", "rad/s", 3.0, derivative_of="angle")],

@@ -8,6 +8,7 @@ import twinloop as tl
 from late_sensors import BODY, PENDULUM, read, swinging, turning
 from late_sensors import DT as LATE_DT
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.forms import _described, brief_look, candidates
@@ -15,7 +16,6 @@ from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.euler_steps import euler_form
 from twinloop.law.forms import FORMS
-from twinloop.streams import Unit
 
 WORKERS = _core.Workers(1)
 FAST = {"moves": 2000, "starts": 2, "generations": 0, "lags": False, "committee_size": 2, "tuning_steps": 8}

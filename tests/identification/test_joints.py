@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import twinloop as tl
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.identification.records import Run, guessed_noise, stages
 from twinloop.identification.search.joints import with_joints
 from twinloop.identification.search.problem import Problem
@@ -19,7 +20,6 @@ from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import Priors
 from twinloop.law.actuation import Actuation
-from twinloop.streams import Unit
 
 WORKERS = _core.Workers(1)
 WEIGHT = st.floats(-0.2, 0.2)

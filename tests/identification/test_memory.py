@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from twinloop import _core, objectives
-from twinloop.limits import Limits
+from twinloop._experiment.limits import Limits
 
 DT, SCALE = 0.1, 2.0
 LAW = _core.Program.parse(

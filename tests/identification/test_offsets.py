@@ -8,6 +8,7 @@ import twinloop as tl
 from late_sensors import BODY, DT, PENDULUM, flown, loop_of, read, swinging, turning
 from oracles import same_bits
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.identify import identify_runs
@@ -16,7 +17,6 @@ from twinloop.identification.sensors.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.sensors.offsets import late_groups, moved, search_offsets
 from twinloop.identification.starts import ANEW, begun
-from twinloop.streams import Unit
 
 WORKERS = _core.Workers()
 FAST = {"moves": 2000, "starts": 2, "generations": 0, "lags": False, "committee_size": 3, "tuning_steps": 8}

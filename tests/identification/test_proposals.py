@@ -8,6 +8,7 @@ import pytest
 from sameness import copied, same, through_json
 from small_plants import fans, gravity, pendulum_like, swung
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
@@ -26,7 +27,6 @@ from twinloop.identification.proposals.second_look import second_look
 from twinloop.identification.proposals.terms import terms
 from twinloop.identification.search.selection import climbed, from_both_sides
 from twinloop.identification.starts import RENEWED, starts
-from twinloop.streams import Unit
 
 WORKERS = _core.Workers(1)
 QUICK = {"moves": 2000, "starts": 2, "generations": 2, "population": 30, "committee_size": 4, "passes": 3}

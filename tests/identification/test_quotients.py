@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 import twinloop as tl
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise, stages
 from twinloop.identification.search.implicit import Quotient
@@ -26,7 +27,6 @@ from twinloop.identification.terms.denominators import denominators, over, quoti
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import Priors
 from twinloop.law.actuation import Actuation
-from twinloop.streams import Unit
 
 WORKERS = _core.Workers(1)
 STEPS = 150

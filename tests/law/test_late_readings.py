@@ -9,10 +9,10 @@ from law_twins import SWINGING
 from oracles import same_bits
 from strategies import program_text
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.flights import candidates, disagreements, qualities, quality
 from twinloop.law.law import Law
 from twinloop.law.linear.margins import closed_loops, margins_of
-from twinloop.limits import Limits
 
 TURNING = [
     "r9 = r6 * 3.0", "r9 = r9 - r3",

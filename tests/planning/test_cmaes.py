@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from twinloop import _core
-from twinloop.streams import Unit
+from twinloop._ground.streams import Unit
 
 cmaes = pytest.importorskip("cmaes")
 

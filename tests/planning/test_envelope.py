@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop.envelope import outside, readings_leave
+from twinloop._experiment.envelope import outside, readings_leave
 from twinloop.planning.judging import risk
 
 

@@ -11,11 +11,12 @@ import twinloop as tl
 from oracles import same_bits
 from strategies import program_text
 from twinloop import _core
+from twinloop._experiment.limits import Limits
+from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.presets import options_of
 from twinloop.flights import candidates, qualities
 from twinloop.law.actuation import delayed
-from twinloop.limits import Limits
 from twinloop.planning.candidates import candidates as drawn
 from twinloop.planning.excitation import SHARE, answered, binary, chirps, first_chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
@@ -23,7 +24,6 @@ from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Flown
 from twinloop.planning.quality import KINDS, quality_of
-from twinloop.streams import Unit
 
 STEPS = 40
 TASK = Task(np.array([0.5, 0.0]), np.array([0.0, 0.0]), STEPS)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinloop._ground.texts import one_line
 from twinloop.autopilots.parameters import Parameter, Value, translated
 from twinloop.errors import InvalidInput, unknown
-from twinloop.texts import one_line
 
 Set = dict[str, tuple[Value, bool]]
 """Values by the names of parameters, with whether each is a whole number."""

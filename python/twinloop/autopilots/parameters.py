@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.errors import InvalidInput
 from twinloop.signals import Bounds, ordered
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats, number
+from twinloop._ground.arrays import Floats, number
+from twinloop._ground.elementary import cos, exp, log, sin
 from twinloop.autopilots.files import EVERY_NODE, FORMATS, Set
-from twinloop.elementary import cos, exp, log, sin
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.signals import Signals
 from twinloop.test import Test

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Cause, Experiment, Lesson
 from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.identification.sensors.noise import exact
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
-from twinloop.streams import Unit
 from twinloop.test import Test
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, whole
+from twinloop._ground.arrays import Floats, floats, whole
+from twinloop._ground.showing import Shown
 from twinloop.campaign import standing
 from twinloop.campaign.assessment import Advice, advice, controller_to_fly, rmse
 from twinloop.campaign.certificate import Certificate, certificate
@@ -39,7 +40,6 @@ from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
 from twinloop.objectives import closed_loop
 from twinloop.remarks import warn
-from twinloop.showing import Shown
 from twinloop.signals import Signals
 from twinloop.systems import System
 from twinloop.test import Test

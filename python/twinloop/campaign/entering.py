@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from twinloop import _core
+from twinloop._experiment.replay import Replay
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.objectives import frozen_error
-from twinloop.replay import Replay
 from twinloop.test import Test, final_distance
 from twinloop.trajectory import Trajectory, check_recorded, continued
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from twinloop.arrays import share, whole
+from twinloop._ground.arrays import share, whole
 from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
 from twinloop.signals import Signals
 from twinloop.systems import System

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from twinloop import _core
-from twinloop.arrays import Floats
-from twinloop.envelope import readings_leave
+from twinloop._experiment.envelope import readings_leave
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
-from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -68,7 +68,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     @property
     def left_envelope(self) -> bool:
-        """Whether two readings in a row were outside: see `twinloop.envelope`."""
+        """Whether two readings in a row were outside: see `twinloop._experiment.envelope`."""
         return readings_leave(self._usages())
 
     def _usages(self) -> Floats:

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from twinloop import _core
-from twinloop.arrays import whole
+from twinloop._ground.arrays import whole
+from twinloop._ground.versions import versions
 from twinloop.campaign.history import Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
@@ -20,7 +21,6 @@ from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput, StoreFailure, unknown
 from twinloop.records import Record, Recorded
 from twinloop.store import Keeper, Store, Stored, begun, found, listed, opened, shown_name
-from twinloop.versions import versions
 
 Answer = TypeVar("Answer")
 

@@ -6,12 +6,12 @@ import uuid
 from collections.abc import Mapping
 from typing import Any
 
-from twinloop.arrays import Floats
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.entering import Judge, flown_test, partial_run, replay_of_record, with_run
 from twinloop.campaign.history import Experiment, Failure, Planned, TestLoop
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
-from twinloop.hold_back import HoldBack
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory, check_recorded

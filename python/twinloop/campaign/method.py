@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Iteration, Lesson
 from twinloop.campaign.logbook import Logbook
-from twinloop.hold_back import HoldBack
 from twinloop.law.twin import Twin
 from twinloop.records import Record
 from twinloop.test import Test

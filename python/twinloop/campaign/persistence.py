@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from twinloop import _core
-from twinloop.arrays import whole
+from twinloop._ground.arrays import whole
 from twinloop.campaign.coevolution.method import Coevolution
 from twinloop.campaign.history import Progress
 from twinloop.campaign.identify_and_plan.method import IdentifyAndPlan

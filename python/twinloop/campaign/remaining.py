@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
+from twinloop._ground.steps import STEPS
 from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import AnyOptions, Options
-from twinloop.steps import STEPS
 
 USUAL: dict[str, tuple[str, float]] = {
     "form": ("deciding what outputs mean", 2.0),

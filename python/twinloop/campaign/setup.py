@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, number, whole
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats, floats, number, whole
 from twinloop.campaign.coevolution.search import grammar, settings_of_tests, variation
 from twinloop.campaign.presets import AnyOptions, DefaultOptions, Options, options_of
 from twinloop.controllers import Family, UnboundFamily
@@ -22,7 +23,6 @@ from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.identification.terms.formulas import parsed_term
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import priors_of
-from twinloop.limits import Limits
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS, Quality, quality_of, weights_of
 from twinloop.records import Record, Recorded, checked_record, plain, read

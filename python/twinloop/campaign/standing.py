@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment, Iteration, Lesson
 from twinloop.campaign.logbook import Logbook
 from twinloop.test import Test

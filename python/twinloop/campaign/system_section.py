@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.errors import InvalidInput, unknown
 
 KEYS = ("use", "timeout", "arguments")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.controllers.mixer import Mixer
 from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import Signals

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from twinloop import _core
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.controllers.axes import (
     TERMS,
     asked_units,

@@ -9,7 +9,7 @@ from typing import Protocol
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers.family import Family
 from twinloop.controllers.gains import GainBounds, bounds_by_name, gain_of
 from twinloop.errors import InvalidInput, engine_input

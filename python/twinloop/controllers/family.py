@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, number
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._ground.arrays import Floats, floats, number
 from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.errors import InvalidInput, engine_input, unknown
-from twinloop.hold_back import HoldBack
 from twinloop.signals import Signals
 
 AT_A_BOUND = 0.01

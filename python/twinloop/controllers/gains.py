@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import ordered
 

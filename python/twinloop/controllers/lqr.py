@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats, floats, number
+from twinloop._ground.arrays import Floats, floats, number
 from twinloop.controllers.family import Family
 from twinloop.controllers.riccati import product, solve_linear, solve_riccati
 from twinloop.controllers.state_feedback import FeedbackFamily

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from twinloop.arrays import Floats, floats, number
+from twinloop._ground.arrays import Floats, floats, number
 from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
 

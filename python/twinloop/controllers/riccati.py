@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 DOUBLINGS = 24
 """Periods are looked ahead by powers of two; what has not settled after 2^24 of them will not settle."""

@@ -13,7 +13,7 @@ import click
 from click.core import ParameterSource
 
 from twinloop import __version__
-from twinloop.arrays import share
+from twinloop._ground.arrays import share
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file
 from twinloop.campaign.presets import PRESETS, options_of, parsed

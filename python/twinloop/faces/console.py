@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from twinloop._ground.steps import STEPS
 from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import AnyOptions
 from twinloop.campaign.remaining import USUAL, duration, estimate
-from twinloop.steps import STEPS
 
 LINE_SECONDS = 5.0
 """Between two plain lines."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from twinloop._experiment.limits import Limits
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.campaign.presets import options_of
@@ -19,7 +20,6 @@ from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.text import table
 from twinloop.law.twin import Twin
-from twinloop.limits import Limits
 from twinloop.logs import load
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory, check_recorded

@@ -8,15 +8,14 @@ from pathlib import Path
 import click
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.campaign_file import read_fields, read_signals
 from twinloop.campaign.examination.log_check import LogCheck, check_log
 from twinloop.errors import InvalidInput
 from twinloop.faces.files import check_writable
 from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.text import table
-from twinloop.logs import TIME, read_log, write_columns
-from twinloop.ulog import Window
+from twinloop.logs import TIME, Window, read_log, write_columns
 
 
 @click.command()

@@ -7,8 +7,8 @@ import sys
 import time
 from datetime import datetime, timezone
 
+from twinloop._ground.versions import versions
 from twinloop.campaign.keeping import as_typed
-from twinloop.versions import versions
 
 
 class Stopwatch:

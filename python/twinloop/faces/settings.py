@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.autopilots.sweep import AXES
 from twinloop.campaign import Campaign
 from twinloop.errors import NotAvailable

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.errors import InvalidInput, NoAnswer, TooRisky
 from twinloop.faces.console import Watch

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats
 from twinloop.law.twin import Twin
 from twinloop.law.uncertainty import NINE_OF_TEN
-from twinloop.replay import Replay
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, at_least_zero, floats, number
+from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.guard.band import BandWatch

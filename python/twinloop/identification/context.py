@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
+from twinloop._ground.steps import Watch, unwatched
+from twinloop._ground.streams import Unit
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.pool import Pool
-from twinloop.limits import Limits
 from twinloop.signals import Signals
-from twinloop.steps import Watch, unwatched
-from twinloop.streams import Unit
 
 SEARCHED_ANEW = 4
 """Runs up to which form, lags, delays and offsets are searched anew with each run."""

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from twinloop import _core
-from twinloop.elementary import log
+from twinloop._ground.elementary import log
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import STEPPING
 from twinloop.identification.hypothesis import Hypothesis

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.identification.evidence import Evidence, price
 from twinloop.identification.records import Run
 from twinloop.identification.search.structure import Sum, total
@@ -17,7 +18,6 @@ from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 from twinloop.records import Recorded
-from twinloop.streams import Unit
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain

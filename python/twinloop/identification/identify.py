@@ -12,7 +12,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.steps import Watch, unwatched
+from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
 from twinloop.identification.fit.committee import committee
@@ -36,8 +38,6 @@ from twinloop.identification.starts import starts
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
-from twinloop.steps import Watch, unwatched
-from twinloop.streams import Unit
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 POINTS = (4, 6, 8)
 """Neighbours that a polynomial may go through."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinloop.arrays import Floats
-from twinloop.elementary import log
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log
 from twinloop.identification.context import Context
 from twinloop.identification.forms import first_form
 from twinloop.identification.records import Run, guessed_noise

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.identification.interpolation import FALLS, FEWEST, integration_error, middles, points, segments
 from twinloop.law.actuation import Actuation
 from twinloop.records import Recorded

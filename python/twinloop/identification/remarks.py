@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.identification.records import Run
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 DEGREES = (2, 4, 6)
 WIDTHS = (5, 7, 9, 13, 19, 27, 39)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from twinloop.elementary import cos, sin, tanh
+from twinloop._ground.elementary import cos, sin, tanh
 from twinloop.law.expressions import (
     CONSTANT,
     INPUT,

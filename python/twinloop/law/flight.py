@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, engine_input
-from twinloop.limits import Limits
-from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 

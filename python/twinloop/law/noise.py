@@ -9,8 +9,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
-from twinloop.elementary import exp
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import exp
 from twinloop.records import Record, Recorded
 
 

@@ -13,7 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats, number
+from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats, floats, number
+from twinloop._ground.showing import Shown
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
 from twinloop.law.equations import equations
@@ -26,11 +29,8 @@ from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import Noise
 from twinloop.law.uncertainty import DRAWS, NINE_OF_TEN, committee_runs, spread_of
-from twinloop.limits import Limits
 from twinloop.records import Recorded, checked_record, from_text, read
 from twinloop.remarks import Remark
-from twinloop.replay import Replay
-from twinloop.showing import Shown
 from twinloop.signals import Signals
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory, check_recorded, continued

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
-from twinloop.limits import Limits
-from twinloop.replay import Replay
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 from twinloop.test import Test
 
 DRAWS = 12

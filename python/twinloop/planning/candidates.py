@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.planning.excitation import chirps
 from twinloop.planning.judging import Ends, Judge
 from twinloop.planning.proposal import Flown

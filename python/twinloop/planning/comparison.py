@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from twinloop.arrays import Floats
-from twinloop.envelope import outside
+from twinloop._experiment.envelope import outside
+from twinloop._ground.arrays import Floats
 from twinloop.flights import disagreements
 from twinloop.planning.candidates import Candidates
 from twinloop.planning.gains import nearby

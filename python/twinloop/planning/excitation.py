@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import sin
 from twinloop.controllers import Family
-from twinloop.elementary import sin
 from twinloop.signals import Signals
 
 SLOWEST, FASTEST = (0.5, 2.0), (4.0, 10.0)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Purpose, Unit
 from twinloop.controllers import Family
 from twinloop.planning.scored import Score
-from twinloop.streams import Purpose, Unit
 
 OFFSPRING = 32
 """Genes of a generation."""

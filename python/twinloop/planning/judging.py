@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.envelope import outside
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.controllers import Family
-from twinloop.envelope import outside
 from twinloop.flights import candidates, qualities
-from twinloop.hold_back import HoldBack
-from twinloop.limits import Limits
 from twinloop.planning.quality import Quality
-from twinloop.streams import Unit
 
 Ends = tuple[Floats, Floats]
 """Initial states and target states (K, n_x)."""

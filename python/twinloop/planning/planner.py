@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
+from twinloop._ground.steps import Watch, unwatched
+from twinloop._ground.streams import Purpose
 from twinloop.controllers import Family
-from twinloop.hold_back import HoldBack
-from twinloop.limits import Limits
 from twinloop.planning.candidates import candidates
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, first_chirps
@@ -21,8 +23,6 @@ from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.quality import Quality
 from twinloop.planning.scored import Scored
 from twinloop.planning.settings import PlanningOptions
-from twinloop.steps import Watch, unwatched
-from twinloop.streams import Purpose
 
 GOALS = ("both", "model", "control")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)

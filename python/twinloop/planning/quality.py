@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.flights import quality as engine_quality
 from twinloop.signals import Signals

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from twinloop.elementary import log
+from twinloop._ground.elementary import log
 from twinloop.planning.settings import PlanningOptions
 from twinloop.signals import Signals
 

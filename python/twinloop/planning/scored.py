@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 Score = Callable[[Floats], Floats]
 """Of genes (K, size) the share of their flights that diverges and a score (K, 2), to be minimised in this order."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.planning.settings import PlanningOptions
 
 

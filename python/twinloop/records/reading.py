@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, unknown
 
 MOST_ITEMS = 10_000_000

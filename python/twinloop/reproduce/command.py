@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from twinloop.arrays import whole
+from twinloop._ground.arrays import whole
 from twinloop.campaign import available_threads
 from twinloop.errors import InvalidInput, unknown
 from twinloop.faces.files import check_picture, check_writable, write_text

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from twinloop.arrays import whole
+from twinloop._ground.arrays import whole
 from twinloop.campaign.presets import PRESETS, parsed
 from twinloop.errors import InvalidInput, unknown
 from twinloop.systems import BUILT_IN

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats, floats, number
+from twinloop._ground.arrays import Floats, floats, number
 from twinloop.errors import InvalidInput, NotAvailable, SystemFailure, unknown
 from twinloop.signals import Signals
 from twinloop.systems.stepped import Deviations, Episode, Stepped

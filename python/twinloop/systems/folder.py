@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.errors import InvalidInput, NoAnswer, TwinloopError
 from twinloop.logs import load
 from twinloop.signals import Signals

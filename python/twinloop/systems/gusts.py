@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from twinloop.arrays import Floats
-from twinloop.elementary import exp
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import exp
 
 CORRELATION_TIME = 0.2
 """Time after which a gust is forgotten to a share of 1/e, s."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats, floats
+from twinloop._ground.arrays import Floats, floats
 from twinloop.errors import InvalidInput, NotAvailable, SystemFailure
 from twinloop.signals import Signals
 from twinloop.systems.environments import KNOWN

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
-from twinloop.arrays import number
+from twinloop._ground.arrays import number
 from twinloop.errors import NoAnswer
 from twinloop.systems.base import System
 from twinloop.test import Test

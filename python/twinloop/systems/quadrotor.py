@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats, at_least_zero, floats, number, whole
+from twinloop._ground.arrays import Floats, at_least_zero, floats, number, whole
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import engine_input, unknown
 from twinloop.law.flight import fly

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import TypeVar
 
-from twinloop.arrays import whole
+from twinloop._ground.arrays import whole
 from twinloop.records import Recorded, checked_record
 
 Built = TypeVar("Built", bound="Repeatable")

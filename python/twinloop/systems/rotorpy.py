@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats, at_least_zero, whole
+from twinloop._ground.arrays import Floats, at_least_zero, whole
 from twinloop.controllers import PID, Mixer
 from twinloop.errors import NotAvailable, unknown
 from twinloop.law.flight import fly

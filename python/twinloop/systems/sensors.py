@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 RATE_NOISE = 5.0
 """Noise of a rate over that of an angle, 1/s."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput
 from twinloop.signals import Signals
 from twinloop.systems.stepped import Deviations, Episode, Step, Stepped

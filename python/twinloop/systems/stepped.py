@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats, at_least_zero, whole
+from twinloop._ground.arrays import Floats, at_least_zero, whole
 from twinloop.errors import InvalidInput, SystemFailure, unknown
 from twinloop.law.flight import fly
 from twinloop.signals import Signals

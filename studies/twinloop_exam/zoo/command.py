@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from twinloop.arrays import whole
+from twinloop._ground.arrays import whole
 from twinloop.errors import InvalidInput, unknown
 from twinloop.sweep.progress import JobBar
 from twinloop.sweep.workers import HERE, finished, processes

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import PID, StateFeedback
 from twinloop.signals import Command, Signals, State
 from twinloop.systems import Gymnasium

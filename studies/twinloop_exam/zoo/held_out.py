@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
-from twinloop.streams import Unit
 from twinloop.test import Test
 from twinloop_exam.zoo.plant import Plant, true_states
 

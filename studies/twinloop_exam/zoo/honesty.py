@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import disturbances
 from twinloop.campaign.history import Lesson

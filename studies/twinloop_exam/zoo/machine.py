@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.signals import Signals
 from twinloop.systems.stepped import Deviations, Stepped
 from twinloop.test import Test

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.errors import NotAvailable
-from twinloop.streams import Unit
 from twinloop_exam.zoo.plant import Plant
 
 FILE = Path(__file__).with_name("optima.json")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family, Mixer, UnboundFamily
 from twinloop.errors import NotAvailable
 from twinloop.planning.quality import Quality, quality_of, weights_of

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.coevolution.learning import Learner, Learning
 from twinloop.campaign.coevolution.search import chunks, committee, start_tests
@@ -19,7 +20,6 @@ from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
 from twinloop.campaign.twin_errors import errors_of
-from twinloop.hold_back import HoldBack
 from twinloop.law.twin import Twin
 from twinloop.objectives import final_distances
 from twinloop.records import Record

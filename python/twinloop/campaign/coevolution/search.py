@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.campaign.presets import Options
 from twinloop.controllers import Family
 from twinloop.errors import engine_input
-from twinloop.limits import Limits
 from twinloop.signals import Signals
 
 CHUNK_SECONDS = 0.3

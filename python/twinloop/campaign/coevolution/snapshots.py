@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop import _core
-from twinloop.arrays import Floats, floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats, floats
 from twinloop.campaign.coevolution.search import committee, grammar, settings_of_tests, variation
 from twinloop.campaign.presets import Options
 from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
-from twinloop.limits import Limits
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 NORMAL_99 = 2.5758293035489004
 """Standard deviations on either side of 0 between which 99 of 100 normal numbers lie."""

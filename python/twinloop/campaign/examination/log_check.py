@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.identify_and_plan.diagnostics import against_derivatives
 from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.errors import InvalidInput
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.limits import Limits
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 from twinloop.trajectory import JITTER, Trajectory, check_recorded

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.setup import Setup
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin

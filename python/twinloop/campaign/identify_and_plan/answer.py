@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.causes import causes_of
 from twinloop.campaign.identify_and_plan.following import Following, following, in_pieces
@@ -20,7 +21,6 @@ from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
-from twinloop.streams import Unit
 
 FEWEST = 4
 """Members of a committee that are kept in any case."""

@@ -9,13 +9,13 @@ from math import isfinite, sqrt
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
 from twinloop.law.uncertainty import NINE_OF_TEN
-from twinloop.limits import Limits
-from twinloop.replay import Replay
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 

@@ -19,7 +19,8 @@ from itertools import combinations
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.exactness import driven, may_be_inexactness, shows
 from twinloop.campaign.identify_and_plan.following import cut, free_run, start_of
@@ -29,7 +30,6 @@ from twinloop.errors import engine_input
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.offsets import moved
-from twinloop.limits import Limits
 from twinloop.signals import Signals
 
 Predictions = Sequence[tuple[Floats, Floats, Floats]]

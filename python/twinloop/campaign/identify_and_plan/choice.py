@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.envelope import outside
+from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.logbook import Logbook
-from twinloop.envelope import outside
 from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judged, expected, risk

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
 from twinloop.identification.records import Run, stages
 from twinloop.identification.sensors.chains import Chain
 from twinloop.law.actuation import Actuation
-from twinloop.limits import Limits
 from twinloop.signals import Signals
 
 SEEN = 2.0

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.errors import engine_input
 from twinloop.law.flight import drawn_runs
-from twinloop.limits import Limits
-from twinloop.replay import Replay
 from twinloop.test import Test
 
 PIECES = 5

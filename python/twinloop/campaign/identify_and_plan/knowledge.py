@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.identify_and_plan.calibration import (
     OF_PARTS,

@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.steps import Watch
 from twinloop.campaign.history import Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
@@ -25,7 +26,6 @@ from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.objectives import closed_loop, normalised_error
 from twinloop.remarks import Remark, note, serious
-from twinloop.steps import Watch
 
 PLAIN = 1_000_000
 """Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 SHARE = 0.3
 """Correlation between flights from which that is more than a trace."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Lesson
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay

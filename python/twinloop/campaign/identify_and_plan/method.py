@@ -7,7 +7,10 @@ from dataclasses import replace
 from functools import partial
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.hold_back import HoldBack
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log
+from twinloop._ground.steps import STEPS, Step
 from twinloop.campaign import standing
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.history import Lesson, Planned, Progress
@@ -24,9 +27,7 @@ from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
 from twinloop.campaign.twin_errors import errors_of
-from twinloop.elementary import log
 from twinloop.errors import NotAvailable
-from twinloop.hold_back import HoldBack
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
 from twinloop.law.twin import Twin
@@ -35,7 +36,6 @@ from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Flown, Proposal
 from twinloop.planning.scored import Scored
 from twinloop.records import Record
-from twinloop.steps import STEPS, Step
 from twinloop.test import Test
 
 

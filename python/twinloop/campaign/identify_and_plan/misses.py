@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._experiment.limits import Limits
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.following import Following, cut, missed_by, squares, start_of
 from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
-from twinloop.limits import Limits
-from twinloop.streams import Unit
 
 DRAWS = 8
 """Of noise and disturbances, by which it is said how far these take a flight."""

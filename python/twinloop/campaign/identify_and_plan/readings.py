@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory

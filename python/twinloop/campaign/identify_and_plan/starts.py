@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.choice import UNKNOWN
 from twinloop.campaign.identify_and_plan.memory import Memory

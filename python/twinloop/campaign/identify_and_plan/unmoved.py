@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified

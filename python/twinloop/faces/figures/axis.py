@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 ROOM = 0.06
 """Share of an axis that is left free on either side of what is drawn."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 ROLES = ("measured", "twin", "target", "limit", "old", "worst", "a", "b", "c", "d", "e", "f")
 """What a mark stands for; each has its own colour and dash, the same in all figures."""

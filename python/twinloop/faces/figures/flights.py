@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Band, Figure, Level, Line, Mark, Panel
 from twinloop.faces.figures.units import labelled, said, shown_unit, words

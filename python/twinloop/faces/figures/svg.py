@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.faces.figures.axis import Axis, axis
 from twinloop.faces.figures.figure import Band, Bars, Cells, Figure, Level, Line, Mark, Panel, Spans, numbers
 from twinloop.faces.figures.style import STYLE, tint

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
-from twinloop.elementary import exp
+from twinloop._ground.elementary import exp
 from twinloop.identification.context import Context
 from twinloop.identification.fit.models import model_of
 from twinloop.identification.fit.tuning import tune

@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from twinloop.arrays import Floats
-from twinloop.elementary import log
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log
+from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
 from twinloop.identification.hypothesis import Hypothesis
@@ -24,7 +25,6 @@ from twinloop.identification.terms.directions import Direction, directions, toge
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import HiddenState, alike_commands
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 
 TIMES = (0.25, 1.0, 4.0)
 """Times that are tried, in lengths of the longest run; the one in the middle first."""

@@ -9,7 +9,7 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
 from twinloop.identification.hypothesis import Hypothesis

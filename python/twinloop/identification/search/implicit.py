@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.streams import Unit
 from twinloop.errors import engine_input
 from twinloop.identification.search.problem import Columns, Problem
 from twinloop.identification.search.structure import Sum, prices
@@ -25,7 +26,6 @@ from twinloop.identification.slopes import slopes
 from twinloop.identification.terms.denominators import Denominator, above, below, power_of, quotient
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 
 TRIED = 3
 """Denominators of each chain that are refined, of all those that searches have come across."""

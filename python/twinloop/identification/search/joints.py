@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
-from twinloop.elementary import log
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log
+from twinloop._ground.streams import Unit
 from twinloop.identification.search.description import shorter
 from twinloop.identification.search.implicit import (
     NEAREST,
@@ -32,7 +33,6 @@ from twinloop.identification.search.structure import Sum, prices, search, total
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.libraries import angles
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 
 FIRST = 2000
 """Number of the first unit of work within a search's own, of which others have lower ones."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.identification.search.implicit import NEAREST, Quotient, matters
 from twinloop.identification.search.problem import Columns, Problem
 from twinloop.identification.search.structure import prices

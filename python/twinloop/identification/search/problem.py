@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.records import Run, Stages
 from twinloop.identification.sensors.chains import Chain

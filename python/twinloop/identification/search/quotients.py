@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from twinloop.elementary import log
+from twinloop._ground.elementary import log
+from twinloop._ground.streams import Unit
 from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.implicit import Quotient, bounded, implicit, matters
 from twinloop.identification.search.newton import refined
@@ -28,7 +29,6 @@ from twinloop.identification.terms.denominators import (
     quotient,
 )
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 
 FIRST = 1000
 """Number of the first unit of work within a search's own, which has lower ones for itself."""

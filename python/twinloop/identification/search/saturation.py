@@ -11,14 +11,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twinloop.elementary import power
+from twinloop._ground.elementary import power
+from twinloop._ground.streams import Unit
 from twinloop.identification.search.implicit import NOISE_ROUNDS, Quotient, explained, walks_among, whitened
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, prices
 from twinloop.identification.terms.denominators import Denominator, plain, power_of
 from twinloop.identification.terms.libraries import angles, coordinates, rates
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 
 EXPONENTS = (1, 2, 4)
 PLACES = (0.25, 0.5, 0.75)

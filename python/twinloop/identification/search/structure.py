@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
-from twinloop.elementary import log, power
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log, power
+from twinloop._ground.streams import Purpose, Unit
 from twinloop.errors import engine_input
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.subsets import Judged, all_judged
@@ -19,7 +20,6 @@ from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
 from twinloop.identification.terms.pool import Pool
 from twinloop.records import Recorded
-from twinloop.streams import Purpose, Unit
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.identification.terms.bounds import Limits, bounded_solution, excludes_zero
 
 Judged = tuple[tuple[int, ...], float, Floats]

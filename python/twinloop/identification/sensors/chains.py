@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.noise import renewed_form
 from twinloop.records import Record, Recorded

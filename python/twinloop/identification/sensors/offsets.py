@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.records import Run
 from twinloop.identification.search.description import shortest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from twinloop.elementary import log
+from twinloop._ground.elementary import log
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.directions import Direction, terms_of, unequal
 from twinloop.identification.terms.formulas import parsed_term

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.pool import Pool

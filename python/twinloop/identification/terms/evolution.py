@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from twinloop import _core
-from twinloop.elementary import log
+from twinloop._ground.elementary import log
+from twinloop._ground.streams import Unit
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.sizes import in_shares, size
 from twinloop.law.expressions import UNARY
 from twinloop.signals import Signals
-from twinloop.streams import Unit
 
 PRODUCTS = 0.5
 """Share of new nodes that are products: most laws of machines are made of them."""

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
-from twinloop.arrays import Floats
-from twinloop.elementary import log
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log
 from twinloop.identification.terms.libraries import speeds
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals

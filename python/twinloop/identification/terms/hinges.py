@@ -13,8 +13,8 @@ from itertools import combinations
 
 import numpy as np
 
-from twinloop.arrays import Floats
-from twinloop.elementary import log
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log
 from twinloop.identification.terms.libraries import periodic, rates
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals

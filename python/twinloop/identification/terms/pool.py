@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
-from twinloop.elementary import log
+from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import log
 from twinloop.errors import InvalidInput, unknown
 from twinloop.law.equations import readable
 from twinloop.law.expressions import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from twinloop.elementary import power
+from twinloop._ground.elementary import power
 from twinloop.identification.terms.libraries import angles
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.expressions import CONSTANT, INPUT, SHARE

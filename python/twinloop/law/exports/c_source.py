@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from twinloop._core import __version__
+from twinloop._ground.texts import one_line
 from twinloop.law.exports.c_actuation import actuation_c
 from twinloop.law.exports.c_outputs import functions_c, outputs_c
 from twinloop.law.exports.c_sensors import sensor_c, sensor_header
 from twinloop.law.exports.c_step import attitude_c, step_c
 from twinloop.law.exports.c_words import listed, number
 from twinloop.law.law import Law
-from twinloop.texts import one_line
 
 
 def c_source(law: Law, name: str, precision: str = "double") -> tuple[str, str]:

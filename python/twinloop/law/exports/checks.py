@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.python_source import equation_roots

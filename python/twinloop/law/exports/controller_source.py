@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from twinloop._core import __version__
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import PID, Cascade, Family, Mixer, StateFeedback, UnboundFamily
 from twinloop.errors import NotAvailable
 from twinloop.signals import Signals

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from twinloop.arrays import Floats, floats, whole
+from twinloop._ground.arrays import Floats, floats, whole
 from twinloop.errors import NotAvailable
 from twinloop.law.law import Law
 from twinloop.law.noise import Noise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.law.exports.python_source import python_source
 from twinloop.law.law import Law
 

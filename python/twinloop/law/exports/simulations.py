@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.compiling import compiled
 from twinloop.law.exports.sensor_source import reach

@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 
 from twinloop._core import __version__
+from twinloop._ground.texts import one_line
 from twinloop.law.equations import LATER, equations, given_symbols
 from twinloop.law.expansion import Expansion, written
 from twinloop.law.exports.python_source import equation_roots, joined
@@ -14,7 +15,6 @@ from twinloop.law.expressions import Expressions
 from twinloop.law.forms import DERIVATIVES, EULER
 from twinloop.law.law import Law
 from twinloop.law.writing import EXACT, Dialect, Writer
-from twinloop.texts import one_line
 
 SYMPY = Dialect({
     "abs": "sp.Abs({})", "sqrt": "sp.sqrt(sp.Abs({}))", "min": "sp.Min({}, {})", "max": "sp.Max({}, {})",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.export import Source, asked, delivered, exported
 from twinloop.law.exports.gymnasium_source import Episode

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.law.linear.dual import Dual
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family, Mixer
 from twinloop.law.law import Law
 from twinloop.law.linear.controller import LinearController, linear_controller

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.actuation import Actuation, Actuator
 from twinloop.law.forms import EULER

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.law.law import Law
 from twinloop.law.linear.jacobian import jacobian
 from twinloop.law.linear.state_space import Linear

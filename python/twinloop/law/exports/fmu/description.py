@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from twinloop._core import __version__
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import one_line
 from twinloop.law.law import Law
-from twinloop.texts import one_line
 
 Tree = ElementTree.Element
 TIME = 0

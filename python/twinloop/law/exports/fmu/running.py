@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.fmu.description import late_states
 from twinloop.law.exports.simulations import Simulation

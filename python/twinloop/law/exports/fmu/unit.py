@@ -15,7 +15,7 @@ from uuid import NAMESPACE_URL, uuid5
 import numpy as np
 
 from twinloop._core import __version__
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.exports.c_source import c_source
 from twinloop.law.exports.compiling import compiled

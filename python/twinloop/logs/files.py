@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput
+from twinloop.logs.ulog import Window, read_ulog
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
-from twinloop.ulog import Window, read_ulog
 
 TIME = "t"
 """Name of the column of times, s."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 
 
 def outside(usages: Floats) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from twinloop import _core
-from twinloop.arrays import Floats
+from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family
 from twinloop.errors import engine_input
 from twinloop.signals import Signals

@@ -51,7 +51,7 @@ def commit(decide: Sequence[str] = WHAT_DECIDES) -> str | None:
     Returns:
         None where it is no checkout, or Git is missing.
     """
-    top = Path(__file__).resolve().parents[2]
+    top = Path(__file__).resolve().parents[3]
     found = _git(top, "rev-parse", "--short=7", "HEAD") if (top / ".git").exists() else None
     if found is None:
         return None

@@ -1,0 +1,1 @@
+"""What a flight meets: limits, an envelope, excitation that is held back, commands that are replayed."""
