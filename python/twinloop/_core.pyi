@@ -625,6 +625,8 @@ class Regression:
         """Readings less what coefficients (p,) explain, (n + 1, states) for each record."""
     def likelihood(self, coefficients: ArrayLike, sensors: ArrayLike, motion: _Motion) -> float:
         """−2 log of the likelihood of the residuals, up to a constant."""
+    def log_determinant(self, sensors: ArrayLike, motion: _Motion) -> float:
+        """Of the readings' covariance: the part of the likelihood that residuals have no share in."""
     def gram(self, sensors: ArrayLike, motion: _Motion, workers: Workers | None = None) -> Gram:
         """Inner products under sensors' variances (states,) and disturbances of the motion."""
 
@@ -641,6 +643,8 @@ class Gram:
         """Sum of squares of the whitened readings."""
     def with_rows(self, rows: ArrayLike) -> Gram:
         """With more rows (m, p + 1), whitened already: features, and a reading at the end."""
+    def with_prior(self, precisions: ArrayLike) -> Gram:
+        """With a normal prior about 0 on every coefficient, of given precisions (p,): inverse variances."""
     def solve(self, subset: Sequence[int], ridge: float = 0.0) -> tuple[_Floats, _Floats, float] | None:
         """Coefficients (k,), their covariance (k, k) and χ²; None where the features are collinear."""
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop.identification.evidence import CORRELATED, HIDING, LAGGING, STEPPING, Evidence, price, strongest
+from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, Evidence, price, strongest
 from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -70,14 +70,13 @@ def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
     ],
 )
 def test_what_is_there_beside_terms_is_paid_for(form, actuation, expected):
-    assert price(form, actuation, APART, 0) == expected
-    assert price(form, actuation, APART, 2) == expected + 2 * CORRELATED
+    assert price(form, actuation, APART) == expected
 
 
 def test_each_group_of_commands_that_lags_pays_and_commands_of_one_group_pay_once():
-    assert price("acceleration", BOTH_LATE, APART, 0) == 2 * LAGGING
-    assert price("acceleration", BOTH_LATE, TOGETHER, 0) == LAGGING
-    assert price("acceleration", LATE, TOGETHER, 0) == LAGGING
+    assert price("acceleration", BOTH_LATE, APART) == 2 * LAGGING
+    assert price("acceleration", BOTH_LATE, TOGETHER) == LAGGING
+    assert price("acceleration", LATE, TOGETHER) == LAGGING
 
 
 def test_rounding_alone_decides_nothing():

@@ -79,10 +79,9 @@ def test_no_proposal_changes_what_it_is_given_and_each_gives_the_same_again(cont
         assert same(found, before) and same(once, again)
         proposed += [propose.__name__] * bool(once)
         found = decided(found, once)
-    assert found.best.evidence.stage == (True, True, True)
-    proposed = [name for name in proposed if name != "calm"]
-    assert proposed == (["terms", "second_look"] + ["parts"] * (len(context.runs) == 1)) or (
-        proposed == ["hidden", "terms", "second_look"] and found.best.actuation.hidden
+    assert found.best.evidence.stage == (True, True, False)
+    assert proposed == (["terms", "undisturbed", "second_look"] + ["parts"] * (len(context.runs) == 1)) or (
+        proposed[:2] == ["hidden", "terms"] and found.best.actuation.hidden
     )
 
 
@@ -149,9 +148,9 @@ def test_what_an_option_switches_off_or_is_done_already_is_not_proposed():
     assert not any(list(propose(context, start)) for propose in (lags, hidden))
     model = end_of(context, start).best
     assert model.fit is not None and not model.smoothed
-    assert [
-        name for name, propose in zip(NAMES, PROPOSALS, strict=True) if list(propose(context, model))
-    ] == []
+    again = [name for name, propose in zip(NAMES, PROPOSALS, strict=True) if list(propose(context, model))]
+    # A law that leaves more than noise may be looked at again as if nothing disturbed.
+    assert again in ([], ["undisturbed"])
     assert list(parts(pendulum(2), model)) == [] and list(second_look(pendulum(2), start)) == []
 
 
@@ -198,12 +197,9 @@ def test_a_newcomer_is_a_function_and_a_line():
         grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
         entered.append(grown.pool.add("tanh", grown.pool.add("*", 0, 0.123)))
         first, *others = grown.sums
-        first = replace(
-            first,
-            weights={**first.weights, entered[0]: 0.5},
-            description_length=first.description_length - 1e3,
-        )
-        return [fitted(context, replace(grown, sums=(first, *others), fit=None))]
+        first = replace(first, weights={**first.weights, entered[0]: 0.5})
+        found = fitted(context, replace(grown, sums=(first, *others), fit=None))
+        return [replace(found, fit=replace(found.fit, length=found.fit.length - 1e3))]
 
     found = end_of(context, start_of(context), (*PROPOSALS, believer))
     learnt = concluded(context, found, [])

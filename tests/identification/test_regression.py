@@ -171,6 +171,21 @@ def test_more_rows_are_more_rows():
             gram.with_rows(wrong)
 
 
+def test_a_normal_prior_is_a_row_for_each_coefficient_that_reads_0():
+    gram, _ = problem(1)
+    precisions = np.array([3.0, 0.0, 1e4, 0.5, 2.0, 0.0, 7.0, 1e-3])
+    rows = np.column_stack([np.diag(np.sqrt(precisions)), np.zeros(8)])
+    for subset in ([2], [0, 2, 6]):
+        for found, expected in zip(
+            gram.with_prior(precisions).solve(subset), gram.with_rows(rows).solve(subset), strict=True
+        ):
+            np.testing.assert_allclose(found, expected, rtol=1e-9)
+    assert gram.with_prior(precisions).readings == gram.readings
+    for wrong in (precisions[:-1], -precisions, np.full(8, np.nan)):
+        with pytest.raises(ValueError, match="precisions: expected"):
+            gram.with_prior(wrong)
+
+
 @pytest.mark.parametrize("motion", MOTIONS, ids=["quiet", "white", "gusts"])
 @pytest.mark.parametrize(("states", "form"), CASES)
 @pytest.mark.parametrize("ignored", [0, 5])

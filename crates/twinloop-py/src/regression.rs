@@ -59,6 +59,10 @@ impl PyRegression {
         Ok(self.0.likelihood(&vector(&coefficients), &self.noise(&sensors, motion)?)?)
     }
 
+    fn log_determinant(&self, sensors: Vector<'_>, motion: Motion) -> Result<f64> {
+        Ok(self.0.log_determinant(&self.noise(&sensors, motion)?))
+    }
+
     #[pyo3(signature = (sensors, motion, workers = None))]
     fn gram(
         &self,
@@ -136,6 +140,19 @@ impl PyGram {
         let flat = crate::arrays::rows("rows", &rows, self.0.features + 1)?.concat();
         finite("rows", &flat)?;
         Ok(Self(Arc::new(Gram::clone(&self.0).with_rows(&flat))))
+    }
+
+    /// With a normal prior about 0 on every coefficient, of given precisions.
+    fn with_prior(&self, precisions: Vector<'_>) -> Result<Self> {
+        let given = vector(&precisions);
+        finite("precisions", &given)?;
+        if given.len() != self.0.features || given.iter().any(|&precision| precision < 0.0) {
+            return Err(misuse(format!(
+                "precisions: expected {} numbers of at least 0, one a feature, found {given:?}",
+                self.0.features
+            )));
+        }
+        Ok(Self(Arc::new(Gram::clone(&self.0).with_prior(&given))))
     }
 
     /// Coefficients, their covariance and χ²; none if the features are collinear.

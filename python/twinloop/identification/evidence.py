@@ -24,12 +24,13 @@ STEPPING = 12.0
 class Evidence:
     """What the readings say for a hypothesis: first how far it was worked out, then how briefly it describes them.
 
-    Description lengths of the same stage compare; those of different stages do not, for they are of other features.
+    Description lengths of the same stage compare. Of fitted models they are by innovations, whatever their terms were
+    selected on; before that they are of features, and those of readings do not compare with those of smoothed states.
 
     Args:
         fitted: whether its constants were tuned on predictions.
         stable: whether its model stays near its own runs; where that is not known yet it is taken to.
-        smoothed: whether its terms were selected on states that a model has smoothed.
+        smoothed: of what is not fitted, whether its terms were selected on states that a model has smoothed.
         length: description length of the readings: −2 log of their likelihood, the price of its terms, and that of
             what else it holds (`price`).
     """
@@ -41,7 +42,7 @@ class Evidence:
 
     @property
     def stage(self) -> tuple[bool, ...]:
-        """How far it was worked out; a model that diverges is worth nothing, however its terms were selected."""
+        """How far it was worked out; a model that diverges is worth nothing."""
         return self.fitted, self.stable, self.stable and self.smoothed
 
     def beats(self, other: Evidence) -> bool:
@@ -72,19 +73,17 @@ def strongest(hypotheses: Iterable[Hypotheses]) -> Hypotheses:
     return best
 
 
-def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], correlated: int) -> float:
-    """What a hypothesis pays for besides its terms, in units of χ².
+def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]]) -> float:
+    """What a hypothesis pays for besides its terms and its disturbances, in units of χ².
 
     Args:
         form: what its outputs mean.
         actuation: between commands and its law.
         alike: groups of commands; those of a group share one lag and one delay, and pay for them once.
-        correlated: how many correlated disturbances.
     """
     lagging = sum(any(not actuation.actuators[i].direct for i in group) for group in alike)
     return (
         STEPPING * (form == "increment" or form in EULER)
         + LAGGING * lagging
         + HIDING * bool(actuation.hidden)
-        + CORRELATED * correlated
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
-from twinloop.identification.evidence import Evidence, price
+from twinloop.identification.evidence import CORRELATED, Evidence, price
 from twinloop.identification.records import Run
 from twinloop.identification.search.structure import Sum, total
 from twinloop.identification.sensors.chains import Chain
@@ -30,6 +31,7 @@ class Fit(Recorded, kind="fit"):
         chi_squared: of the whitened prediction errors; infinite where the model diverges on its own runs.
         readings: that counted.
         covariance: of the constants and lags that were free; empty where a small change makes the model diverge.
+        length: description length of the readings by the innovations of its observer; infinite where none is known.
     """
 
     model: _core.Model
@@ -37,6 +39,7 @@ class Fit(Recorded, kind="fit"):
     chi_squared: float
     readings: int
     covariance: Floats
+    length: float = math.inf
 
     @property
     def stable(self) -> bool:
@@ -96,10 +99,12 @@ class Hypothesis(Recorded, kind="hypothesis"):
     @property
     def evidence(self) -> Evidence:
         """What the readings say for it."""
-        stable = self.fit is None or self.fit.stable
-        correlated = sum(found.chain.motion.correlated > 0.0 for found in self.sums)
-        length = self.length + price(self.form, self.actuation, self.alike, correlated)
-        return Evidence(self.fit is not None, stable, self.smoothed, length)
+        if self.fit is not None:
+            length = self.fit.length + price(self.form, self.actuation, self.alike)
+            return Evidence(fitted=True, stable=self.fit.stable, smoothed=False, length=length)
+        correlated = CORRELATED * sum(found.chain.motion.correlated > 0.0 for found in self.sums)
+        length = self.length + correlated + price(self.form, self.actuation, self.alike)
+        return Evidence(fitted=False, stable=True, smoothed=self.smoothed, length=length)
 
     def next_unit(self, unit: Unit) -> Unit:
         """The part of an identification's unit of work from which the next search draws."""

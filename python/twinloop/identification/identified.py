@@ -37,7 +37,7 @@ class Identified(Recorded, kind="identified"):
         chi_squared: of the whitened prediction errors of the best model.
         readings: that counted.
         outliers: readings that were taken for such, and not learnt from.
-        description_length: of its sums.
+        description_length: of the readings, by the innovations of the best model's observer.
         of_parts: whether members are there that parts of the only run have led to.
         remarks: what a person should know.
     """

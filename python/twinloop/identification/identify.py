@@ -22,8 +22,8 @@ from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
 from twinloop.identification.outliers import cleaned
+from twinloop.identification.proposals.apart import apart
 from twinloop.identification.proposals.at_once import at_once
-from twinloop.identification.proposals.calm import calm
 from twinloop.identification.proposals.contacts import contacts
 from twinloop.identification.proposals.friction import friction
 from twinloop.identification.proposals.hidden import hidden
@@ -31,6 +31,7 @@ from twinloop.identification.proposals.lags import lags
 from twinloop.identification.proposals.parts import parts
 from twinloop.identification.proposals.second_look import second_look
 from twinloop.identification.proposals.terms import terms
+from twinloop.identification.proposals.undisturbed import undisturbed
 from twinloop.identification.records import Run
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
@@ -41,7 +42,9 @@ from twinloop.signals import Signals
 
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
-PROPOSALS: tuple[Proposal, ...] = (lags, hidden, terms, friction, contacts, second_look, parts, at_once, calm)
+PROPOSALS: tuple[Proposal, ...] = (
+    lags, hidden, terms, undisturbed, apart, friction, contacts, second_look, parts, at_once,
+)  # fmt: skip
 """In the order in which they are made."""
 
 
@@ -178,7 +181,7 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
         chi_squared=fit.chi_squared,
         readings=fit.readings,
         outliers=int(sum((run.weights == 0.0).sum() for run in best.runs)),
-        description_length=best.length,
+        description_length=fit.length,
         of_parts=of_parts,
         remarks=[
             *said,

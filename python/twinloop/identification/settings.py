@@ -51,6 +51,8 @@ class IdentificationOptions:
             first, and not only from the residuals of all terms.
         gusts: whether disturbances may be correlated, as gusts are, and not only white.
         price_disturbances: whether correlated disturbances that explain less than they cost are dropped in the end.
+        moderation: whether terms have to pay for being much larger than all that moves a state, as those are that
+            nearly cancel.
         implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
             masses.
         contacts: whether what begins at a place, as the force of a stop or behind the play of a gear does, is searched,
@@ -87,6 +89,7 @@ class IdentificationOptions:
     noise_from_above: bool = True
     gusts: bool = True
     price_disturbances: bool = True
+    moderation: bool = True
     implicit: bool = True
     contacts: bool = True
     lags: bool = True

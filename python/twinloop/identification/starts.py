@@ -14,7 +14,8 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
 from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import guessed_noise
-from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.search.moderation import with_moved
+from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
@@ -40,9 +41,10 @@ def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:
     """
     aligned = cache(lambda: with_offsets(context, begun(context, form, context.first_pool(), ANEW)))
     known = context.earlier
-    if known is None or not known.actuation.hidden:
+    if known is None:
         return (lambda: anew(context, aligned()),)
-    # What is hidden shows when terms are nearly right, and these when it shows.
+    # A law that followed fewer runs may be lost in a search among more; what is hidden shows when terms are nearly
+    # right, and these when it shows.
     return lambda: anew(context, aligned()), lambda: renewed(context, known, aligned())
 
 
@@ -58,7 +60,7 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
     signals, options, runs = context.signals, context.options, tuple(context.runs)
     every = chains(signals, form, guessed_noise(runs, np.array([state.scale for state in signals.states])))
     seen = [node for node in context.known_terms if not pool.is_hidden(node)]
-    return Hypothesis(
+    first = Hypothesis(
         form=form,
         offsets=np.zeros(signals.n_x),
         runs=runs,
@@ -69,6 +71,10 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
         given=tuple(given_noise(chain, signals) for chain in every if chain.output is None),
         start=start,
     )
+    if not options.moderation:
+        return first
+    problem = posed(context, first)
+    return replace(first, driven=tuple(with_moved(problem, chain) for chain in first.driven))
 
 
 def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
@@ -95,15 +101,18 @@ def anew(context: Context, aligned: Hypothesis) -> Hypothesis:
     if known is None:
         return from_both_sides(context, aligned)
     sums = [_without_hidden(found, aligned.pool) for found in known.sums]
-    return from_both_sides(context, replace(aligned, actuation=known.actuation.bare()), sums)
+    alike = alike_commands(context.signals, known.actuation)
+    return from_both_sides(context, replace(aligned, actuation=known.actuation.bare(), alike=alike), sums)
 
 
 def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothesis:
-    """What was known with its hidden state, tuned on all runs."""
+    """What was known, with its lags and its hidden state, tuned on all runs."""
+    candidates = aligned.candidates
     begins = replace(
         aligned,
         actuation=known.actuation,
-        candidates=with_hidden(context, aligned.candidates),
+        alike=alike_commands(context.signals, known.actuation),
+        candidates=with_hidden(context, candidates) if known.actuation.hidden else candidates,
         sums=tuple(replace(found, others=[]) for found in known.sums),
         start=RENEWED,
     )

@@ -91,11 +91,17 @@ class Actuation(Recorded, kind="actuation"):
         return replace(self, hidden=())
 
 
-def alike_commands(signals: Signals) -> tuple[tuple[int, ...], ...]:
-    """Commands that are alike, by unit and bounds: they share an actuator, and fill hidden states together."""
+def alike_commands(signals: Signals, known: Actuation | None = None) -> tuple[tuple[int, ...], ...]:
+    """Commands that are alike, by unit and bounds: they share an actuator, and fill hidden states together.
+
+    Args:
+        signals: of the system.
+        known: actuators that were found; commands behind different ones are not alike. None: all may share one.
+    """
     found: dict[tuple[object, ...], list[int]] = {}
     for i, command in enumerate(signals.commands):
-        found.setdefault((command.unit, command.bounds, command.size), []).append(i)
+        actuator = None if known is None else known.actuators[i]
+        found.setdefault((command.unit, command.bounds, command.size, actuator), []).append(i)
     return tuple(tuple(group) for group in found.values())
 
 

@@ -203,6 +203,13 @@ impl Gram {
         self
     }
 
+    /// With a normal prior about 0 on every coefficient, of given precisions (inverse variances): what it costs is in χ².
+    pub fn with_prior(mut self, precisions: &[f64]) -> Self {
+        let width = self.features + 1;
+        precisions.iter().enumerate().for_each(|(j, precision)| self.products[j * width + j] += precision);
+        self
+    }
+
     /// Copies the upper triangle of the products to the lower one.
     fn mirror(&mut self) {
         let width = self.features + 1;

@@ -56,6 +56,12 @@ impl Regression {
         Ok(likelihood(&self.chain, &self.records, &self.residuals(coefficients)?, noise))
     }
 
+    /// Of the readings' covariance under a noise, the part of −2 log of a likelihood that residuals have no share in.
+    pub fn log_determinant(&self, noise: &Noise) -> f64 {
+        let whitenings = Record::whitenings(&self.chain, &self.records, noise);
+        whitenings.iter().map(|whitening| whitening.log_determinant).sum()
+    }
+
     /// Inner products of all features and the readings, whitened for a noise.
     pub fn gram(&self, noise: &Noise, workers: &Workers) -> Gram {
         Gram::new(&self.chain, &self.records, self.features, noise, workers)

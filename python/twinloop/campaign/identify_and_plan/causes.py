@@ -23,13 +23,15 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.exactness import driven, may_be_inexactness, shows
-from twinloop.campaign.identify_and_plan.following import cut, free_run, start_of
+from twinloop.campaign.identify_and_plan.following import cut, start_of
+from twinloop.campaign.identify_and_plan.foretold import features_of, foretold
 from twinloop.campaign.identify_and_plan.likeness import Likeness
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.errors import engine_input
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.offsets import moved
+from twinloop.law.flight import drawn_runs
 from twinloop.signals import Signals
 
 Predictions = Sequence[tuple[Floats, Floats, Floats]]
@@ -117,17 +119,21 @@ def causes_of(
     drives = driven(identified.model, runs_of(identified, flights, signals), signals)
     frees = [alone(identified.members[0], run, limits, workers) for run in flights]
     known = [
-        (run.trajectory.states, gusts[1:], free)
+        (run.trajectory.states, gusts[1:], *free)
         for run, (_, _, gusts), free in zip(flights, found, frees, strict=True)
         if free is not None
     ]
-    missed = [(read, free) for read, _, free in known]
+    missed = [(read, free) for read, _, free, _ in known]
     speeds = [speed(free, limits) for _, free in missed]
+    features = [features_of(free, sent, signals) for _, _, free, sent in known]
     causes: dict[int, Cause] = {}
     for state, place in disturbed.items():
         chain = identified.chains[place]
         causes[state] = cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
-        moving = [(np.abs(gusts[:, place]), fast) for (_, gusts, _), fast in zip(known, speeds, strict=True)]
+        felt = [gusts[:, place] for _, gusts, _, _ in known]
+        if len(known) > 1 and foretold(list(zip(features, felt, strict=True))).certain(SURE):
+            causes[state] = "law"
+        moving = [(np.abs(gusts), fast) for gusts, fast in zip(felt, speeds, strict=True)]
         if causes[state] == "disturbance" and (
             acts_in_motion(moving) or may_be_inexactness(chain, drives) or not shows(missed, chain, limits)
         ):
@@ -157,8 +163,10 @@ def acts_in_motion(flights: Sequence[tuple[Floats, Floats]]) -> bool:
     return Likeness.of((size - size.mean(), fast - fast.mean()) for size, fast in flights).certain(BY_LUCK)
 
 
-def alone(model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers) -> Floats | None:
-    """States of a model flown by itself (n + 1, n_x); None where it does not last as long as the flight.
+def alone(
+    model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers
+) -> tuple[Floats, Floats] | None:
+    """States (n + 1, n_x) and commands (n, n_u) of a model flown by itself; None where it lasts less than the flight.
 
     Args:
         model: that is flown.
@@ -168,8 +176,8 @@ def alone(model: _core.Model, flight: Experiment, limits: Limits, workers: _core
     """
     steps = flight.trajectory.steps
     flown = cut(flight.replayed, start_of(model, flight.trajectory.states[0]), steps)
-    states, lasted = free_run(model, flown, limits, workers)
-    return None if lasted < steps else states
+    runs = drawn_runs(model, flown, limits, workers=workers)
+    return None if int(runs.lasted[0]) < steps else (np.asarray(runs.read[0]), np.asarray(runs.commands[0]))
 
 
 def speed(states: Floats, limits: Limits) -> Floats:

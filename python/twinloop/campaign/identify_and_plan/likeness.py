@@ -39,7 +39,7 @@ class Likeness:
         product = scatter = size = 0.0
         for one, other in pairs:
             n = min(len(one), len(other))
-            first, second = _in_pieces(one[:n]), _in_pieces(other[:n])
+            first, second = in_pieces(one[:n]), in_pieces(other[:n])
             product += float((first * second).sum())
             size += float(np.sqrt(np.square(first).sum() * np.square(second).sum()))
             # The variance of a sum of products of two unrelated series is that of their autocovariances' products.
@@ -52,10 +52,11 @@ class Likeness:
         return self.product > SHARE * self.size and self.product > deviations * self.by_luck
 
 
-def _in_pieces(series: Floats) -> Floats:
-    """Means over pieces of a series, each as long as the next one; what is left at its end is not used."""
+def in_pieces(series: Floats) -> Floats:
+    """Means over pieces of series (n, …), each as long as the next one; what is left at their end is not used."""
     length = max(1, len(series) // PIECES)
-    return np.asarray(series[: len(series) // length * length].reshape(-1, length).mean(axis=1))
+    whole = series[: len(series) // length * length]
+    return np.asarray(whole.reshape(-1, length, *series.shape[1:]).mean(axis=1))
 
 
 def _autocovariances(series: Floats) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop.identification.context import Context
+from twinloop.identification.fit.innovations import Described, described
 from twinloop.identification.fit.models import bounds_of, layout, model_of
 from twinloop.identification.fit.predictions import without_outliers
 from twinloop.identification.fit.support import supported
@@ -17,12 +18,42 @@ from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.bounds import excludes_zero
 from twinloop.law.actuation import Actuation
 
+TURNS = 4
+"""Times at most that a model is tuned again with the noise that was estimated behind it."""
+GAIN = 1.0
+"""What another noise must gain, in units of χ², for a model to be tuned with it again."""
 PRUNINGS = 3
 """How often terms that tuning has shown to be nothing are dropped."""
 
 
 def fitted(context: Context, hypothesis: Hypothesis) -> Hypothesis:
-    """The hypothesis with its model tuned, without outliers and without terms that tuning has shown to be nothing."""
+    """The hypothesis with its model tuned, without outliers and without terms that tuning has shown to be nothing.
+
+    The noise that its innovations say takes the place of the one that it had, for the model is tuned by noise and the
+    noise estimated behind the model.
+    """
+    best, found = _described(context, _pruned(context, hypothesis))
+    for _ in range(TURNS):
+        if found is None or found.gained <= GAIN:
+            break
+        other, found = _described(context, _tuned(context, found.of(best))[0])
+        if not other.evidence.stable or best.evidence.length < other.evidence.length - GAIN:
+            break
+        best = other
+    return best
+
+
+def _described(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Described | None]:
+    """The hypothesis with the description length of its fit, and how that was found; nothing where it diverges."""
+    fit = hypothesis.fit
+    if fit is None or not fit.stable:
+        return hypothesis, None
+    found = described(context, hypothesis)
+    return replace(hypothesis, fit=replace(fit, length=found.length)), found
+
+
+def _pruned(context: Context, hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis tuned, without outliers, weak terms and terms that share too few readings."""
     best, fit = _tuned(context, hypothesis)
     if not fit.stable or not context.options.tuning:
         return best

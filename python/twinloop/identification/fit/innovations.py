@@ -1,26 +1,27 @@
-"""Noise by innovations: what is most likely to have disturbed a model that has been tuned on its predictions.
+"""Innovations: what readings say for a fitted model, by the errors of its own observer's predictions.
 
-A regression sees a law through readings. What is as steep as friction turns their noise into forces, and what these
-miss looks like a disturbance. An observer sees the law through what it believes of the states, so its innovations
-(Ljung 1999, chapter 7) tell the two apart.
+A regression sees a law through readings, or through states that another model has smoothed: its description lengths
+compare where those are the same. An observer sees the law through what it believes of the states, so its innovations
+(Ljung 1999, chapter 7) compare any two models of the same readings, and tell noise from what is as steep as friction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from twinloop import _core
+from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import CORRELATED
-from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.predictions import predictions
-from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.description import shortest
+from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import priced
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
@@ -29,76 +30,100 @@ STEPS = (30.0, 5.0, 1.5)
 """Factors by which variances and times are tried in turn, coarse to fine."""
 FORGOTTEN = 4.0
 """Times that a correlated disturbance is forgotten within the longest record, as in the engine's likelihood."""
-TURNS = 10
-"""Times at most that the noise is estimated behind a law, and the law tuned with it."""
-GAIN = 1.0
-"""What a turn must gain, in units of χ²: less is worth no further one."""
 MOVE = 0.1
 """What a move of the noise must gain."""
 
 
-def by_innovations(context: Context, hypothesis: Hypothesis) -> Hypothesis:
-    """The hypothesis with noise and description lengths by its innovations, tuned with that noise.
+@dataclass(frozen=True, eq=False)
+class Described:
+    """What the innovations of a fitted hypothesis say for it.
+
+    Args:
+        chains: those that outputs drive, each under its most likely noise.
+        length: of the description of all readings, with terms and correlated disturbances paid for.
+        gained: by how much that is shorter than under the noise that the hypothesis had.
+    """
+
+    chains: tuple[Chain, ...]
+    length: float
+    gained: float
+
+    def of(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis under this noise, its model to be tuned with it."""
+        sums = (replace(sum_, chain=chain) for sum_, chain in zip(hypothesis.sums, self.chains, strict=True))
+        return replace(hypothesis, sums=tuple(sums))
+
+
+def described(context: Context, hypothesis: Hypothesis) -> Described:
+    """How briefly a fitted hypothesis describes the readings, each driven chain under its most likely noise.
 
     Args:
         context: of the identification.
         hypothesis: with a stable fit.
 
     Returns:
-        The same terms, with the constants inside them that tuning has found, and without those that are nothing then.
+        Lengths of −2 log likelihood, up to what is the same for all hypotheses of the same readings.
     """
-    best = latest = hypothesis
-    for turn in range(TURNS):
-        noisy = _noisy(context, latest)
-        if turn and not noisy.evidence.length < best.evidence.length - GAIN:
-            break
-        latest = fitted(context, settled(noisy))
-        if not latest.evidence.stable:
-            break
-        best = latest
-    return best
-
-
-def _noisy(context: Context, hypothesis: Hypothesis) -> Hypothesis:
-    """The hypothesis with each driven chain under its most likely noise, and what the readings say for it then."""
-    assert hypothesis.fit is not None
-    sums, observer = list(hypothesis.sums), list(hypothesis.fit.observer)
-    for i, found in enumerate(sums):
-        likelihood = _Likelihood(context, hypothesis, i)
+    chains, length, before = [], 0.0, 0.0
+    problem = posed(context, hypothesis)
+    for i, found in enumerate(hypothesis.sums):
         chain = found.chain
+        likelihood = _Likelihood(context, hypothesis, i, problem.integration(chain))
         period = context.signals.dt if chain.integrated else 1.0
-        quiet = chain.with_noise(
-            chain.sensors, (1e-3 * float(chain.sensors[0]) / period, 0.0, chain.motion.correlation_time)
-        )
+        white = max(1e-3 * float(chain.sensors[0]), likelihood.integration) / period
+        quiet = chain.with_noise(chain.sensors, (white, 0.0, chain.motion.correlation_time))
         begun = [quiet, chain] if chain.motion.correlated else [quiet]
-        chain, length = shortest([likelihood.climbed(one) for one in begun], lambda pair: pair[1])
-        # A correlated disturbance is paid for with the hypothesis, not with the sum.
-        length -= CORRELATED * (chain.motion.correlated > 0.0)
-        length += priced(hypothesis.pool, list(found.weights), likelihood.readings, len(hypothesis.runs))
-        sums[i] = replace(found, description_length=length, chain=chain, others=[])
-        observer[i] = chain
-    fit = replace(hypothesis.fit, observer=tuple(observer))
-    return replace(hypothesis, sums=tuple(sums), fit=fit)
+        likely, least = shortest([likelihood.climbed(one) for one in begun], lambda pair: pair[1])
+        chains.append(likely)
+        length += least + priced(
+            hypothesis.pool, list(found.weights), likelihood.readings, len(hypothesis.runs)
+        )
+        before += likelihood(chain) - least
+    return Described(tuple(chains), length, before)
 
 
+@dataclass(frozen=True, eq=False)
 class _Likelihood:
-    """−2 log of the likelihood of one driven chain's innovations, with what a correlated disturbance must gain."""
+    """−2 log of the likelihood of one driven chain's innovations, with what a correlated disturbance must gain.
 
-    def __init__(self, context: Context, hypothesis: Hypothesis, i: int) -> None:
-        self.context, self.hypothesis, self.i = context, hypothesis, i
-        chain = hypothesis.sums[i].chain
-        self.states, self.dt = list(chain.states), context.signals.dt
-        self.counted = [run.weights[:, self.states] for run in hypothesis.runs]
-        self.longest = self.dt * max(len(weights) for weights in self.counted) / FORGOTTEN
-        self.readings = int(sum(weights.sum() for weights in self.counted))
-        # The determinant is that of the kinematics: of readings that are 0 nothing else is left.
-        nothing = [np.zeros((len(weights) - 1, 1)) for weights in self.counted]
-        records = [
-            (np.zeros_like(weights), weights, none, none, none)
-            for weights, none in zip(self.counted, nothing, strict=True)
-        ]
+    Args:
+        context: of the identification.
+        hypothesis: with a stable fit.
+        i: number of the chain.
+        integration: variance, a period, of what integrating leaves of what moves the chain: less disturbance is not
+            told from that.
+    """
+
+    context: Context
+    hypothesis: Hypothesis
+    i: int
+    integration: float
+
+    @property
+    def states(self) -> list[int]:
+        """Of the chain."""
+        return list(self.hypothesis.sums[self.i].chain.states)
+
+    @cached_property
+    def counted(self) -> Sequence[Floats]:
+        """Weights of the chain's readings, of each run."""
+        return [run.weights[:, self.states] for run in self.hypothesis.runs]
+
+    @property
+    def readings(self) -> int:
+        """That count."""
+        return int(sum(weights.sum() for weights in self.counted))
+
+    @cached_property
+    def readings_alone(self) -> _core.Regression:
+        """The chain's readings on nothing; it knows the determinant of a likelihood, which is that of the kinematics."""
+        states, chain = self.states, self.hypothesis.sums[self.i].chain
+        records = []
+        for run, weights in zip(self.hypothesis.runs, self.counted, strict=True):
+            nothing = np.zeros((len(weights) - 1, 1))
+            records.append((run.states[:, states], weights, nothing, nothing, nothing))
         with engine_input():
-            self.still = _core.Regression(len(self.states), self.dt, chain.form, records)
+            return _core.Regression(len(states), self.context.signals.dt, chain.form, records)
 
     def __call__(self, chain: Chain) -> float:
         fit = self.hypothesis.fit
@@ -111,8 +136,9 @@ class _Likelihood:
             float(np.square(whitened[:, self.states][weights > 0.0]).sum())
             for (whitened, _, _), weights in zip(errors, self.counted, strict=True)
         )
-        determinant = float(self.still.likelihood(np.zeros(1), chain.sensors, chain.motion))
-        return squares + determinant + CORRELATED * (chain.motion.correlated > 0.0)
+        determinant = self.readings_alone.log_determinant(chain.sensors, chain.motion)
+        disturbance = CORRELATED * self.context.options.price_disturbances
+        return squares + determinant + disturbance * (chain.motion.correlated > 0.0)
 
     def climbed(self, chain: Chain) -> tuple[Chain, float]:
         """The most likely noise that is reached from a chain's by changing one number at a time."""
@@ -129,7 +155,9 @@ class _Likelihood:
 
     def _beside(self, chain: Chain, step: float) -> Iterator[Chain]:
         """The chain with one number of its noise changed by a factor; never below what is believed."""
-        least, slow = floor_of(chain, self.dt)
+        dt = self.context.signals.dt
+        longest = dt * max(len(weights) for weights in self.counted) / FORGOTTEN
+        least, slow = floor_of(chain, dt, self.integration)
         numbers = 3 if chain.motion.correlated else 1
         for factor in (1.0 / step, step):
             for k, sensor in enumerate((chain.sensors * factor).tolist()):
@@ -140,5 +168,5 @@ class _Likelihood:
             for k in range(numbers):
                 motion = list(chain.motion)
                 motion[k] *= factor
-                if motion[k] >= slow[k] and (k < 2 or motion[k] <= self.longest):
+                if motion[k] >= slow[k] and (k < 2 or motion[k] <= longest):
                     yield chain.with_noise(chain.sensors, (motion[0], motion[1], motion[2]))

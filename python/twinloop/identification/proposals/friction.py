@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
+from twinloop.identification.fit.alternation import by_innovations
 from twinloop.identification.fit.fitting import fitted, with_fit
-from twinloop.identification.fit.innovations import by_innovations
 from twinloop.identification.fit.models import model_of
 from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.fit.tuning import tune

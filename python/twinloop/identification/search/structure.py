@@ -14,6 +14,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log, power
 from twinloop._ground.streams import Purpose, Unit
 from twinloop.errors import engine_input
+from twinloop.identification.search.moderation import precisions
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.subsets import Judged, all_judged
 from twinloop.identification.sensors.chains import Chain
@@ -139,6 +140,7 @@ def search(
     ]
     columns = problem.values(usable)
     regressions = [problem.regression(chain, columns) for chain in chains]
+    priors = [precisions(problem, chain, usable) for chain in chains]
 
     def walked(
         grams: Sequence[_core.Gram], costs: Sequence[Floats], number: int, round_: int
@@ -153,7 +155,8 @@ def search(
     current = list(chains)
     for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
         grams = [
-            r.gram(c.sensors, c.motion, problem.workers) for r, c in zip(regressions, current, strict=True)
+            r.gram(c.sensors, c.motion, problem.workers).with_prior(prior)
+            for r, c, prior in zip(regressions, current, priors, strict=True)
         ]
         subsets = _chosen(problem, usable, chains, known, grams, costs, partial(walked, round_=round_))
         coefficients = [_spread(judged[0], len(usable)) for judged in subsets]
@@ -168,6 +171,7 @@ def search(
         subset, length, weights = judged[0]
         others = [(tuple(usable[j] for j in s), max(0.0, longer - length)) for s, longer, _ in judged[1:40]]
         score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
+        score += float((priors[i] * np.square(coefficients[i])).sum())
         rung = RUNG * problem.pool.rung(usable[j] for j in subset)
         total = rung + score + float(costs[i][list(subset)].sum())
         chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}

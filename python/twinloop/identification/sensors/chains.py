@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -44,6 +45,8 @@ class Chain(Recorded, kind="chain"):
         sensors: variance of each state's sensor, in its unit squared.
         rough: variance of each state's readings about a polynomial through neighbours: the sensor's or more.
         motion: what disturbs the driven one.
+        moved: variance of all that moves the driven one, by which large coefficients are priced; infinite: they are
+            not.
     """
 
     states: tuple[int, ...]
@@ -52,6 +55,7 @@ class Chain(Recorded, kind="chain"):
     sensors: Floats
     rough: Floats
     motion: Motion = QUIET
+    moved: float = math.inf
 
     VERSION = 3
 
