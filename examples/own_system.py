@@ -3,8 +3,6 @@
 import math
 
 import twinloop as tl
-from twinloop.faces.result import summary
-from twinloop.faces.text import render
 
 signals = tl.Signals(
     states=[
@@ -39,4 +37,4 @@ campaign = tl.Campaign(
 campaign.test({"angle.kp": 2.0, "angle.ki": 2.0, "angle.kd": 0.3})  # flown first
 campaign.run(rig, experiments=3)
 
-print(render(summary(campaign, {"name": "pendulum"}, run_info={})))
+print(campaign.report(name="pendulum"))

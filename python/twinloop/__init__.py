@@ -1,9 +1,22 @@
 """Twinloop: from a handful of experiments to a twin made of readable equations and a tuned controller."""
 
-from twinloop import autopilots, contracts, controllers, errors, objectives, pareto, systems
+from twinloop import (
+    autopilots,
+    contracts,
+    controllers,
+    errors,
+    flights,
+    guard,
+    objectives,
+    options,
+    pareto,
+    results,
+    systems,
+)
 from twinloop._core import __version__
 from twinloop._experiment.replay import Replay
 from twinloop.campaign import Campaign, identify
+from twinloop.campaign.examination.log_check import check_log
 from twinloop.errors import (
     InvalidInput,
     NoAnswer,
@@ -44,13 +57,23 @@ __all__ = [
     "TwinloopError",
     "__version__",
     "autopilots",
+    "check_log",
     "contracts",
     "controllers",
     "errors",
+    "flights",
+    "guard",
     "identify",
     "load",
     "load_twin",
     "objectives",
+    "options",
     "pareto",
+    "results",
     "systems",
 ]
+
+
+def __dir__() -> list[str]:
+    """What users are meant to use; rooms that are loaded behind it are no part of it."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

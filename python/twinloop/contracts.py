@@ -15,6 +15,8 @@ from twinloop.systems import System
 from twinloop.test import Test
 from twinloop.trajectory import check_recorded
 
+__all__ = ["ContractBroken", "check_controller", "check_system"]
+
 
 class ContractBroken(TwinloopError, AssertionError):
     """A requirement that a system or controller violates."""

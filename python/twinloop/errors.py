@@ -6,6 +6,17 @@ import difflib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+__all__ = [
+    "InvalidInput",
+    "NoAnswer",
+    "NotAvailable",
+    "RemarkWarning",
+    "StoreFailure",
+    "SystemFailure",
+    "TooRisky",
+    "TwinloopError",
+]
+
 
 class TwinloopError(Exception):
     """Base of all errors of Twinloop.

@@ -15,6 +15,8 @@ from twinloop.controllers import Family
 from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
+__all__ = ["candidates", "disagreements", "qualities", "quality"]
+
 
 def candidates(
     family: Family,

@@ -17,6 +17,19 @@ from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
+__all__ = [
+    "closed_loop",
+    "discrimination",
+    "final_distances",
+    "frozen_error",
+    "instability",
+    "k_step",
+    "lasted",
+    "normalised_error",
+    "open_loop",
+    "selected_tests",
+]
+
 
 def selected_tests(
     tests: Sequence[Test], trajectories: Sequence[Trajectory], limits: Limits | None = None

@@ -8,6 +8,8 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats, Integers, floats, whole
 from twinloop.errors import engine_input
 
+__all__ = ["Archive", "best_tradeoff", "crowding_distances", "ideal_point", "ranks", "select"]
+
 Archive = _core.Archive
 
 

@@ -1,113 +1,137 @@
-"""The page of the API has all that is public: what the package names, and what these give back."""
+"""The pages of the API and of the options say what the code says, of all that is public."""
 
+import dataclasses
 import inspect
 import re
-import typing
-from importlib import import_module
 from pathlib import Path
 
+import pytest
+
 import twinloop as tl
+from twinloop.campaign.presets import CHOICES, PRESETS, RANGES, options_of
 
-DOCS = Path(__file__).parents[2] / "docs"
-PAGE = "\n".join((DOCS / name).read_text(encoding="utf-8") for name in ("api.md", "options.md"))
-ENTRIES = re.findall(r"^::: (\S+)$", PAGE, re.MULTILINE)
-
-ONLY = {
-    name: re.findall(r"\w+", found) if found else None
-    for name, found in re.findall(
-        r"^::: (\S+)\n(?:    .*\n)*?(?:      members: \[(.*)\]\n|\n|\Z)", PAGE, re.MULTILINE
-    )
-}
-"""Members that are all that is shown of an entry, where the page says so."""
+ROOT = Path(__file__).parents[2]
 
 
-def entry(name):
-    """What an entry of the page stands for."""
-    parts = name.split(".")
-    for split in range(len(parts), 0, -1):
-        try:
-            found = import_module(".".join(parts[:split]))
-        except ModuleNotFoundError:
-            continue
-        for part in parts[split:]:
-            found = getattr(found, part)
-        return found
-    raise AssertionError(name)
+@pytest.fixture(autouse=True)
+def scripts(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
 
 
-def documented():
-    """Classes and functions of the page, those of whole modules among them."""
-    for name in ENTRIES:
-        found = entry(name)
-        if not inspect.ismodule(found):
-            yield found
-            continue
-        for member, each in vars(found).items():
-            shown = ONLY[name] is None or member in ONLY[name]
-            if shown and (inspect.isroutine(each) or inspect.isclass(each)) and each.__module__ == name:
-                yield each
+def page(name):
+    return (ROOT / "docs" / name).read_text(encoding="utf-8")
 
 
-KNOWN = {id(each) for each in documented()}
+def entries():
+    """Objects of the page of the API, by their names there."""
+    found = {}
+    for name in re.findall(r"^### `tl\.(\S+)`$", page("api.md"), re.MULTILINE):
+        assert name not in found, f"{name} has two entries"
+        *rooms, last = name.split(".")
+        found[name] = getattr(getattr(tl, rooms[0]) if rooms else tl, last)
+    return found
 
 
-def named():
-    """Classes and functions that the package and its modules name, by the name."""
-    for name in tl.__all__:
-        found = getattr(tl, name)
-        if not inspect.ismodule(found):
-            yield name, found
-            continue
-        for inner in getattr(found, "__all__", ()):
-            yield f"{name}.{inner}", getattr(found, inner)
+def test_the_page_of_the_api_is_what_its_script_writes():
+    import api_page
+
+    assert page("api.md") == api_page.page(), "run `python scripts/api_page.py`"
 
 
-def classes_in(hint):
-    """Classes of a type hint, those within its brackets among them."""
-    if inspect.isclass(hint):
-        yield hint
-    for part in typing.get_args(hint):
-        yield from classes_in(part)
+def test_the_page_of_the_options_is_what_its_script_writes():
+    import options_page
+
+    assert page("options.md") == options_page.page(), "run `python scripts/options_page.py`"
 
 
-def given_back():
-    """Classes of the package that public members of public classes give back, each with who gives it."""
-    for known in list(documented()):
-        members = inspect.getmembers(known) if inspect.isclass(known) else [("", known)]
-        for name, member in members:
-            if name.startswith("_"):
-                continue
-            called = getattr(member, "fget", None) or getattr(member, "func", None) or member
-            if not inspect.isfunction(called) or not called.__module__.startswith("twinloop."):
-                continue
-            scope = {**vars(import_module(called.__module__))}
-            try:
-                hint = eval(str(called.__annotations__.get("return")), scope)
-            except NameError:
-                continue  # a name for type checkers alone
-            for each in classes_in(hint):
-                if each.__module__.startswith("twinloop.") and each.__module__ != "twinloop._core":
-                    yield f"{getattr(known, '__name__', known)}.{name}", each
-
-
-def test_every_name_of_the_package_has_an_entry():
+def test_every_public_name_has_an_entry():
+    shown = {id(found) for found in entries().values()}
+    rooms = [tl, *(getattr(tl, name) for name in tl.__all__ if inspect.ismodule(getattr(tl, name)))]
     missing = [
-        name
-        for name, found in named()
-        if (inspect.isclass(found) or inspect.isfunction(found)) and id(found) not in KNOWN
+        f"{room.__name__}.{name}"
+        for room in rooms
+        for name in room.__all__
+        if not inspect.ismodule(getattr(room, name)) and id(getattr(room, name)) not in shown
     ]
-    assert missing == []
+    assert missing == ["twinloop.__version__"]
 
 
-def test_what_public_members_give_back_has_an_entry():
-    missing = {
-        f"{each.__module__}.{each.__qualname__}, of {who}"
-        for who, each in given_back()
-        if id(each) not in KNOWN
+def test_the_first_lines_name_all_that_the_package_names():
+    first = page("api.md").partition("\n## ")[0]
+    assert [name for name in tl.__all__ if not re.search(rf"`(?:tl\.)?{name}`", first)] == ["__version__"]
+
+
+def calls():
+    """Functions, classes that somebody makes, and methods of the page, by name."""
+    for name, found in entries().items():
+        of_the_package = (
+            getattr(found, "__module__", "").startswith("twinloop.") and "_core" not in found.__module__
+        )
+        if inspect.isfunction(found):
+            yield name, found
+        elif inspect.isclass(found) and of_the_package and not issubclass(found, BaseException):
+            if not name.startswith(("results.", "options.")) and not getattr(found, "_is_protocol", False):
+                yield name, found
+            for member, value in vars(found).items():
+                if (
+                    inspect.isfunction(value)
+                    and not member.startswith("_")
+                    and "Args:" in (value.__doc__ or "")
+                ):
+                    yield f"{name}.{member}", value
+
+
+def test_every_argument_of_what_is_public_is_explained():
+    wrong = []
+    for name, call in calls():
+        taken = {
+            each.name
+            for each in inspect.signature(call).parameters.values()
+            if each.name != "self" and each.kind is not each.VAR_KEYWORD
+        }
+        told = set(
+            re.findall(r"^ {4}(\w+): ", inspect.getdoc(call).partition("Args:\n")[2].split("\n\n")[0], re.M)
+        )
+        if taken != told:
+            wrong.append(f"{name}: {sorted(taken ^ told)}")
+    assert wrong == []
+
+
+def rows(name, heading):
+    """Rows of the table below a heading, by what their first cell says."""
+    text = page(name).partition(f"{heading}\n")[2].partition("\n#")[0]
+    return {
+        line[0].strip("` "): line
+        for line in (row.strip("| ").split(" | ") for row in re.findall(r"^\| `.*$", text, re.M))
     }
-    assert sorted(missing) == []
 
 
-def test_entries_are_there_once():
-    assert len(ENTRIES) == len(set(ENTRIES))
-    assert all(entry(name).__doc__ for name in ENTRIES)
+@pytest.mark.parametrize("preset", ["default", "paper"])
+def test_tables_of_options_have_each_option_with_its_default_and_the_range_that_is_checked(preset):
+    found = (
+        rows("api.md", "### `tl.options.Options`")
+        if preset == "paper"
+        else {
+            **rows("options.md", "## How a twin is learnt"),
+            **rows("options.md", "## How tests are chosen and gains tuned"),
+        }
+    )
+    assert list(found) and set(found) == {field.name for field in dataclasses.fields(PRESETS[preset])}
+    for name, (low, high) in RANGES[preset].items():
+        least, greatest = found[name][3].split(" to ")
+        assert (float(least), float(greatest)) == (low, high)
+        with pytest.raises(tl.InvalidInput, match=name):
+            options_of(preset, {name: type(getattr(PRESETS[preset], name) or 0)(high * 2 + 1)})
+    for name, known in CHOICES[preset].items():
+        assert all(f"`{each}`" in found[name][3] for each in known)
+    for name, line in found.items():
+        assert eval(line[2].strip("`")) == getattr(PRESETS[preset], name)
+
+
+def test_a_page_that_says_less_than_the_code_is_stale(monkeypatch, tmp_path):
+    import options_page
+
+    shortened = tmp_path / "options.md"
+    shortened.write_text(page("options.md").replace("| `confidence` |", "| `confident` |"), encoding="utf-8")
+    monkeypatch.setattr(options_page, "PAGE", shortened)
+    assert shortened.read_text(encoding="utf-8") != options_page.page() == page("options.md")

@@ -99,10 +99,10 @@ class Options:
         return False
 
     def __post_init__(self) -> None:
-        _check(self, _RANGES)
-        for name, choices in (("form", FORMS), ("tradeoff", TRADEOFFS)):
-            if getattr(self, name) not in choices:
-                raise unknown(f"value of the option {name!r}", getattr(self, name), choices)
+        _check(self, RANGES["paper"])
+        for name in ("form", "tradeoff"):
+            if getattr(self, name) not in CHOICES["paper"][name]:
+                raise unknown(f"value of the option {name!r}", getattr(self, name), CHOICES["paper"][name])
         if self.constant_low >= self.constant_high:
             raise InvalidInput(
                 f"Options constant_low, constant_high: expected low < high, found {self.constant_low:g} and "
@@ -143,10 +143,10 @@ class DefaultOptions(PlanningOptions, IdentificationOptions):
         return True
 
     def __post_init__(self) -> None:
-        _check(self, _DEFAULT_RANGES)
-        for name, choices in (("form", ALL_FORMS), ("tests", TESTS)):
-            if getattr(self, name) not in choices:
-                raise unknown(f"value of the option {name!r}", getattr(self, name), choices)
+        _check(self, RANGES["default"])
+        for name in ("form", "tests"):
+            if getattr(self, name) not in CHOICES["default"][name]:
+                raise unknown(f"value of the option {name!r}", getattr(self, name), CHOICES["default"][name])
         for name in self.libraries:
             if name not in LIBRARIES:
                 raise unknown("library", name, LIBRARIES)
@@ -228,6 +228,13 @@ _RANGES: dict[str, tuple[float, float]] = {
     "mutant_step": (1e-9, 1),
     "test_mutation_step": (1e-9, 1),
 }
+RANGES = {"default": _DEFAULT_RANGES, "paper": _RANGES}
+"""Least and greatest value of options, by preset and name; None is none of them."""
+CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
+    "default": {"form": ALL_FORMS, "tests": TESTS, "libraries": LIBRARIES, "operators": OPERATORS},
+    "paper": {"form": FORMS, "operations": OPERATORS, "tradeoff": TRADEOFFS},
+}
+"""Values of options, or of their items, by preset and name."""
 
 
 @overload

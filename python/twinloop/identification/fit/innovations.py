@@ -116,7 +116,7 @@ class _Likelihood:
 
     @cached_property
     def readings_alone(self) -> _core.Regression:
-        """The chain's readings on nothing; it knows the determinant of a likelihood, which is that of the kinematics."""
+        """The readings alone: of a likelihood they know the determinant, which is that of the kinematics."""
         states, chain = self.states, self.hypothesis.sums[self.i].chain
         records = []
         for run, weights in zip(self.hypothesis.runs, self.counted, strict=True):

@@ -1,0 +1,79 @@
+"""Types of what campaigns, tests and twins give back: names for annotations and `isinstance`. Nobody builds them."""
+
+from twinloop._core import Flights, Model, ModelSearch, Program, Quality, SelectedTests
+from twinloop._experiment.hold_back import HoldBack
+from twinloop.campaign.assessment import Advice
+from twinloop.campaign.certificate import Certificate, Use
+from twinloop.campaign.cost import Cost
+from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.correlation import Correlations
+from twinloop.campaign.examination.data import DataQuality
+from twinloop.campaign.examination.examination import Examination, Frequency
+from twinloop.campaign.examination.frequency import Responses
+from twinloop.campaign.examination.learning import ErrorMap
+from twinloop.campaign.examination.log_check import Column, LogCheck
+from twinloop.campaign.examination.loops import ClosedCurves, LoopCurves
+from twinloop.campaign.examination.poles import Pole
+from twinloop.campaign.examination.steps import StepAnswer
+from twinloop.campaign.examination.unseen import Unseen
+from twinloop.campaign.examination.use import Effort, GainSlope
+from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, Progress, TestLoop
+from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
+from twinloop.law.actuation import Actuation, Actuator, HiddenState
+from twinloop.law.expressions import Expressions
+from twinloop.law.law import Law
+from twinloop.law.linear.margins import LoopMargins, Margins
+from twinloop.law.linear.state_space import Linear
+from twinloop.law.noise import CorrelatedDisturbance, Noise
+
+__all__ = [
+    "Actuation",
+    "Actuator",
+    "Advice",
+    "Certificate",
+    "Check",
+    "Checks",
+    "ClosedCurves",
+    "Column",
+    "CorrelatedDisturbance",
+    "Correlations",
+    "Cost",
+    "DataQuality",
+    "Effort",
+    "ErrorMap",
+    "ErrorTable",
+    "Examination",
+    "Experiment",
+    "Expressions",
+    "Failure",
+    "FitTable",
+    "Flights",
+    "Frequency",
+    "GainSlope",
+    "HiddenState",
+    "HoldBack",
+    "Iteration",
+    "Law",
+    "Lesson",
+    "Linear",
+    "LogCheck",
+    "LoopCurves",
+    "LoopMargins",
+    "Margins",
+    "Model",
+    "ModelSearch",
+    "Noise",
+    "Planned",
+    "Pole",
+    "Program",
+    "Progress",
+    "Quality",
+    "Responses",
+    "SelectedTests",
+    "StateFit",
+    "StepAnswer",
+    "TestErrors",
+    "TestLoop",
+    "Unseen",
+    "Use",
+]

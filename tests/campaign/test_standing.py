@@ -1,0 +1,130 @@
+"""Where tests are in their lives and how they have fared, beside a plain list of what happened to each."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+
+from logbooks import SETUPS, events, genes_of, planned, run_of, written
+from twinloop.campaign import standing
+from twinloop.campaign.logbook import Logbook
+
+
+def status_of(life):
+    if life.failures:
+        return "failed"
+    if life.runs:
+        return "flown" if life.qualities else "aborted"
+    return "abandoned" if life.abandoned else "asked"
+
+
+def mean(values):
+    return math.fsum(values) / len(values) if values else None
+
+
+@given(events)
+def test_each_test_stands_where_its_life_has_led_it(wanted):
+    book, lives, _ = written(wanted)
+    for number, life in enumerate(lives):
+        whole = life.runs != [] and all(kind != "cut" for kind, _ in life.runs) and not life.failures
+        assert standing.status(book, book.tests[number]) == status_of(life)
+        assert standing.measured(book, number) == mean(life.qualities)
+        assert standing.flies(book, number) == life.flies
+        assert standing.finishes(book, number) == whole
+        assert standing.failed(book, number) == (life.failures > 0)
+        assert standing.on_task(book, book.tests[number]) == life.at_home
+    unfit = [
+        number for number, life in enumerate(lives) if life.flown and not standing.finishes(book, number)
+    ]
+    assert [genes.tolist() for genes in standing.unfit(book)] == [
+        book.tests[number].genes.tolist() for number in unfit
+    ]
+
+
+@given(events)
+def test_gains_have_flown_as_often_as_there_are_runs_of_any_test_with_them(wanted):
+    book, lives, _ = written(wanted)
+    for gains in range(3):
+        runs = sum(len(life.runs) for life in lives if life.gains == gains)
+        assert standing.times_flown(book, genes_of(gains)) == runs
+
+
+def best_of(lives, order, groups):
+    """The number of the best test: the lowest quality in the first group with any; else the first that was flown."""
+    measured = [number for number in dict.fromkeys(order) if number is not None and lives[number].qualities]
+    for group in groups:
+        among = [number for number in measured if group(lives[number])]
+        if among:
+            return min(among, key=lambda number: mean(lives[number].qualities))
+    return next((number for number in order if number is not None), None)
+
+
+GROUPS = {
+    "default": [
+        lambda life: life.flies and life.at_home,
+        lambda life: life.flies,
+        lambda life: life.at_home,
+        lambda life: True,
+    ],
+    "paper": [lambda life: life.at_home, lambda life: True],
+}
+
+
+def two(first, second, how):
+    """Two tests, of which the first has flown better, in some way."""
+    return [(first, 0, 1.0), (second, 1, 1.0), (f"tell {how}", 0, 0.5), ("tell inside", 1, 4.0)]
+
+
+@pytest.mark.parametrize("preset", GROUPS)
+@given(wanted=events)
+@example(wanted=two("make elsewhere", "make", "inside"))
+@example(wanted=two("make", "make elsewhere", "outside"))
+@example(wanted=two("make", "make", "outside"))
+def test_the_best_flown_test_is_known_to_fly_then_is_of_the_task_then_is_of_the_best_quality(preset, wanted):
+    book, lives, order = written(wanted, preset)
+    best, first = standing.best_flown(book), standing.first_flown(book)
+    assert (None if best is None else best.number) == best_of(lives, order, GROUPS[preset])
+    assert (None if first is None else first.number) == next(
+        (each for each in order if each is not None), None
+    )
+
+
+def test_a_replicate_that_left_the_envelope_costs_a_test_its_place():
+    book = Logbook(SETUPS["default"])
+    good, fair = book.new_test(genes_of(0)), book.new_test(genes_of(1))
+    for test, quality in ((good, 1.0), (fair, 2.0)):
+        book.enter(run_of(test, "inside", quality))
+    assert standing.best_flown(book) is good
+    book.enter(run_of(good, "outside", 1.0))
+    assert standing.best_flown(book) is fair
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What a turn of either loop has: its number, and the tests asked for after it."""
+
+    iteration: int
+    asked: tuple = ()
+
+
+def test_turns_have_the_tests_that_were_asked_for_after_them_with_what_these_have_flown():
+    book = Logbook(SETUPS["default"])
+    for after in (1, 1, 2):
+        book.asked.append((after, planned(book.new_test(genes_of(after)))))
+    for quality in (1.0, 3.0):
+        book.enter(run_of(book.tests[1], "inside", quality))
+    book.enter(run_of(book.tests[2], "cut"))
+    turns = standing.with_asked(book, [Turn(1), Turn(2), Turn(3)])
+    found = [[(asked.test, asked.flown) for asked in turn.asked] for turn in turns]
+    assert found == [[(0, None), (1, 2.0)], [(2, None)], []]
+    assert [asked.flown for _, asked in book.asked] == [None] * 3
+
+
+def test_a_target_that_varies_is_the_task_only_where_it_varies_alike():
+    setup = SETUPS["default"]
+    book = Logbook(setup)
+    assert standing.on_task(book, book.new_test(genes_of(0)))
+    ramp = np.linspace([0.0, 0.0], setup.target_state, setup.steps + 1)
+    assert not standing.on_task(book, book.new_test(genes_of(0), target_state=ramp))

@@ -1,0 +1,224 @@
+"""Which candidate flies next, beside slow flights of every candidate on a committee of three and the rules in words."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from committees import MOTORS, STEPS, TASK, TUNED, committee_of, member, planner_of, signals
+from oracles import rk4, same_bits
+from twinloop.planning.candidates import candidates
+from twinloop.planning.comparison import Comparison
+from twinloop.planning.proposal import Flown, Wanted
+
+KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
+DRAWS = 3
+PLANNER = planner_of(KNOWN, candidates=24, draws=DRAWS)
+COMMITTEE = committee_of(KNOWN)
+FLOWN = Flown(best=np.array([3.0, 0.2, 1.5]), flies=True, usages=[0.7], good=0.5)
+
+
+def drafts(flown=FLOWN, goal="model", number=3, trusted=True):
+    return candidates(PLANNER, PLANNER.options, TUNED, flown, goal, number, trusted)
+
+
+def compared(
+    committee=COMMITTEE, flown=FLOWN, goal="model", number=3, exploit=False, plain=False, drawn=None
+):
+    drawn = drafts(flown, goal, number, committee.trusted) if drawn is None else drawn
+    wanted = Wanted(goal, number, exploit, plain)
+    return Comparison(PLANNER, PLANNER.options, committee, drawn, flown, wanted)
+
+
+def flight(motor, genes, excitation, noise):
+    """A flight in a plain loop: true states and readings (STEPS + 1, 2), and commands as they were sent."""
+    gain, damping = motor
+    test = tl.Test(PLANNER.family, genes, TASK.initial_state, TASK.target_state, STEPS, excitation)
+    controller = test.controller()
+    controller.reset()
+    states, readings, commands = [np.array(TASK.initial_state)], [], []
+    for k in range(STEPS):
+        readings.append(states[-1] + noise[k])
+        (torque,) = controller.command(readings[-1], test.target_state)
+        states.append(
+            rk4(lambda x, u=torque: np.array([x[1], gain * u - damping * x[1]]), states[-1], KNOWN.dt)
+        )
+        commands.append([torque])
+    return np.array(states), np.array([*readings, states[-1] + noise[STEPS]]), np.array(commands)
+
+
+def judged(drawn, noises, measured, motors=MOTORS):
+    """Qualities and usages of the envelope (members, draws, candidates), flight by flight."""
+    times, bounds = KNOWN.dt * np.arange(STEPS + 1), [0.9, 1.5]
+    shape = len(motors), len(noises), len(drawn.genes)
+    qualities, usages = np.empty(shape), np.empty(shape)
+    for place in np.ndindex(shape):
+        m, d, k = place
+        excitation = drawn.excitation[k] if drawn.excitation[k].any() else None
+        states, readings, commands = flight(motors[m], drawn.genes[k], excitation, noises[d])
+        flown = tl.Trajectory(times, readings if measured else states, commands)
+        qualities[place] = PLANNER.quality.flown(flown, TASK.target_state)
+        usages[place] = np.abs(states / bounds).max()
+    return qualities, usages
+
+
+QUIET = np.zeros((1, STEPS + 1, 2))
+
+
+def test_every_candidate_is_flown_on_every_member():
+    drawn = drafts()
+    qualities, usages = judged(drawn, QUIET, measured=False)
+    found = compared(drawn=drawn).quiet
+    np.testing.assert_allclose(found.qualities, qualities, rtol=1e-9)
+    np.testing.assert_allclose(found.usages, usages, rtol=1e-9)
+
+
+@pytest.mark.parametrize("sds", [(1e-3, 5e-3), (0.2, 1.0)], ids=["calm sensors", "loud sensors"])
+@pytest.mark.parametrize("good", [0.5, 3.0])
+@pytest.mark.parametrize("number", [3, 4])
+def test_for_the_model_the_flight_that_tells_most_of_those_that_last_is_chosen(number, good, sds):
+    flown, committee = replace(FLOWN, good=good), replace(COMMITTEE, sds=np.array(sds))
+    drawn = drafts(flown, number=number)
+    quiet, usage = judged(drawn, QUIET, measured=False)
+    noisy, shaken = judged(drawn, PLANNER.noise(committee.sds, DRAWS), measured=True)
+    options = PLANNER.options
+    # One for the model may cost what the best flight has cost and a little, or as much again as is promised.
+    most = max((1.0 + options.worse) * good, 2.0 * quiet[:, 0, 0].mean())
+    # It goes no further than the first flight has, somewhat more, nor beyond the margin.
+    reach = max(min(options.reach_far, options.reach_growth * 0.7), options.reach_least, 0.7)
+    found = compared(committee, flown, number=number, drawn=drawn)
+    lasts = [
+        k
+        for k in range(1, len(drawn.genes))
+        if usage[:, 0, k].max() <= min(reach, 1.0 - options.margin)
+        and quiet[:, 0, k].mean() <= most
+        and shaken[:, :, k].max() <= 1.0
+        and noisy[:, :, k].mean() <= most
+    ]
+    assert 1 < len(lasts) < len(drawn.genes) - 1
+    best = max(lasts, key=lambda k: found.tells[k])
+    proposal = found.proposal()
+    assert same_bits(proposal.genes, drawn.genes[best]) and same_bits(
+        proposal.excitation, drawn.excitation[best]
+    )
+    assert proposal.predicted == pytest.approx(noisy[:, :, best].mean(), rel=1e-9)
+    assert proposal.spread == pytest.approx(noisy[:, :, best].std(), rel=1e-6)
+    assert proposal.risk == pytest.approx(0.5 / (len(MOTORS) * DRAWS + 1.0)) and proposal.safe
+
+
+@pytest.mark.parametrize("goal", ["both", "control"])
+def test_the_tuned_gains_are_flown_where_they_are_wanted_and_nothing_that_costs_more_otherwise(goal):
+    drawn = drafts(goal=goal)
+    quiet, _ = judged(drawn, QUIET, measured=False)
+    assert same_bits(compared(goal=goal, drawn=drawn, exploit=True).proposal().genes, TUNED)
+    other = compared(goal=goal, drawn=drawn).proposal()
+    (chosen,) = [k for k in range(len(drawn.genes)) if same_bits(drawn.excitation[k], other.excitation)]
+    promised, worse = quiet[:, 0, 0].mean(), PLANNER.options.worse
+    assert chosen > 0 and quiet[:, 0, chosen].mean() <= (1.0 + worse) * min(promised, FLOWN.good)
+
+
+def test_what_is_gained_by_knowing_the_right_member_is_the_expected_value_of_perfect_information():
+    apart = replace(
+        COMMITTEE, members=[member(KNOWN, gain, damping) for gain, damping in ((0.5, 0.0), (2.5, 1.0))]
+    )
+    found = compared(apart)
+    choices = found.quiet.qualities[:, 0, found.keeps]
+    # Whoever knew which member is right would fly the best for it; who does not flies the best on average.
+    known = np.mean([min(row) for row in choices])
+    assert found.gain == pytest.approx(min(choices.mean(axis=0)) - known) and found.gain > 1e-4
+
+
+@pytest.mark.parametrize("flies", [True, False])
+def test_where_the_committee_is_not_trusted_the_flight_that_uses_least_of_the_envelope_is_chosen(flies):
+    distrusted = replace(COMMITTEE, trusted=False)
+    # Lazy gains use no more of the envelope than the start does.
+    flown = replace(FLOWN, flies=flies, best=np.array([0.1, 0.0, 3.0]))
+    drawn = drafts(flown, trusted=False)
+    usage = judged(drawn, QUIET, measured=False)[1].max(axis=(0, 1))
+    # What flies is flown again, in one way or another; gains that do not are left alone.
+    among = [k for k in range(len(usage)) if (k >= drawn.repeats) == flies]
+    best = min(among, key=lambda k: usage[k])
+    proposal = compared(distrusted, flown, drawn=drawn).proposal()
+    sent = np.zeros((STEPS, 1)) if proposal.excitation is None else proposal.excitation
+    assert same_bits(proposal.genes, drawn.genes[best]) and same_bits(sent, drawn.excitation[best])
+
+
+def test_gains_close_to_some_that_failed_are_not_flown_again():
+    flown = replace(FLOWN, failed=[TUNED])
+    found = compared(flown=flown, exploit=True, goal="both")
+    places = PLANNER.family.to_unit(found.drafts.genes)
+    off = np.abs(places - PLANNER.family.to_unit(TUNED)).max(axis=1)
+    assert found.possible.tolist() == (off > 0.02).tolist() and not found.possible[0]
+    assert np.abs(PLANNER.family.to_unit(found.proposal().genes) - PLANNER.family.to_unit(TUNED)).max() > 0.02
+
+
+def test_where_every_candidate_is_close_to_a_failure_the_safest_of_them_is_still_offered():
+    drawn = drafts()
+    flown = replace(FLOWN, failed=list(drawn.genes))
+    found = compared(flown=flown, drawn=drawn)
+    assert found.possible.all() and np.isfinite(found.proposal().predicted)
+
+
+def test_a_member_that_diverges_whatever_is_flown_has_no_say():
+    wild = replace(COMMITTEE, members=[*COMMITTEE.members, member(KNOWN, -60.0, -40.0)])
+    with_it, without = compared(wild), compared()
+    assert len(with_it.members) == len(without.members) == 3
+    one, other = with_it.proposal(), without.proposal()
+    assert same_bits(one.genes, other.genes) and same_bits(one.excitation, other.excitation)
+
+
+def keeping(usage):
+    """Which candidates stay within what may be used after a flight that has used 70 %, by usages on each member."""
+    reach = min(
+        max(PLANNER.options.reach_first, PLANNER.options.reach_growth * 0.7), 1.0 - PLANNER.options.margin
+    )
+    return usage.max(axis=(0, 1)) <= reach
+
+
+def test_a_plain_flight_is_the_one_that_promises_most_beside_the_tuned_one_that_was_passed_over():
+    drawn = drafts().quiet()
+    first = int(np.argmin(judged(drawn, QUIET, measured=False)[0].mean(axis=(0, 1))))
+    genes = drawn.genes.copy()
+    genes[[0, first]] = genes[[first, 0]]
+    drawn = replace(drawn, genes=genes)
+    quiet, usage = judged(drawn, QUIET, measured=False)
+    mean, keeps = quiet.mean(axis=(0, 1)), usage.max(axis=(0, 1)) <= 0.7
+    best = min(np.flatnonzero(keeps)[1:], key=lambda k: mean[k])
+    found = compared(drawn=drawn, plain=True)
+    assert keeps[0] and mean[0] == mean.min() and found.tells[keeps].max() > found.tells[best]
+    proposal = found.proposal()
+    assert same_bits(proposal.genes, drawn.genes[best]) and proposal.excitation is None
+
+
+def test_where_no_flight_is_worth_what_it_costs_the_best_that_is_no_worse_than_was_flown_is_chosen_or_the_safest():
+    drawn = drafts(goal="control")
+    lazy = PLANNER.family.to_unit(np.array([0.5, 0.0, 1.0]))
+    others = np.linspace(np.add(lazy, [0.2, 0.1, 0.0]), lazy, len(drawn.genes) - 1)
+    drawn = replace(drawn, genes=np.concatenate([drawn.genes[:1], PLANNER.family.from_unit(others)]))
+    quiet, usage = judged(drawn, QUIET, measured=False)
+    mean = quiet.mean(axis=(0, 1))
+    best = 1 + int(np.argmin(mean[1:]))
+    assert mean[best] > 1.2 * mean[0] and keeping(usage)[best]
+    enough, too_little = (replace(FLOWN, good=good) for good in (1.1 * mean[best], 0.5 * mean[0]))
+    found = compared(goal="control", flown=enough, drawn=drawn).proposal()
+    assert same_bits(found.genes, drawn.genes[best])
+    safest = drawn.repeats + int(np.argmin(usage.max(axis=(0, 1))[drawn.repeats :]))
+    assert safest != best
+    found = compared(goal="control", flown=too_little, drawn=drawn).proposal()
+    assert same_bits(found.genes, drawn.genes[safest])
+
+
+@pytest.mark.parametrize("flies", [True, False])
+def test_gains_that_have_not_flown_keep_the_envelope_with_more_delay_than_was_seen(flies):
+    quick = (4.0, 0.0)
+    delayed = replace(COMMITTEE, delayed=[member(KNOWN, *quick)])
+    flown = replace(FLOWN, flies=flies)
+    drawn = drafts(flown, goal="both")
+    bears = judged(drawn, QUIET, measured=False, motors=[quick])[1][0, 0] <= 1.0
+    bears[drawn.repeats :] |= flies
+    assert 0 < bears[: drawn.repeats].sum() < drawn.repeats
+    usage = judged(drawn, QUIET, measured=False)[1]
+    possible = flies | (np.arange(len(bears)) < drawn.repeats)
+    found = compared(delayed, flown, goal="both", drawn=drawn)
+    assert found.keeps.tolist() == (keeping(usage) & bears & possible).tolist()
