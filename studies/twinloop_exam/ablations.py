@@ -53,6 +53,7 @@ SMOKE_OPTIONS: dict[str, Mapping[str, object]] = {
         "moves": 500,
         "starts": 1,
         "contacts": False,
+        "friction": False,
         "lags": False,
         "hidden": False,
         "parts": False,

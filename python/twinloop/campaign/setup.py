@@ -64,6 +64,8 @@ class Setup(Recorded, kind="setup"):
     goal: str
     quality: Quality
 
+    VERSION = 2
+
     @cached_property
     def task(self) -> _core.Task:
         """Start, target and length, for the native engine."""
@@ -113,6 +115,14 @@ class Setup(Recorded, kind="setup"):
             "goal": self.goal,
             "quality": self.quality.kind,
         }
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of the first version, in which contacts were searched with dry friction or not at all."""
+        options = record.get("options")
+        if isinstance(options, Mapping) and "contacts" in options:
+            record = {**record, "options": {"friction": options["contacts"], **options}}
+        return record
 
     @classmethod
     def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Setup:

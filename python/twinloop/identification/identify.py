@@ -121,7 +121,7 @@ def identify_runs(
         watch=watch,
     )
     if under_way is None:
-        context = cleaned(context)
+        context = cleaned(context) if options.cleaning else context
         form, said = likeliest(context)
         under_way = UnderWay(tuple(context.runs), form, tuple(said))
         keep(under_way)

@@ -76,8 +76,59 @@ class Learner:
         """
         told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
         needed = () if asked is None else knowledge.needed_factors(asked)
+        answer = self._of_all_flights(book, asked, under_way, keep)
+        if not answer.explained and self.options.earlier_twin and asked is not None:
+            answer = self._or_known_before(answer, asked, book)
+        if not answer.explained and self.options.plain != self.options:
+            answer = self._or_rough(answer, book)
+        identified, lesson = answer.identified, self._lesson(answer, book)
+        before, models, ensembles = (
+            ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
+        )
+        learnt = Learnt(
+            told,
+            identified,
+            answer.believed,
+            answer.follows,
+            needed,
+            (*before, lesson),
+            models=(*models, identified.model),
+        )
+        return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
+
+    def _of_all_flights(
+        self,
+        book: Logbook,
+        asked: Learnt | None,
+        under_way: UnderWay | None,
+        keep: Callable[[UnderWay], None],
+    ) -> Answer:
+        """What all flights teach, beside what was known."""
+        earlier = None if asked is None else asked.identified
+        identified = self._identified_from(book)(
+            self.options, iteration=len(book.experiments), earlier=earlier, under_way=under_way, keep=keep
+        )
+        return self._answered(identified, book)
+
+    def _or_known_before(self, answer: Answer, asked: Learnt, book: Logbook) -> Answer:
+        """What was known before the last flights, where it explains all of them: it has not learnt the last."""
+        known = self._answered(as_known_before(asked.identified), book)
+        return known if known.explained else answer
+
+    def _or_rough(self, answer: Answer, book: Logbook) -> Answer:
+        """What a law of linear terms makes of the flights, where it follows them, and better than the answer does.
+
+        What is too coarse for a simulator may still tell better gains from worse.
+        """
+        plain = self._identified_from(book)(self.options.plain, iteration=PLAIN + len(book.experiments))
+        rough = self._answered(with_remark(plain, ROUGH), book)
+        better = rough.follows and (not answer.follows or rough.worst < answer.worst)
+        return rough if better else answer
+
+    def _identified_from(self, book: Logbook) -> partial[Identified]:
+        """The identification of the flights that are learnt from; what it lacks are options and a number."""
         flights = learnt_from(book.experiments, self.options.most_readings)
-        identified_from = partial(
+        return partial(
             identify_runs,
             [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
             self.setup.signals,
@@ -86,40 +137,10 @@ class Learner:
             workers=self.workers,
             watch=self.watch,
         )
-        identified = identified_from(
-            self.options,
-            iteration=told,
-            earlier=None if asked is None else asked.identified,
-            under_way=under_way,
-            keep=keep,
-        )
-        answered = partial(Answer.of, flights=book.experiments, setup=self.setup, workers=self.workers)
-        answer = answered(identified)
-        if not answer.explained and asked is not None:
-            # It has not learnt the flights since: where it explains all of them, it knows more.
-            known = answered(as_known_before(asked.identified))
-            answer = known if known.explained else answer
-        if not answer.explained and self.options.plain != self.options:
-            # What is too coarse for a simulator may still tell better gains from worse.
-            plain = identified_from(self.options.plain, iteration=PLAIN + told)
-            rough = answered(with_remark(plain, ROUGH))
-            if rough.follows and (not answer.follows or rough.worst < answer.worst):
-                answer = rough
-        identified, follows = answer.identified, answer.follows
-        lesson = self._lesson(answer, book)
-        before, models, ensembles = (
-            ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
-        )
-        learnt = Learnt(
-            told,
-            identified,
-            answer.believed,
-            follows,
-            needed,
-            (*before, lesson),
-            models=(*models, identified.model),
-        )
-        return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
+
+    def _answered(self, identified: Identified, book: Logbook) -> Answer:
+        """What was identified, held against all flights."""
+        return Answer.of(identified, book.experiments, self.setup, self.options, self.workers)
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""

@@ -233,7 +233,7 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        confirmed = nearly_confirmed(book.experiments)
+        confirmed = not self.options.delay_margin or nearly_confirmed(book.experiments)
         slower = [] if confirmed else [delayed(latest.believed[0], self.setup.signals)]
         return Committee(latest.believed, sensors, latest.follows, delayed=slower)
 
