@@ -7,13 +7,13 @@ import pytest
 
 import twinloop as tl
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.records import Run
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import ANEW, begun
-from twinloop._ground.streams import Unit
 
 DT, NOISE, WRONG = 0.05, 0.01, 70
 SIGNALS = tl.Signals([tl.State("speed", "m/s", 2.0)], [tl.Command("u", "1", (-1.0, 1.0), scale=1.0)], DT)
