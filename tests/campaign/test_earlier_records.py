@@ -14,6 +14,7 @@ from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS
 from sameness import through_json
 from twinloop.campaign.setup import Setup
+from twinloop.identification.search.structure import Sum
 
 EARLIER = Path(__file__).parent / "earlier"
 LAWS = {"default": "- 24.6074*sin(angle)", "paper": "521.991/(212.8*angle + 930.573)"}
@@ -32,6 +33,17 @@ def test_what_was_told_and_learnt_is_read(written):
     for experiment, run in zip(campaign.experiments, runs, strict=True):
         assert np.array_equal(experiment.trajectory.states, run["trajectory"]["states"])
     assert LAWS[campaign.setup.preset] in campaign.twin.equations()
+
+
+def test_subsets_that_had_no_names_are_read():
+    written = json.loads((EARLIER / "default.json").read_text(encoding="utf-8"))
+    (before,) = written["memory"]["latest"]["identified"]["sums"]
+    found = Sum.from_record(before)
+    assert len(found.others) == len(before["others"]) > 0
+    for other, (terms, above) in zip(found.others, before["others"], strict=True):
+        assert other.terms == tuple(terms) and other.above == above
+    again = Sum.from_record(through_json(found.to_record()))
+    assert again.others == found.others and again.subsets[0].terms == tuple(found.weights)
 
 
 def test_it_goes_on_and_what_it_writes_now_is_read_again(written):

@@ -440,7 +440,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self._learn()
         known, book = self._method, self._book
         twins = known.twins_before(book)
-        errors = closed_loop([twin.model for _, twin in twins], book.selected, self._workers)
+        errors = closed_loop([before.twin.model for before in twins], book.selected, self._workers)
         return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals(book)))
 
     def checks(self) -> Checks:

@@ -76,11 +76,18 @@ class Learner:
         """
         told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
         needed = () if asked is None else knowledge.needed_factors(asked)
-        answer = self._of_all_flights(book, asked, under_way, keep)
-        if not answer.explained and self.options.earlier_twin and asked is not None:
-            answer = self._or_known_before(answer, asked, book)
+        identify = self._identification(book)
+        answered = partial(
+            Answer.of, flights=book.experiments, setup=self.setup, options=self.options, workers=self.workers
+        )
+        earlier = None if asked is None else asked.identified
+        answer = answered(
+            identify(self.options, iteration=told, earlier=earlier, under_way=under_way, keep=keep)
+        )
+        if not answer.explained and self.options.earlier_twin and earlier is not None:
+            answer = or_known_before(answer, earlier, answered)
         if not answer.explained and self.options.plain != self.options:
-            answer = self._or_rough(answer, book)
+            answer = or_rough(answer, partial(identify, self.options.plain, iteration=PLAIN + told), answered)
         identified, lesson = answer.identified, self._lesson(answer, book)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -96,37 +103,8 @@ class Learner:
         )
         return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
 
-    def _of_all_flights(
-        self,
-        book: Logbook,
-        asked: Learnt | None,
-        under_way: UnderWay | None,
-        keep: Callable[[UnderWay], None],
-    ) -> Answer:
-        """What all flights teach, beside what was known."""
-        earlier = None if asked is None else asked.identified
-        identified = self._identified_from(book)(
-            self.options, iteration=len(book.experiments), earlier=earlier, under_way=under_way, keep=keep
-        )
-        return self._answered(identified, book)
-
-    def _or_known_before(self, answer: Answer, asked: Learnt, book: Logbook) -> Answer:
-        """What was known before the last flights, where it explains all of them: it has not learnt the last."""
-        known = self._answered(as_known_before(asked.identified), book)
-        return known if known.explained else answer
-
-    def _or_rough(self, answer: Answer, book: Logbook) -> Answer:
-        """What a law of linear terms makes of the flights, where it follows them, and better than the answer does.
-
-        What is too coarse for a simulator may still tell better gains from worse.
-        """
-        plain = self._identified_from(book)(self.options.plain, iteration=PLAIN + len(book.experiments))
-        rough = self._answered(with_remark(plain, ROUGH), book)
-        better = rough.follows and (not answer.follows or rough.worst < answer.worst)
-        return rough if better else answer
-
-    def _identified_from(self, book: Logbook) -> partial[Identified]:
-        """The identification of the flights that are learnt from; what it lacks are options and a number."""
+    def _identification(self, book: Logbook) -> partial[Identified]:
+        """Identification of the flights that are learnt from; what it lacks are options and a number."""
         flights = learnt_from(book.experiments, self.options.most_readings)
         return partial(
             identify_runs,
@@ -137,10 +115,6 @@ class Learner:
             workers=self.workers,
             watch=self.watch,
         )
-
-    def _answered(self, identified: Identified, book: Logbook) -> Answer:
-        """What was identified, held against all flights."""
-        return Answer.of(identified, book.experiments, self.setup, self.options, self.workers)
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
@@ -194,6 +168,35 @@ class Learner:
             recurring=recurring,
             undecided=undecided,
         )
+
+
+def or_known_before(answer: Answer, earlier: Identified, answered: Callable[[Identified], Answer]) -> Answer:
+    """What was known before the last flights, where it explains all of them: it has not learnt the last.
+
+    Args:
+        answer: of what all flights teach, which does not.
+        earlier: what was known before the last of them.
+        answered: holds what was identified against all flights.
+    """
+    known = answered(as_known_before(earlier))
+    return known if known.explained else answer
+
+
+def or_rough(
+    answer: Answer, identify: Callable[[], Identified], answered: Callable[[Identified], Answer]
+) -> Answer:
+    """What a law of linear terms makes of the flights, where it follows them, and better than the answer does.
+
+    What is too coarse for a simulator may still tell better gains from worse.
+
+    Args:
+        answer: that does not explain all flights.
+        identify: such a law.
+        answered: holds what was identified against all flights.
+    """
+    rough = answered(with_remark(identify(), ROUGH))
+    better = rough.follows and (not answer.follows or rough.worst < answer.worst)
+    return rough if better else answer
 
 
 def as_known_before(identified: Identified) -> Identified:
