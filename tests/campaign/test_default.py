@@ -361,6 +361,13 @@ def test_the_last_experiment_of_a_budget_flies_the_best_gains_as_they_are(begin,
     assert not explored.experiments[1].test.reason.startswith("The best gains")
 
 
+@pytest.mark.parametrize("bears", [True, False])
+def test_gains_must_bear_more_delay_until_a_prediction_has_come_true(begin, pendulum, bears):
+    campaign = told(begin(options={"delay_margin": bears}), pendulum)
+    _ = campaign.twin
+    assert len(campaign._method._committee(campaign._book).delayed) == bears
+
+
 def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committee_with_parts(
     begin, pendulum
 ):

@@ -9,6 +9,7 @@ import twinloop as tl
 from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
+from twinloop.identification.fit import fitting
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.records import Run
 from twinloop.identification.search.selection import from_both_sides
@@ -57,3 +58,16 @@ def test_a_term_that_does_not_pay_is_dropped(run, drops):
     found = hypothesis_of(run, pruning=drops)
     assert (found.pool.one in found.sums[0].weights) is not drops
     assert len(found.sums[0].weights) == (2 if drops else 3)
+
+
+@pytest.mark.parametrize("drops", [True, False])
+def test_terms_are_held_against_the_readings_that_they_share(run, monkeypatch, drops):
+    asked = []
+
+    def supported(context, hypothesis):
+        asked.append(hypothesis)
+        return hypothesis
+
+    monkeypatch.setattr(fitting, "supported", supported)
+    hypothesis_of(run, support=drops)
+    assert bool(asked) is drops
