@@ -1,41 +1,131 @@
-"""The one table of what is switched off or changed in ours: a name, and options of the preset."""
+"""The one list of ablations: each idea of the preset `default` that can be switched off, and by what options."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
-ABLATIONS: dict[str, Mapping[str, object]] = {
-    "annealing": {"moves": 100, "starts": 1},
-    "ladder": {"libraries": ("linear", "quadratic", "damping")},
-    "directions": {"directions": False},
-    "evolution": {"generations": 0},
-    "parts": {"parts": False},
-    "tuning": {"tuning": False},
-    "second-pass": {"passes": 1},
-    "lags": {"lags": False},
-    "hidden": {"hidden": False},
-    "noise-from-above": {"noise_from_above": False},
-    "gusts": {"gusts": False},
-    "disturbance-price": {"price_disturbances": False},
-    "implicit": {"implicit": False},
-    "contacts": {"contacts": False},
-    "offsets": {"offsets": False},
-    "hold-back": {"hold_back": False},
-    "excitation": {"excitation": 0.0, "excitation_most": 0.0},
-    "committee": {"committee_size": 1, "tuning_members": 1},
-    "noise-draws": {"draws": 1},
-    "starts": {"tuning_starts": 1},
-}
-"""Each idea of the preset `default` switched off: name → options. Studied at k ≤ 2 with 10 seeds."""
+from twinloop.errors import unknown
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """One idea switched off.
+
+    Args:
+        without: what is switched off, for a table.
+        options: of the preset that do it.
+    """
+
+    without: str
+    options: Mapping[str, object]
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The options as they are written on the command line, name=value each."""
+        return tuple(f"{name}={_written(value)}" for name, value in self.options.items())
+
+
+def _written(value: object) -> str:
+    match value:
+        case bool():
+            return str(value).lower()
+        case float():
+            return f"{value:g}"
+        case tuple():
+            return ",".join(map(str, value))
+    return str(value)
+
 
 TEST_KINDS = ("random", "chirp", "prbs")
 """Same learner, other flights: values of the option `tests` beside "ask"."""
 
-LIBRARIES_OFF: Mapping[str, object] = {"libraries": ()}
-"""Evolved programs only: a column of every table."""
+ABLATIONS: dict[str, Ablation] = {
+    # How a twin is learnt
+    "kinematics": Ablation("derivatives and rigid bodies, even if declared", {"form": "increment"}),
+    "forms": Ablation("steps of Euler and increments beside derivatives", {"form": "acceleration"}),
+    "cleaning": Ablation("single wrong readings ignored before anything is learnt", {"cleaning": False}),
+    "outliers": Ablation("readings ignored that predictions miss by far", {"outliers": False}),
+    "offsets": Ablation("offsets of late or early sensors", {"offsets": False}),
+    "noise-from-above": Ablation("the search of the noise from above as well", {"noise_from_above": False}),
+    "gusts": Ablation("correlated disturbances, such as gusts", {"gusts": False}),
+    "disturbance-price": Ablation("a price on correlated disturbances", {"price_disturbances": False}),
+    "moderation": Ablation("a price on terms that are large and cancel", {"moderation": False}),
+    "undisturbed": Ablation("terms searched as if nothing disturbed, too", {"undisturbed": False}),
+    "annealing": Ablation(
+        "long walks over subsets of terms, and several of them", {"moves": 100, "starts": 1}
+    ),
+    "libraries": Ablation("libraries: evolved programs only", {"libraries": ()}),
+    "ladder": Ablation(
+        "the upper rungs of the ladder of libraries", {"libraries": ("linear", "quadratic", "damping")}
+    ),
+    "directions": Ablation("directions of alike commands, as one term", {"directions": False}),
+    "evolution": Ablation("evolved terms", {"generations": 0}),
+    "implicit": Ablation(
+        "quotients with a denominator of their own, joints that share masses", {"implicit": False}
+    ),
+    "contacts": Ablation("stops, play and what else begins at a place", {"contacts": False}),
+    "friction": Ablation("dry friction", {"friction": False}),
+    "lags": Ablation("lags and delays", {"lags": False}),
+    "apart": Ablation("lags of their own for alike commands", {"apart": False}),
+    "at-once": Ablation("lags dropped that tuning has shown to be nothing", {"at_once": False}),
+    "hidden": Ablation("a hidden state that commands fill", {"hidden": False}),
+    "tuning": Ablation("constants tuned on predictions", {"tuning": False}),
+    "pruning": Ablation("terms dropped whose constants are too uncertain to pay", {"pruning": False}),
+    "support": Ablation("terms dropped that share too few readings", {"support": False}),
+    "second-pass": Ablation("a second selection on smoothed states", {"passes": 1}),
+    "parts": Ablation("models of parts of a single flight", {"parts": False}),
+    "committee": Ablation("a committee: the best model only", {"committee_size": 1, "tuning_members": 1}),
+    "earlier-twin": Ablation(
+        "the earlier twin kept where the new one explains less", {"earlier_twin": False}
+    ),
+    "rough": Ablation("a law of linear terms where no other follows the flights", {"rough": False}),
+    "causes": Ablation("disturbances told from errors of the law", {"causes": False}),
+    "exactness": Ablation("the inaccuracy of a law told from disturbances", {"exactness": False}),
+    # How tests are chosen and gains tuned
+    "excitation": Ablation(
+        "excitation of the first flight and of all others", {"excitation": 0.0, "excitation_most": 0.0}
+    ),
+    "hold-back": Ablation("holding an excitation back in flight", {"hold_back": False}),
+    **{
+        f"{kind}-tests": Ablation(f"a committee that chooses the flights: {what} instead", {"tests": kind})
+        for kind, what in zip(TEST_KINDS, ("random gains", "chirps", "binary sequences"), strict=True)
+    },
+    "worth": Ablation("a price on what a flight tells, up to its worth", {"worth": False}),
+    "backtracking": Ablation("candidates on the way to the tuned gains", {"backtracking": False}),
+    "noise-draws": Ablation("sensor noise while gains are tuned", {"draws": 1}),
+    "members": Ablation("gains tuned on several members", {"tuning_members": 1}),
+    "starts": Ablation("several starts of the tuning of gains", {"tuning_starts": 1}),
+    "delay-margin": Ablation(
+        "one more period of delay until a prediction has come true", {"delay_margin": False}
+    ),
+    "track-record": Ablation(
+        "earlier predictions counted where a controller is chosen", {"track_record": False}
+    ),
+    "alone": Ablation("flown gains compared without their excitation", {"alone": False}),
+    "exploit-last": Ablation("a last flight that only exploits", {"exploit_last": False}),
+    "margin": Ablation("the margin of the envelope", {"margin": 0.0}),
+    "reach": Ablation("flights that stay near those flown before", {"reach_first": 1.0}),
+}
+"""By name."""
 
-NO_PRIOR: Mapping[str, object] = {"form": "increment", **LIBRARIES_OFF}
-"""Nothing is known of derivatives either."""
+
+def ablation(name: str) -> Ablation:
+    """One idea switched off.
+
+    Args:
+        name: of it.
+
+    Raises:
+        InvalidInput: an unknown name.
+    """
+    if name not in ABLATIONS:
+        raise unknown("ablation", name, ABLATIONS)
+    return ABLATIONS[name]
+
+
+NO_PRIOR: Mapping[str, object] = {**ABLATIONS["kinematics"].options, **ABLATIONS["libraries"].options}
+"""Nothing is known of derivatives, and terms are evolved only."""
 
 SMOKE_OPTIONS: dict[str, Mapping[str, object]] = {
     "paper": {
@@ -53,6 +143,7 @@ SMOKE_OPTIONS: dict[str, Mapping[str, object]] = {
         "moves": 500,
         "starts": 1,
         "contacts": False,
+        "friction": False,
         "lags": False,
         "hidden": False,
         "parts": False,

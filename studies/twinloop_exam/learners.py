@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict, replace
 
 from twinloop.errors import unknown
-from twinloop_exam.ablations import ABLATIONS, LIBRARIES_OFF, NO_PRIOR, SMOKE_OPTIONS, TEST_KINDS
+from twinloop_exam.ablations import ABLATIONS, NO_PRIOR, SMOKE_OPTIONS, TEST_KINDS
 from twinloop_exam.kinds import Campaigner, Fitter, Flyer, Learner, Optimum, Tuner
 
 VERSION = 1
@@ -75,16 +75,18 @@ _TUNERS = (
     Tuner("cma-es", "cma_es", {"step": 0.3}, "cmaes", grid={"step": (0.1, 0.2, 0.3, 0.5)}),
     Tuner("optuna-tpe", "tree_parzen", {"random": 15}, "optuna", grid={"random": (3, 5, 10, 15)}),
 )
+_IN_EVERY_TABLE = {"libraries": "ours-evolved", **{f"{kind}-tests": f"ours-{kind}" for kind in TEST_KINDS}}
+"""Ablations that are measured as the preset itself is, and who they are then."""
 _CAMPAIGNERS = (
     Campaigner("ours", "default", experiments=10, longer={"quadrotor": 20}),
     Campaigner("ours-model", "default", arguments={"goal": "model"}),
     Campaigner("ours-control", "default", arguments={"goal": "control"}),
-    Campaigner("ours-evolved", "default", LIBRARIES_OFF),
+    *(Campaigner(who, "default", ABLATIONS[name].options) for name, who in _IN_EVERY_TABLE.items()),
     Campaigner("ours-no-prior", "default", NO_PRIOR),
-    *(Campaigner(f"ours-{kind}", "default", {"tests": kind}) for kind in TEST_KINDS),
     *(
-        Campaigner(f"without-{name}", "default", options, experiments=2)
-        for name, options in ABLATIONS.items()
+        Campaigner(f"without-{name}", "default", each.options, experiments=2)
+        for name, each in ABLATIONS.items()
+        if name not in _IN_EVERY_TABLE
     ),
     Campaigner("paper", "paper", {"model_generations": 1000}, seconds=5.0),
 )

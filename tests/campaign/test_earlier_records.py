@@ -11,8 +11,10 @@ import pytest
 
 import twinloop as tl
 from conftest import pendulum_step
-from lives import SIGNALS
+from lives import CONTROLLER, SIGNALS
 from sameness import through_json
+from twinloop.campaign.setup import Setup
+from twinloop.identification.search.structure import Sum
 
 EARLIER = Path(__file__).parent / "earlier"
 LAWS = {"default": "- 24.6074*sin(angle)", "paper": "521.991/(212.8*angle + 930.573)"}
@@ -33,6 +35,17 @@ def test_what_was_told_and_learnt_is_read(written):
     assert LAWS[campaign.setup.preset] in campaign.twin.equations()
 
 
+def test_subsets_that_had_no_names_are_read():
+    written = json.loads((EARLIER / "default.json").read_text(encoding="utf-8"))
+    (before,) = written["memory"]["latest"]["identified"]["sums"]
+    found = Sum.from_record(before)
+    assert len(found.others) == len(before["others"]) > 0
+    for other, (terms, above) in zip(found.others, before["others"], strict=True):
+        assert other.terms == tuple(terms) and other.above == above
+    again = Sum.from_record(through_json(found.to_record()))
+    assert again.others == found.others and again.subsets[0].terms == tuple(found.weights)
+
+
 def test_it_goes_on_and_what_it_writes_now_is_read_again(written):
     campaign = tl.Campaign.from_record(written, threads=1)
     again = tl.Campaign.from_record(through_json(campaign.to_record()), threads=1)
@@ -47,3 +60,17 @@ def test_an_unknown_key_of_an_earlier_version_is_refused_by_its_name(written):
     written["memory"]["latest"]["luck"] = 1.0
     with pytest.raises(tl.InvalidInput, match="luck"):
         tl.Campaign.from_record(written)
+
+
+@pytest.mark.parametrize("contacts", [True, False])
+def test_where_contacts_were_not_searched_dry_friction_was_not_either(contacts):
+    campaign = tl.Campaign(
+        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0,
+    )  # fmt: skip
+    record = campaign.setup.to_record()
+    record |= {"version": 1, "options": {**record["options"], "contacts": contacts}}
+    del record["options"]["friction"]
+    found = Setup.from_record(record)
+    assert found.options.contacts is found.options.friction is contacts
+    again = Setup.from_record(through_json(found.to_record()))
+    assert again.options == found.options

@@ -23,7 +23,7 @@ from twinloop.faces.figures.svg import drawing, panel_svg
 from twinloop.faces.report.moot import moot
 from twinloop.faces.report.page import report_page
 from twinloop.faces.report.source import OWN
-from twinloop.faces.report.tables import margins as margins_table
+from twinloop.faces.report.tables.controller import margins as margins_table
 from twinloop.faces.report.verdict import of_next
 from twinloop.faces.result import summary
 from twinloop.records import to_text

@@ -21,7 +21,7 @@ from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
-from twinloop.identification.search.structure import Sum
+from twinloop.identification.search.structure import Other, Sum
 from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
@@ -397,7 +397,7 @@ def test_what_was_identified_of_other_signals_is_refused(pendulum_signals, quadr
     chain = Chain((1, 0), 0, "acceleration", np.ones(2), np.ones(2))
     model = _core.Model(program, "acceleration", pendulum_signals.engine)
     direct = Actuation.direct(pendulum_signals)
-    sums = [Sum({0: 1.0}, 2.0, chain, [((0,), 1.0)])]
+    sums = [Sum({0: 1.0}, 2.0, chain, [Other((0,), 1.0)])]
     whole = Identified(model, [model], pool, sums, [chain], direct, np.zeros(2), 1.0, 2, 0, 3.0)
     assert same(again(whole, pendulum_signals), whole)
     with pytest.raises(tl.InvalidInput):

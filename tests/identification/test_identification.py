@@ -387,8 +387,8 @@ def test_terms_that_exact_runs_cannot_tell_apart_are_left_out():
     both, prices_ = [(0, 1, 3), (1, 4)], np.ones(6)
     assert all(gram.solve(list(subset)) is None for subset in both)
     found = all_judged(gram, both, prices_, {})
-    assert {subset for subset, *_ in found} == {(0, 1), (1,)}
-    assert all_judged(gram, [*both, (2,)], prices_, {})[0][0] == (2,)
+    assert {judged.features for judged in found} == {(0, 1), (1,)}
+    assert all_judged(gram, [*both, (2,)], prices_, {})[0].features == (2,)
 
 
 def test_where_nothing_drives_a_state_but_noise_no_term_does():

@@ -65,6 +65,17 @@ def test_one_of_thirty_readings_that_is_wrong_spoils_nothing(size):
         np.testing.assert_allclose(linear.B, [[GAIN]], rtol=0.05)
 
 
+def test_who_switches_all_cleaning_off_ignores_nothing():
+    states, commands = heated(4)
+    states[12] -= 15.0 * NOISE
+    off = {"cleaning": False, "outliers": False}
+    twin = tl.identify(
+        [tl.Trajectory(SIGNALS.dt * np.arange(31), states, commands)], SIGNALS, seed=0, options=off
+    )
+
+    assert not any(remark.code == "outliers" for remark in twin.remarks)
+
+
 def test_clean_readings_are_all_kept():
     for seed in range(3):
         states, commands = heated(seed)

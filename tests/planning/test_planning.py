@@ -427,6 +427,9 @@ def test_where_the_tuned_gains_go_further_than_is_believed_some_on_the_way_to_th
     found = proposed(planner, committee, far, best=near, good=slow, usages=[0.3])
     assert found.safe and found.predicted < 0.8 * slow
     assert usages(planner, committee, found).max() <= planner.options.reach_first
+    straight = planner_of(known, candidates=256, nearness=0.01, backtracking=False)
+    found = proposed(straight, committee, far, best=near, good=slow, usages=[0.3])
+    assert "again" in found.reason and found.genes.tobytes() == near.tobytes()
 
 
 def test_gains_that_fly_again_are_excited_more_each_time_up_to_a_limit():

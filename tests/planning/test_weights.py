@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import twinloop as tl
 from lives import CONTROLLER, SIGNALS, SMALL, lived
 from twinloop.faces.cli import main
-from twinloop.faces.report.tables import gains
+from twinloop.faces.report.tables.controller import gains
 from twinloop.faces.result import summary
 from twinloop.faces.text import counted, render
 from twinloop.planning.quality import KINDS, quality_of, weights_of

@@ -1,5 +1,7 @@
 """What a flight may cost: the value of information, and no more than a share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,3 +43,9 @@ def test_members_are_apart_by_the_share_in_the_middle():
 )
 def test_a_flight_may_cost_what_it_is_worth(promised, good, to_task, unknown, scatter, most):
     assert limit(promised, good, to_task, unknown, scatter, OPTIONS) == pytest.approx(most)
+
+
+def test_without_a_worth_every_flight_may_cost_the_share():
+    free = replace(OPTIONS, worth=False)
+    assert limit(2.0, 9.0, 0.0, 0.0, 0.0, free) == pytest.approx(2.1)
+    assert limit(2.0, 1.8, 0.0, 0.0, 0.0, free) == pytest.approx(1.89)

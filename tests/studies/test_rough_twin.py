@@ -5,6 +5,7 @@ import warnings
 import pytest
 
 import twinloop as tl
+from twinloop.campaign.presets import options_of
 from twinloop_exam.zoo.plants import plant
 
 
@@ -37,3 +38,9 @@ def test_it_has_linear_terms_only(learnt):
     _, campaign, _ = learnt
     law = campaign.twin.equations(4).partition("d motor_rate / dt")[2]
     assert "*" in law and not any(word in law for word in ("**", "Max", "abs", "motor*", "sqrt"))
+
+
+def test_where_it_is_not_asked_for_none_is_learnt():
+    asked, not_asked = (options_of("default", {"rough": rough}) for rough in (True, False))
+    assert asked.plain != asked and asked.plain.libraries == ("linear",)
+    assert not_asked.plain == not_asked

@@ -31,7 +31,7 @@ from twinloop.campaign.persistence import Persistent
 from twinloop.campaign.presets import AnyOptions
 from twinloop.campaign.ranking import ranked
 from twinloop.campaign.reporting import plots, reported
-from twinloop.campaign.setup import checked, refuse_arguments
+from twinloop.campaign.setup import Choices, Flights, checked, refuse_arguments
 from twinloop.campaign.taking_away import taken_controller, taken_twin
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable
@@ -104,11 +104,9 @@ class Campaign(Shown, Persistent, kind="campaign"):
         **other: object,
     ) -> None:
         refuse_arguments("Campaign", other, list(signature(Campaign).parameters)[:-1])
-        setup = checked(
-            signals, controller, initial_state, target_state, duration, preset, options, seed, goal, quality,
-            operators, weights,
-        )  # fmt: skip
-        self._begin(setup, threads, progress)
+        flights = Flights(signals, controller, initial_state, target_state, duration)
+        choices = Choices(preset, options, seed, goal, quality, operators, weights)
+        self._begin(checked(flights, choices), threads, progress)
         if store is not None:
             self._open(store, name)
 
@@ -442,7 +440,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self._learn()
         known, book = self._method, self._book
         twins = known.twins_before(book)
-        errors = closed_loop([twin.model for _, twin in twins], book.selected, self._workers)
+        errors = closed_loop([before.twin.model for before in twins], book.selected, self._workers)
         return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals(book)))
 
     def checks(self) -> Checks:

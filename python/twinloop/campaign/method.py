@@ -9,6 +9,7 @@ from twinloop import _core
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.rivals import Rival
+from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.history import Iteration, Lesson
 from twinloop.campaign.logbook import Logbook
 from twinloop.law.twin import Twin
@@ -94,8 +95,8 @@ class Method(Protocol):
         """The best model when the last test was asked for; None before."""
         ...
 
-    def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
-        """Earlier twins, the oldest first, with how many of the first experiments each had learnt."""
+    def twins_before(self, book: Logbook) -> tuple[TwinBefore, ...]:
+        """Earlier twins, the oldest first."""
         ...
 
     def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:

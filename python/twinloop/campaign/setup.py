@@ -64,6 +64,8 @@ class Setup(Recorded, kind="setup"):
     goal: str
     quality: Quality
 
+    VERSION = 2
+
     @cached_property
     def task(self) -> _core.Task:
         """Start, target and length, for the native engine."""
@@ -115,46 +117,44 @@ class Setup(Recorded, kind="setup"):
         }
 
     @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of the first version, in which contacts were searched with dry friction or not at all."""
+        options = record.get("options")
+        if isinstance(options, Mapping) and "contacts" in options:
+            record = {**record, "options": {"friction": options["contacts"], **options}}
+        return record
+
+    @classmethod
     def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Setup:
         found = checked_record(record, cls, cls.recorded_fields(), where)
         signals = read(Signals, found["signals"], f"{where}.signals")
         steps = read(int, found["steps"], f"{where}.steps")
         if not 2 <= steps <= MOST_STEPS:
             raise InvalidInput(f"Record {where}.steps: expected 2 to {MOST_STEPS}, found {steps}.")
-        return checked(
+        flights = Flights(
             signals,
             read(UnboundFamily, found["controller"], f"{where}.controller"),
             read(Floats, found["initial_state"], f"{where}.initial_state"),
             read(Floats, found["target_state"], f"{where}.target_state"),
             steps * signals.dt,
+        )
+        choices = Choices(
             read(str, found["preset"], f"{where}.preset"),
             read(dict[str, Any], found["options"], f"{where}.options"),
             read(int, found["seed"], f"{where}.seed"),
             read(str, found["goal"], f"{where}.goal"),
             read(str, found["quality"], f"{where}.quality"),
-            None,
         )
+        return checked(flights, choices)
 
     def none_selected(self) -> _core.SelectedTests:
         """No tests yet, for the native engine."""
         return _core.SelectedTests(self.setting)
 
 
-def checked(
-    signals: object,
-    controller: object,
-    initial_state: ArrayLike,
-    target_state: ArrayLike | Callable[[float], ArrayLike],
-    duration: object,
-    preset: str,
-    options: Mapping[str, object] | None,
-    seed: object,
-    goal: str | None,
-    quality: str | None,
-    operators: Sequence[str] | None,
-    weights: Mapping[str, float] | None = None,
-) -> Setup:
-    """The arguments of a campaign, if they can be used.
+@dataclass(frozen=True, eq=False)
+class Flights:
+    """What is flown, as a campaign was given it: not checked yet.
 
     Args:
         signals: of the system.
@@ -163,6 +163,20 @@ def checked(
         target_state: (n_x,), the same units; or a reference that varies with time: a function of it in s, or a row for
             each period and one for the end.
         duration: of a test, s.
+    """
+
+    signals: object
+    controller: object
+    initial_state: ArrayLike
+    target_state: ArrayLike | Callable[[float], ArrayLike]
+    duration: object
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """How a campaign is to go about it, as it was given it: not checked yet.
+
+    Args:
         preset: name of a set of options.
         options: other values for some of them.
         seed: of all random numbers.
@@ -170,6 +184,23 @@ def checked(
         quality: what is minimised; None: the preset's.
         operators: that evolved programs may use; None: the preset's.
         weights: of states in the quality, by name, in place of 1 or 0; kept as the option `quality_weights`.
+    """
+
+    preset: str
+    options: Mapping[str, object] | None
+    seed: object
+    goal: str | None
+    quality: str | None
+    operators: Sequence[str] | None = None
+    weights: Mapping[str, float] | None = None
+
+
+def checked(flights: Flights, choices: Choices) -> Setup:
+    """The arguments of a campaign, if they can be used.
+
+    Args:
+        flights: what is flown.
+        choices: how the campaign is to go about it.
 
     Returns:
         The setup.
@@ -177,58 +208,72 @@ def checked(
     Raises:
         InvalidInput: one of them cannot be used.
     """
-    if not isinstance(signals, Signals):
-        raise InvalidInput(
-            f"Campaign, signals: expected twinloop.Signals, found {signals!r}; describe them first."
-        )
-    if not isinstance(controller, UnboundFamily):
-        raise InvalidInput(
-            "Campaign, controller: expected a family such as twinloop.controllers.PID, "
-            f"found {controller!r}; pass one."
-        )
-    steps = _steps(number("Campaign, duration (s)", duration, above=0.0), signals.dt)
-    start = floats("Campaign, initial_state", initial_state, (signals.n_x,))
-    rows = _sampled(target_state, signals, steps) if callable(target_state) else target_state
-    target = checked_target("Campaign, target_state", rows, signals.n_x, steps)
-    if preset == "paper" and not signals.difference(target, start).any():
+    signals, controller = _described(flights)
+    steps, start, target = _task(flights, signals)
+    if choices.preset == "paper" and not signals.difference(target, start).any():
         raise InvalidInput(
             "Campaign, target_state: expected a target away from the initial state, found both the same; "
             'the paper measures distances in that length, so move one of them, or choose preset="default".'
         )
-    known_seed = whole("Campaign, seed", seed)
-    if known_seed >= 2**64:
-        raise InvalidInput(f"Campaign, seed: expected less than 2**64, found {seed}; choose a smaller one.")
-    given = {} if options is None else options
-    changes = dict(given) if isinstance(given, Mapping) else given
-    if operators is not None and isinstance(changes, dict):
-        changes["operations" if preset == "paper" else "operators"] = operators
-    if weights and isinstance(changes, dict):
-        changes["quality_weights"] = _weighed(weights, signals, preset, quality, changes)
-    chosen = options_of(preset, changes)
-    purpose, measure = _purpose(preset, goal, quality, chosen, signals)
+    seed = whole("Campaign, seed", choices.seed)
+    if seed >= 2**64:
+        raise InvalidInput(
+            f"Campaign, seed: expected less than 2**64, found {choices.seed}; choose a smaller one."
+        )
+    options = options_of(choices.preset, _changes(choices, signals))
+    purpose, measure = _purpose(choices, options, signals)
     family = controller.bind(signals)
     setup = Setup(
-        signals, controller, family, start, target, steps, preset, chosen, known_seed, purpose, measure
+        signals, controller, family, start, target, steps, choices.preset, options, seed, purpose, measure
     )
     with engine_input():
         _ = setup.task  # the engine refuses now rather than after the first flight
-    for what, state in (("initial_state", start), *(("target_state", row) for row in np.atleast_2d(target))):
-        _check_reachable(f"Campaign, {what}", state, setup.limits)
-        if isinstance(chosen, DefaultOptions):
-            _check_inside(f"Campaign, {what}", state, signals, chosen.margin)
-    _check_use(chosen, signals)
+    _check_ends(setup)
+    _check_use(options, signals)
     return setup
 
 
+def _described(flights: Flights) -> tuple[Signals, UnboundFamily]:
+    """Signals and controllers, if they are such."""
+    if not isinstance(flights.signals, Signals):
+        raise InvalidInput(
+            f"Campaign, signals: expected twinloop.Signals, found {flights.signals!r}; describe them first."
+        )
+    if not isinstance(flights.controller, UnboundFamily):
+        raise InvalidInput(
+            "Campaign, controller: expected a family such as twinloop.controllers.PID, "
+            f"found {flights.controller!r}; pass one."
+        )
+    return flights.signals, flights.controller
+
+
+def _task(flights: Flights, signals: Signals) -> tuple[int, Floats, Floats]:
+    """Steps of a test, where it starts and where it should end."""
+    steps = _steps(number("Campaign, duration (s)", flights.duration, above=0.0), signals.dt)
+    start = floats("Campaign, initial_state", flights.initial_state, (signals.n_x,))
+    target = flights.target_state
+    rows = _sampled(target, signals, steps) if callable(target) else target
+    return steps, start, checked_target("Campaign, target_state", rows, signals.n_x, steps)
+
+
+def _changes(choices: Choices, signals: Signals) -> Mapping[str, object]:
+    """Options other than the preset's, with those that have an argument of their own."""
+    given = {} if choices.options is None else choices.options
+    if not isinstance(given, Mapping):
+        return given  # which is refused where options are read
+    changes = dict(given)
+    if choices.operators is not None:
+        changes["operations" if choices.preset == "paper" else "operators"] = choices.operators
+    if choices.weights:
+        changes["quality_weights"] = _weighed(choices.weights, signals, choices, changes)
+    return changes
+
+
 def _weighed(
-    weights: Mapping[str, float],
-    signals: Signals,
-    preset: str,
-    quality: str | None,
-    options: Mapping[str, Any],
+    weights: Mapping[str, float], signals: Signals, choices: Choices, options: Mapping[str, Any]
 ) -> tuple[float, ...]:
     """Weights by name as the option that holds them."""
-    if preset == "paper":
+    if choices.preset == "paper":
         raise InvalidInput(
             f"Campaign, weights: expected none with the preset 'paper', which weighs all states alike, found"
             f' {weights!r}; leave them out, or choose preset="default".'
@@ -237,7 +282,8 @@ def _weighed(
         raise InvalidInput(
             "Campaign: expected either weights or the option 'quality_weights', found both; leave one out."
         )
-    return tuple(weights_of("iae" if quality is None else quality, signals, weights).tolist())
+    quality = "iae" if choices.quality is None else choices.quality
+    return tuple(weights_of(quality, signals, weights).tolist())
 
 
 def _sampled(reference: Callable[[float], ArrayLike], signals: Signals, steps: int) -> Floats:
@@ -261,10 +307,9 @@ def _check_use(options: AnyOptions, signals: Signals) -> None:
             settings_of_tests(options)
 
 
-def _purpose(
-    preset: str, goal: str | None, quality: str | None, options: AnyOptions, signals: Signals
-) -> tuple[str, Quality]:
+def _purpose(choices: Choices, options: AnyOptions, signals: Signals) -> tuple[str, Quality]:
     """What flights are for and what is minimised; the paper knows one answer to each."""
+    goal, quality = choices.goal, choices.quality
     if isinstance(options, DefaultOptions):
         purpose = "both" if goal is None else goal
         kind = "iae" if quality is None else quality
@@ -290,10 +335,20 @@ def _purpose(
     for what, value, only in (("goal", goal, "both"), ("quality", quality, "final_distance")):
         if value not in (None, only):
             raise InvalidInput(
-                f"Campaign, {what}: expected {only!r} with the preset {preset!r}, found {value!r}; leave it out, or"
-                ' choose preset="default".'
+                f"Campaign, {what}: expected {only!r} with the preset {choices.preset!r}, found {value!r}; leave it"
+                ' out, or choose preset="default".'
             )
     return "both", quality_of("final_distance", signals)
+
+
+def _check_ends(setup: Setup) -> None:
+    """Refuses a start or target that cannot be flown from or to."""
+    ends = [("initial_state", setup.initial_state)]
+    ends += [("target_state", row) for row in np.atleast_2d(setup.target_state)]
+    for what, state in ends:
+        _check_reachable(f"Campaign, {what}", state, setup.limits)
+        if isinstance(setup.options, DefaultOptions):
+            _check_inside(f"Campaign, {what}", state, setup.signals, setup.options.margin)
 
 
 def _check_reachable(what: str, values: Floats, limits: Limits) -> None:

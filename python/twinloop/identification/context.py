@@ -10,9 +10,10 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
-from twinloop._ground.streams import Unit
+from twinloop._ground.streams import Purpose, Unit
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
+from twinloop.identification.search.walks import Walks
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals
@@ -72,6 +73,17 @@ class Context:
     def known_terms(self) -> list[int]:
         """Terms of what was learnt earlier."""
         return [] if self.earlier is None else [node for found in self.earlier.sums for node in found.weights]
+
+    def walks(self, unit: Unit, moves: int, starts: int = 1, purpose: Purpose = "subsets") -> Walks:
+        """Walks over subsets of as many terms as the options allow.
+
+        Args:
+            unit: of work.
+            moves: of each walk.
+            starts: walks for each chain.
+            purpose: of the random numbers.
+        """
+        return Walks(moves, self.options.largest, unit, starts, purpose)
 
     def first_pool(self) -> Pool:
         """A pool to begin with, nobody else's: what is entered in it does not change what was learnt earlier."""

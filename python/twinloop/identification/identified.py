@@ -82,7 +82,7 @@ class Identified(Recorded, kind="identified"):
         states = {
             state for chain in (*found.chains, *(sum_.chain for sum_ in found.sums)) for state in chain.states
         }
-        subsets = [subset for sum_ in found.sums for subset in (sum_.weights, *(s for s, _ in sum_.others))]
+        subsets = [subset.terms for sum_ in found.sums for subset in sum_.subsets]
         fits = (
             all(0 <= state < signals.n_x for state in states)
             and all(0 <= node < len(found.pool) for subset in subsets for node in subset)

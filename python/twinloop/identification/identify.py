@@ -124,7 +124,7 @@ def identify_runs(
         watch=watch,
     )
     if under_way is None:
-        context = cleaned(context)
+        context = cleaned(context) if options.cleaning else context
         form, said = likeliest(context)
         under_way = UnderWay(tuple(context.runs), form, tuple(said))
         keep(under_way)
@@ -165,24 +165,24 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
     best, signals = found.best, context.signals
     fit, sums = best.fit, list(best.sums)
     assert fit is not None  # `terms` and the starts see to it
-    members, observer, of_parts = committee(context, best, fit, found.rivals)
+    seated = committee(context, best, fit, found.rivals)
     # What parts have entered stays known.
     of_rivals = (rival.pool for rival in found.rivals if rival.of_part)
     pool = max((best.pool, *(pool for pool in of_rivals if pool.extends(best.pool))), key=len)
     driven = [chain.states[0] for chain in best.driven]
     return Identified(
-        model=members[0],
-        members=members,
+        model=seated.members[0],
+        members=seated.members,
         pool=pool,
         sums=sums,
-        chains=list(observer),
+        chains=list(seated.observer),
         actuation=best.actuation,
         offsets=best.offsets,
         chi_squared=fit.chi_squared,
         readings=fit.readings,
         outliers=int(sum((run.weights == 0.0).sum() for run in best.runs)),
         description_length=fit.length,
-        of_parts=of_parts,
+        of_parts=seated.of_parts,
         remarks=[
             *said,
             *remarks(best.runs, pool, signals, sums, fit.chi_squared, fit.readings),

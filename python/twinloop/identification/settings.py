@@ -53,20 +53,33 @@ class IdentificationOptions:
         price_disturbances: whether correlated disturbances that explain less than they cost are dropped in the end.
         moderation: whether terms have to pay for being much larger than all that moves a state, as those are that
             nearly cancel.
+        undisturbed: whether terms are also searched as if nothing disturbed, where something is believed to.
         implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
             masses.
-        contacts: whether what begins at a place, as the force of a stop or behind the play of a gear does, is searched,
-            and dry friction.
+        contacts: whether what begins at a place, as the force of a stop or behind the play of a gear does, is searched.
+        friction: whether dry friction is searched.
         lags: whether lags and delays of the actuators are searched.
+        at_once: whether a lag that tuning has shown to be nothing is dropped.
+        apart: whether commands of one unit and bounds may lag differently.
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
             replaced them.
         hidden: whether a hidden state that commands fill and that decays, such as a climb or heat, is searched.
         offsets: whether sensors may be late or early against those of the driven states.
+        cleaning: whether single readings that no motion has made are ignored before anything is learnt.
+        outliers: whether readings that the predictions of a tuned model miss by far are ignored.
         tuning: whether constants are tuned on predictions.
         tuning_steps: largest number of steps of the tuning.
+        pruning: whether terms are dropped whose tuned constants are too uncertain to pay for them.
+        support: whether terms are dropped that share too few readings with others.
         passes: number of selections of terms; from the second on with states that the model has smoothed.
         committee_size: models that judge tests, the best included.
         parts: whether, as long as there is one run, models of its parts are members too.
+        earlier_twin: whether the twin of before the last flights is kept where it follows them all and the new one does
+            not.
+        rough: whether a law with linear terms only is learnt, too, where no other follows the flights.
+        causes: whether what disturbs for long is told from an error of the law; otherwise all of it is taken to come
+            from outside.
+        exactness: whether what is no more than the inaccuracy of the law may be an error of it.
         divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
     """
 
@@ -90,17 +103,29 @@ class IdentificationOptions:
     gusts: bool = True
     price_disturbances: bool = True
     moderation: bool = True
+    undisturbed: bool = True
     implicit: bool = True
     contacts: bool = True
+    friction: bool = True
     lags: bool = True
+    at_once: bool = True
+    apart: bool = True
     longest_delay: int = 2
     hidden: bool = True
     offsets: bool = True
+    cleaning: bool = True
+    outliers: bool = True
     tuning: bool = True
     tuning_steps: int = 20
+    pruning: bool = True
+    support: bool = True
     passes: int = 2
     committee_size: int = 8
     parts: bool = True
+    earlier_twin: bool = True
+    rough: bool = True
+    causes: bool = True
+    exactness: bool = True
     divergence_factor: float = 10.0
 
     def form_for(self, signals: Signals) -> str:
@@ -111,8 +136,8 @@ class IdentificationOptions:
 
     @property
     def plain(self) -> IdentificationOptions:
-        """The same for a law with linear terms only; itself where those are not among its terms."""
-        if "linear" not in self.libraries:
+        """The same for a law with linear terms only; itself where such a one is not wanted, or cannot be."""
+        if not self.rough or "linear" not in self.libraries:
             return self
         return replace(
             self,
@@ -120,6 +145,7 @@ class IdentificationOptions:
             generations=0,
             implicit=False,
             contacts=False,
+            friction=False,
             hidden=False,
             parts=False,
         )

@@ -75,7 +75,7 @@ def candidates(
     places[: count // 4] = place
     if goal == "model":
         places[count // 2 :] = stream.uniforms(count - count // 2, family.size)
-    else:
+    elif options.backtracking:
         # Where the tuned gains go further than the committee is believed, some on the way to them do not.
         way = count - count // 4
         back = stream.uniforms(count - way)[:, np.newaxis]

@@ -23,7 +23,10 @@ class PlanningOptions:
             (n_x,), in the states' units; none: every test starts there.
         target_range: the same for the target.
         candidates: number of flights that are compared for each proposal.
+        backtracking: whether some candidates are on the way from the best gains flown to the tuned ones; not with the
+            goal "model".
         nearness: standard deviation of the candidates' gains around the tuned ones, in ranges of the gains.
+        worth: whether a test may be predicted worse only by what it may tell is worth; otherwise by the share `worse`.
         worse: largest share by which an informative test may be predicted worse than the tuned gains, and than the
             best flight so far.
         accuracy: requested relative accuracy of predicted qualities: the part of the members' spread above it counts
@@ -38,7 +41,11 @@ class PlanningOptions:
         evaluations: number of flights on which gains are tuned, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
+        delay_margin: whether gains are tuned on, and must bear, one more period of delay until a prediction has come
+            true.
         confidence: share of members and draws that must find new gains better than the best flown ones.
+        track_record: whether new gains must also be better by what earlier predictions were wrong.
+        alone: whether flown gains are compared without what the excitation of their flights has done.
         exploit_last: whether the last experiment of a budget flies the tuned gains without excitation.
         quality_weights: of the states in the quality (n_x,); none: the default weights.
         effort: weight of the commands' squares in the quality.
@@ -53,7 +60,9 @@ class PlanningOptions:
     initial_range: tuple[float, ...] = ()
     target_range: tuple[float, ...] = ()
     candidates: int = 1024
+    backtracking: bool = True
     nearness: float = 0.1
+    worth: bool = True
     worse: float = 0.05
     accuracy: float = 0.01
     draws: int = 16
@@ -65,7 +74,10 @@ class PlanningOptions:
     evaluations: int = 12_000
     tuning_starts: int = 3
     tuning_members: int = 4
+    delay_margin: bool = True
     confidence: float = 0.8
+    track_record: bool = True
+    alone: bool = True
     exploit_last: bool = True
     quality_weights: tuple[float, ...] = ()
     effort: float = 0.0

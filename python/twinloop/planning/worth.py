@@ -62,5 +62,6 @@ def limit(
     if not np.isfinite(promised):
         return most
     to_twin = max(0.0, unknown - options.accuracy) * promised
-    given = min(max(to_task + to_twin, scatter), options.worse * promised)
+    most_given = options.worse * promised
+    given = min(max(to_task + to_twin, scatter), most_given) if options.worth else most_given
     return min(promised + given, most)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -14,8 +14,10 @@ from twinloop.campaign import Campaign, controller_to_fly
 from twinloop.campaign.assessment import disturbances
 from twinloop.campaign.history import Lesson
 from twinloop.errors import RemarkWarning, SystemFailure, TwinloopError
+from twinloop.records import plain
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+from twinloop_exam.ablations import ablation
 from twinloop_exam.measures import violated
 from twinloop_exam.version import version
 from twinloop_exam.zoo import honesty
@@ -36,8 +38,9 @@ class Job:
         plant: its name.
         seed: of the campaign and of the sensors.
         flights: in all, the first included.
-        options: of the preset, other than its own; for smoke runs.
+        options: of the preset, other than its own; for smoke runs, and of the idea that is switched off.
         held_out: controllers that twins are judged on.
+        without: name of the ablation; nothing: the whole preset.
     """
 
     plant: str
@@ -45,11 +48,29 @@ class Job:
     flights: int = 5
     options: tuple[tuple[str, object], ...] = ()
     held_out: int = COUNT
+    without: str = ""
 
     @property
     def name(self) -> str:
         """What tells it from the others."""
-        return f"{self.plant}, seed {self.seed}"
+        return f"{self.plant}, seed {self.seed}" + (f", without {self.without}" if self.without else "")
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Its options by name, in plain types."""
+        return {name: plain(value) for name, value in self.options}
+
+    def ablated(self, name: str) -> Job:
+        """The same with one idea switched off.
+
+        Args:
+            name: of the ablation.
+
+        Raises:
+            InvalidInput: an unknown name.
+        """
+        options = {**dict(self.options), **ablation(name).options}
+        return replace(self, options=tuple(options.items()), without=name)
 
 
 def fly(job: Job) -> Measured:
@@ -66,6 +87,8 @@ def fly(job: Job) -> Measured:
         "plant": job.plant,
         "seed": job.seed,
         "flights_asked": job.flights,
+        "without": job.without,
+        "options": job.asked,
         "version": version(),
         "optimum": best_quality(plant),
         "optimum_under_noise": best_quality(plant, noisy=True),

@@ -14,9 +14,9 @@ from twinloop._ground.arrays import whole
 from twinloop.errors import InvalidInput, unknown
 from twinloop.sweep.progress import JobBar
 from twinloop.sweep.workers import HERE, finished, processes
-from twinloop_exam.ablations import SMOKE_OPTIONS
+from twinloop_exam.ablations import ABLATIONS, SMOKE_OPTIONS, ablation
 from twinloop_exam.tables import as_markdown, as_text
-from twinloop_exam.zoo import bars, results
+from twinloop_exam.zoo import ablated, bars, results
 from twinloop_exam.zoo.campaign import Job, Measured, fly
 from twinloop_exam.zoo.halves import HALVES
 from twinloop_exam.zoo.optima import FLIGHTS, STARTS, keep, optimum
@@ -39,6 +39,8 @@ FORMATS = {"text": as_text, "markdown": as_markdown}
     "--cluster", default=HERE, show_default=True, help="here, local:N, or a Dask scheduler's address."
 )
 @click.option("--table", "form", help=f"Only show what is there: {', '.join((*FORMATS, 'json'))}.")
+@click.option("--ablation", "without", metavar="NAMES",
+              help="Also without some ideas, comma-separated, or all: compared with the whole preset.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
 @click.option(
     "--optima", is_flag=True, help="Search the optima by CMA-ES instead, and write them to their file."
@@ -54,6 +56,7 @@ def zoo(
     folder: Path,
     cluster: str,
     form: str | None,
+    without: str | None,
     as_json: bool,
     optima: bool,
     smoke: bool,
@@ -62,17 +65,13 @@ def zoo(
     form = "json" if as_json else form
     if form is not None and form not in (*FORMATS, "json"):
         raise unknown("form of the tables", form, (*FORMATS, "json"))
+    ideas = _ablations(without)
     names = _chosen(half, plants, smoke)
     if optima:
         _search(names)
         return
-    flights = 2 if smoke else whole("--experiments", experiments, least=1)
-    options = tuple(SMOKE_OPTIONS["default"].items()) if smoke else ()
-    jobs = [
-        Job(name, seed, flights, options, *([4] if smoke else []))
-        for seed in (range(1) if smoke else _seeds(seeds))
-        for name in names
-    ]
+    jobs = _smoke_jobs(names) if smoke else _jobs(names, seeds, whole("--experiments", experiments, least=1))
+    jobs += [job.ablated(idea) for job in jobs for idea in ideas]
     with tempfile.TemporaryDirectory() as scratch:
         where = Path(scratch) if smoke else folder
         try:
@@ -82,23 +81,42 @@ def zoo(
             _say(f"Interrupted: what was finished is in {where}; the same command goes on from there.")
             context.exit(130)
         there = list(results.kept(jobs, where).values())
-    _show(there, half, form or "text")
+    _show(there, half, ideas, form or "text")
     failed = sum(one["failure"] is not None for one in there)
     if smoke:
         _say("A smoke run: the numbers mean nothing.")
     context.exit(1 if smoke and (failed or len(there) < len(jobs)) else 0)
 
 
-def _show(campaigns: Sequence[Measured], half: str | None, form: str) -> None:
-    if form == "json":
-        answer = {"half": half, "bars": bars.judged(campaigns), "worst": bars.worst(campaigns)}
-        click.echo(json.dumps(answer))
-        return
+def _jobs(names: Sequence[str], seeds: str, flights: int) -> list[Job]:
+    return [Job(name, seed, flights) for seed in _seeds(seeds) for name in names]
+
+
+def _smoke_jobs(names: Sequence[str]) -> list[Job]:
+    return [Job(name, 0, 2, tuple(SMOKE_OPTIONS["default"].items()), held_out=4) for name in names]
+
+
+def _show(campaigns: Sequence[Measured], half: str | None, ideas: Sequence[str], form: str) -> None:
     seeds = len({one["seed"] for one in campaigns})
     plants = len({one["plant"] for one in campaigns})
-    title = f"{half or 'both'}: {len(campaigns)} campaigns, {plants} plants, {seeds} seeds"
-    shown = [FORMATS[form](table) for table in bars.tables(title, campaigns) if table.rows]
-    click.echo("\n\n".join(shown))
+    if ideas:
+        rows = ablated.compared(ideas, campaigns)
+        answer = {
+            "half": half,
+            "plants": plants,
+            "seeds": seeds,
+            "versions": sorted({one["version"] for one in campaigns}),
+            "ablations": rows,
+        }
+        tables = [ablated.table(f"{half or 'both'}: {plants} plants, {seeds} seeds", rows)]
+    else:
+        answer = {"half": half, "bars": bars.judged(campaigns), "worst": bars.worst(campaigns)}
+        title = f"{half or 'both'}: {len(campaigns)} campaigns, {plants} plants, {seeds} seeds"
+        tables = bars.tables(title, campaigns)
+    if form == "json":
+        click.echo(json.dumps(answer))
+    else:
+        click.echo("\n\n".join(FORMATS[form](table) for table in tables if table.rows))
 
 
 def _work(jobs: Sequence[Job], folder: Path, cluster: str) -> None:
@@ -149,6 +167,18 @@ def _chosen(half: str | None, patterns: str | None, smoke: bool) -> list[str]:
         else:
             _say(f"Left out: {name}: {missing}")
     return there
+
+
+def _ablations(text: str | None) -> list[str]:
+    """Names of the ideas that are switched off, one at a time."""
+    if text is None:
+        return []
+    if text.strip() == "all":
+        return list(ABLATIONS)
+    names = [word.strip() for word in text.split(",")]
+    for name in names:
+        ablation(name)
+    return list(dict.fromkeys(names))
 
 
 def _seeds(text: str) -> range:

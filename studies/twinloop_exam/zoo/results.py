@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from twinloop.errors import InvalidInput
 from twinloop_exam.zoo.campaign import Job, Measured
@@ -15,7 +16,8 @@ from twinloop_exam.zoo.plants import plant
 
 def path_of(job: Job, folder: Path) -> Path:
     """Where a campaign is kept."""
-    return folder / f"{job.plant}-{job.seed}-{job.flights}.json"
+    without = f"-without-{job.without}" if job.without else ""
+    return folder / f"{job.plant}-{job.seed}-{job.flights}{without}.json"
 
 
 def keep(job: Job, measured: Measured, folder: Path) -> None:
@@ -25,6 +27,11 @@ def keep(job: Job, measured: Measured, folder: Path) -> None:
     unfinished = path.with_suffix(".part")
     unfinished.write_text(json.dumps(measured, indent=1) + "\n", "utf-8")
     os.replace(unfinished, path)
+
+
+def _which(found: Measured) -> tuple[Any, ...]:
+    """What tells a campaign from others; a file of before ablations is of the whole preset."""
+    return found.get("plant"), found.get("seed"), found.get("without", ""), found.get("options", {})
 
 
 def kept(jobs: Iterable[Job], folder: Path) -> dict[Job, Measured]:
@@ -51,9 +58,9 @@ def kept(jobs: Iterable[Job], folder: Path) -> dict[Job, Measured]:
             raise InvalidInput(
                 f"{path}: expected a campaign as JSON, found: {reason}; remove the file."
             ) from reason
-        if not isinstance(found, dict) or (found.get("plant"), found.get("seed")) != (job.plant, job.seed):
+        if not isinstance(found, dict) or _which(found) != (job.plant, job.seed, job.without, job.asked):
             raise InvalidInput(
-                f"{path}: expected the campaign {job.name}, found another one; remove the file."
+                f"{path}: expected the campaign {job.name}, found another one, or other options; remove the file."
             )
         of = plant(job.plant)
         # A better controller may have been found since it was flown.

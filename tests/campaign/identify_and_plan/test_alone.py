@@ -1,5 +1,7 @@
 """What flown gains are worth without the excitation of their flight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,8 @@ def test_the_share_is_that_of_the_system(learnt, pendulum):
     assert found == pytest.approx(qualities[0] / qualities[1], rel=0.02)
     assert abs(found - 1.0) > 0.05  # or it shows nothing
     assert share_of(method.planner, method._committee(learnt._book), quiet, 1) == 1.0
+    method.planner.options = replace(method.planner.options, alone=False)
+    assert share_of(method.planner, method._committee(learnt._book), excited, 1) == 1.0
 
 
 def test_gains_are_not_the_best_for_what_their_excitation_did(learnt):

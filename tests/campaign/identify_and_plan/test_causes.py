@@ -1,9 +1,15 @@
 """An error of the law comes again in flight after flight; gusts do not; what may be either is said to be."""
 
+from types import SimpleNamespace
+from unittest import mock
+
 import numpy as np
 import pytest
 
-from twinloop.campaign.identify_and_plan.causes import acts_in_motion, cause
+from twinloop.campaign.identify_and_plan import causes
+from twinloop.campaign.identify_and_plan.causes import acts_in_motion, cause, causes_of
+from twinloop.identification.sensors.chains import Chain, Motion
+from twinloop.identification.settings import IdentificationOptions
 
 STEPS = 300
 
@@ -117,3 +123,36 @@ def test_what_acts_in_motion_alone_is_found_though_each_flight_has_another(fligh
     assert found >= 55
     # By their products these are unrelated.
     assert cause([[gusts(flight, 5.0) * fast(flight) for flight in range(6)]]) == "disturbance"
+
+
+# What is switched off
+
+
+def causes_of_gusts(flights, size, options):
+    """The cause of gusts of such a size on a chain of a law that drives motions of variance 1, in some flights."""
+    signals = SimpleNamespace(n_x=1, difference=lambda one, other: one - other)
+    chain = Chain((0,), 0, "acceleration", np.full(1, 1e-8), np.full(1, 1e-8), Motion(0.0, size**2, 0.1))
+    told = [
+        SimpleNamespace(
+            test=SimpleNamespace(target_state=np.zeros(1)), trajectory=SimpleNamespace(states=free)
+        )
+        for free in (np.linspace(0.0, 1.0, STEPS)[:, np.newaxis] for _ in range(flights))
+    ]
+    seen = [(None, None, size * gusts(seed, 3.0, STEPS + 1)[:, np.newaxis]) for seed in range(flights)]
+    with mock.patch.multiple(
+        causes, observed=lambda *_: seen, runs_of=lambda *_: [], driven=lambda *_: np.ones(1),
+        distinct=lambda runs: runs, alone=lambda model, run, *_: run.trajectory.states + 0.1,
+    ):  # fmt: skip
+        identified = SimpleNamespace(chains=[chain], members=[None], model=None)
+        return causes_of(identified, told, signals, SimpleNamespace(signals=signals), options, None)
+
+
+def test_without_causes_all_that_disturbs_comes_from_outside():
+    assert causes_of_gusts(1, 1.0, IdentificationOptions()) == {0: "undecided"}
+    assert causes_of_gusts(1, 1.0, IdentificationOptions(causes=False)) == {0: "disturbance"}
+
+
+def test_without_exactness_the_smallest_gusts_come_from_outside_too():
+    assert causes_of_gusts(6, 1.0, IdentificationOptions()) == {0: "disturbance"}
+    assert causes_of_gusts(6, 0.01, IdentificationOptions()) == {0: "undecided"}
+    assert causes_of_gusts(6, 0.01, IdentificationOptions(exactness=False)) == {0: "disturbance"}

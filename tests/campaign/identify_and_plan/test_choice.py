@@ -21,6 +21,7 @@ from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
 from twinloop.planning.planner import Planner
+from twinloop.planning.settings import PlanningOptions
 
 FAMILY = CONTROLLER.bind(SIGNALS)
 FLOWN = tl.Test(FAMILY, np.array([2.0, 2.0, 0.3]), np.zeros(2), np.array([1.0, 0.0]), 20, number=0)
@@ -35,7 +36,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
-    experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN,
+    experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -56,7 +57,10 @@ def chosen(
         experiments=runs, tests=[FLOWN], setup=SimpleNamespace(signals=SIGNALS),
         of_task=lambda genes, number: tl.Test(FAMILY, genes, np.zeros(2), np.array([1.0, 0.0]), 20, number=number),
     )  # fmt: skip
-    planner = SimpleNamespace(family=FAMILY, judge=judge, stable_members=lambda members, genes: members)
+    planner = SimpleNamespace(
+        family=FAMILY, judge=judge, stable_members=lambda members, genes: members,
+        options=PlanningOptions(track_record=track_record),
+    )  # fmt: skip
     choice = Choice(planner, Committee([None], np.zeros(2), trusted), book, 4, confidence)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
@@ -132,6 +136,14 @@ def test_a_twin_that_has_promised_too_much_twice_must_promise_more_by_as_much():
     answer, reason = chosen(0.95, experiments=twice)
     assert answer == "flown" and "both by 6.4 % or more" in reason
     assert chosen(0.95, experiments=twice[:1])[0] == "tuned"
+
+
+def test_who_has_no_track_record_is_taken_at_his_word():
+    twice = [experiment(0.9, 1.0, 0.2), experiment(0.94, 1.0, 0.2)]
+    missed = [experiment(predicted=0.8, quality=1.0, spread=0.01)]
+    for against in ({"experiments": twice}, {"experiments": missed}, {"recorded": 1.1, "again": 1.2}):
+        assert chosen(0.95, **against)[0] == "flown"
+        assert chosen(0.95, **against, track_record=False)[0] == "tuned"
 
 
 @pytest.mark.parametrize(

@@ -361,6 +361,13 @@ def test_the_last_experiment_of_a_budget_flies_the_best_gains_as_they_are(begin,
     assert not explored.experiments[1].test.reason.startswith("The best gains")
 
 
+@pytest.mark.parametrize("bears", [True, False])
+def test_gains_must_bear_more_delay_until_a_prediction_has_come_true(begin, pendulum, bears):
+    campaign = told(begin(options={"delay_margin": bears}), pendulum)
+    _ = campaign.twin
+    assert len(campaign._method._committee(campaign._book).delayed) == bears
+
+
 def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committee_with_parts(
     begin, pendulum
 ):
@@ -404,8 +411,9 @@ def test_the_band_of_exact_readings_is_that_of_what_the_twin_leaves_of_the_fligh
     assert min(shares) > 0.5
 
 
-def test_where_more_flights_make_a_worse_twin_the_one_of_before_is_kept(begin, pendulum, monkeypatch):
-    campaign = told(begin(), pendulum)
+@pytest.mark.parametrize("keeps", [True, False])
+def test_where_more_flights_make_a_worse_twin_the_one_of_before_is_kept(begin, pendulum, monkeypatch, keeps):
+    campaign = told(begin(options={"earlier_twin": keeps}), pendulum)
     test = campaign.ask()
     before = campaign.twin.equations()
     identify, nothing = learning.identify_runs, "r3 = r3 + 0.0"
@@ -418,8 +426,10 @@ def test_where_more_flights_make_a_worse_twin_the_one_of_before_is_kept(begin, p
 
     monkeypatch.setattr(learning, "identify_runs", worse)
     campaign.tell(test, pendulum.run(test))
-    assert campaign.twin.equations() == before
-    assert [remark.code for remark in campaign.twin.remarks].count("known-before") == 1
+    assert (campaign.twin.equations() == before) is keeps
+    assert [remark.code for remark in campaign.twin.remarks].count("known-before") == keeps
+    if not keeps:
+        return
     monkeypatch.setattr(learning, "identify_runs", identify)
     test = campaign.ask()
     campaign.tell(test, pendulum.run(test))

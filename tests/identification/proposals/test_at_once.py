@@ -43,6 +43,8 @@ def test_a_lag_that_is_tuned_to_nothing_saves_its_price():
     assert other.evidence.length < hypothesis.evidence.length - LAGGING + 1.0
     np.testing.assert_allclose(other.fit.model.constants, [-0.8, 3.0], rtol=0.01)
     assert list(at_once(context, other)) == []
+    kept = replace(context, options=replace(context.options, at_once=False))
+    assert list(at_once(kept, hypothesis)) == []
 
 
 def test_a_lag_that_is_there_stays():

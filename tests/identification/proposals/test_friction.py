@@ -83,8 +83,8 @@ def test_friction_that_falls_once_it_moves_is_followed():
     runs = runs_of(breaking_away)
     # No evolved terms: of enough of them any curve can be made.
     twin, without = (
-        tl.identify(runs, SLIDE, seed=0, options={"generations": 0, "contacts": contacts})
-        for contacts in (True, False)
+        tl.identify(runs, SLIDE, seed=0, options={"generations": 0, "friction": friction})
+        for friction in (True, False)
     )
     assert not twin.noise.correlated
     error = free_run_error(twin, breaking_away)

@@ -15,6 +15,7 @@ from twinloop.identification.records import Run, guessed_noise, stages
 from twinloop.identification.search.joints import with_joints
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
+from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.pool import Pool
@@ -103,7 +104,7 @@ def posed(slope, noise):
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_the_masses_of_a_cart_and_its_pendulum_are_found(noise):
     problem, signals, known, states = posed(cart, noise)
-    found = with_joints(problem, signals, known, moves=25_000, largest=16, unit=Unit(0, (1,)))
+    found = with_joints(problem, signals, known, Walks(25_000, 16, Unit(0, (1,))))
     assert all(new is not old for new, old in zip(found, known, strict=True))
     rows = np.random.default_rng(3).uniform(states.min(axis=0), states.max(axis=0), (50, 4))
     truth = np.array([cart(*row) for row in rows])[:, [1, 3]]
@@ -117,7 +118,7 @@ def test_the_masses_of_a_cart_and_its_pendulum_are_found(noise):
 
 def test_joints_that_share_no_mass_stay_apart():
     problem, signals, known, _ = posed(apart, 0.01)
-    found = with_joints(problem, signals, known, moves=25_000, largest=16, unit=Unit(0, (1,)))
+    found = with_joints(problem, signals, known, Walks(25_000, 16, Unit(0, (1,))))
     assert all(new is old for new, old in zip(found, known, strict=True))
 
 
@@ -129,7 +130,7 @@ def test_where_no_rates_are_declared_there_are_no_joints():
         dt=signals.dt,
     )
     alone = [replace(found, chain=replace(found.chain, states=found.chain.states[:1])) for found in known]
-    assert with_joints(problem, bare, alone, moves=100, largest=4, unit=Unit(0, (1,))) == alone
+    assert with_joints(problem, bare, alone, Walks(100, 4, Unit(0, (1,)))) == alone
 
 
 def test_terms_of_joints_are_entered_once():

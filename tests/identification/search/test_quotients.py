@@ -20,6 +20,7 @@ from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import with_quotients
 from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum
+from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.slopes import slopes
@@ -151,7 +152,7 @@ def test_a_denominator_that_two_chains_share_is_found_and_paid_for_once():
     terms = [pool.one, 0, 1, pool.product(0, 0), pool.product(1, 1), pool.product(0, 1)]
     problem.usable(terms)
     known = [_fitted(problem, chain, terms) for chain in both]
-    found = with_quotients(problem, signals, known, (), moves=12_500, largest=16, unit=Unit(0, (1,)))
+    found = with_quotients(problem, signals, known, (), Walks(12_500, 16, Unit(0, (1,))))
     shared = denominators(pool, [term for sum_ in found for term in sum_.weights])
     assert len(shared) == 1
     ((term, constant),) = shared[0]
@@ -185,7 +186,7 @@ def test_where_no_quotient_is_worth_its_price_sums_stay_the_very_same():
     product = pool.product(0, 1)
     problem.usable([0, 1, product])
     known = [_fitted(problem, chain, [i, product]) for i, chain in enumerate(both)]
-    found = with_quotients(problem, signals, known, (), moves=12_500, largest=16, unit=Unit(0, (1,)))
+    found = with_quotients(problem, signals, known, (), Walks(12_500, 16, Unit(0, (1,))))
     assert all(new is old for new, old in zip(found, known, strict=True))
 
 
@@ -199,7 +200,7 @@ def test_which_state_saturates_shows_behind_noise():
     terms = [problem.pool.one, 0, 1, 2, *(problem.pool.product(i, j) for i, j in ((0, 0), (1, 1), (2, 2)))]
     problem.usable(terms)
     known = [_fitted(problem, chain.with_noise(chain.sensors, (1e-2, 0.0, 1.0)), terms) for chain in every]
-    found = saturations(problem, signals, known, moves=12_500, largest=16, unit=Unit(0, (1,)))
+    found = saturations(problem, signals, known, Walks(12_500, 16, Unit(0, (1,))))
     for repressor, quotients in zip((2, 0, 1), found, strict=True):
         steep = {problem.pool.product(*[repressor] * power) for power in (2, 4)}
         assert steep & {candidate.denominator[0][0] for candidate in quotients}

@@ -56,6 +56,7 @@ def learnt(monkeypatch, **options):
         "committee_size": 2,
         "lags": False,
         "contacts": False,
+        "friction": False,
         "form": "acceleration",
     }
     settings = IdentificationOptions(**{**few, **options})

@@ -15,6 +15,7 @@ from twinloop.campaign.coevolution.learning import Learner, Learning
 from twinloop.campaign.coevolution.search import chunks, committee, start_tests
 from twinloop.campaign.coevolution.written import WrittenMemory
 from twinloop.campaign.examination.rivals import Rival
+from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.history import Iteration, Progress, TestLoop
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import Options
@@ -169,13 +170,13 @@ class Coevolution:
         asked = self.memory.asked
         return None if asked is None else asked.models.best_model
 
-    def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
+    def twins_before(self, book: Logbook) -> tuple[TwinBefore, ...]:
         """The best trade-off when the last test was asked for."""
         asked, latest = self.memory.asked, self.memory.latest
         if asked is None or latest is None or len(asked.experiments) >= len(latest.experiments):
             return ()
         twin = Twin(asked.models.best_model, self.setup.signals, (), self.options.divergence_factor)
-        return ((len(asked.experiments), twin),)
+        return (TwinBefore(len(asked.experiments), twin),)
 
     def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
         """None: the paper knows no noise."""

@@ -30,7 +30,7 @@ from twinloop.campaign.examination.loops import (
 from twinloop.campaign.examination.poles import Pole, poles
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.examination.steps import StepAnswer, moved_states, step_answer
-from twinloop.campaign.examination.unseen import Unseen, unseen_flights
+from twinloop.campaign.examination.unseen import TwinBefore, Unseen, unseen_flights
 from twinloop.campaign.examination.use import Effort, GainSlope, effort, gain_slopes, outside_of
 from twinloop.campaign.history import Experiment
 from twinloop.controllers import Mixer
@@ -49,13 +49,13 @@ class Earlier:
     """What a campaign's method knows beside its public results.
 
     Args:
-        twins: that were known earlier, with how many of the first experiments each had learnt.
+        twins: that were known earlier, the oldest first.
         errors: of each of them on all experiments, SI units squared (twins, experiments).
         innovations: of each experiment that was learnt (n + 1, n_x), whitened; None where there are none.
         rivals: sums of terms that were considered, the chosen ones among them.
     """
 
-    twins: Sequence[tuple[int, Twin]]
+    twins: Sequence[TwinBefore]
     errors: Floats
     innovations: Sequence[Floats] | None
     rivals: Sequence[Rival]
@@ -141,7 +141,7 @@ class Examination:
     @cached_property
     def errors(self) -> ErrorMap:
         """Error of each twin on each flight, learnt or not."""
-        known = {learnt: row for (learnt, _), row in zip(self.twins_before, self._errors, strict=True)}
+        known = {before.learnt: row for before, row in zip(self.twins_before, self._errors, strict=True)}
         return error_map(self.campaign.history, self.experiments, known)
 
     @cached_property

@@ -42,28 +42,39 @@ class Unseen:
     inside: float | None
 
 
-def unseen_flights(
-    experiments: Sequence[Experiment], twins: Sequence[tuple[int, Twin]]
-) -> tuple[Unseen, ...]:
+@dataclass(frozen=True, eq=False)
+class TwinBefore:
+    """A twin that was known earlier.
+
+    Args:
+        learnt: number of the first experiments that it had learnt.
+        twin: with a band if the committee of that time is known.
+    """
+
+    learnt: int
+    twin: Twin
+
+
+def unseen_flights(experiments: Sequence[Experiment], twins: Sequence[TwinBefore]) -> tuple[Unseen, ...]:
     """Each flight beside the free run of the latest twin that had not learnt it.
 
     Args:
         experiments: in the order of `tell`.
-        twins: with how many of the first experiments each had learnt.
+        twins: that were known earlier, in any order.
 
     Returns:
         One for each flight of which such a twin is known.
     """
     found = []
     for place, run in enumerate(experiments):
-        known = [(learnt, twin) for learnt, twin in twins if learnt <= place]
+        known = [before for before in twins if before.learnt <= place]
         if known:
-            learnt, twin = max(known, key=lambda pair: pair[0])
-            found.append(_beside(place, run, learnt, twin))
+            found.append(_beside(place, run, max(known, key=lambda before: before.learnt)))
     return tuple(found)
 
 
-def _beside(place: int, run: Experiment, learnt: int, twin: Twin) -> Unseen:
+def _beside(place: int, run: Experiment, before: TwinBefore) -> Unseen:
+    twin = before.twin
     predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
     rmse, fit, inside = followed(twin, run.trajectory, predicted)
     lasted = bool(np.isfinite(rmse).all())
@@ -74,7 +85,7 @@ def _beside(place: int, run: Experiment, learnt: int, twin: Twin) -> Unseen:
         if run.before is None
         else normalised_error(run.before, run.frozen)
     )
-    return Unseen(place, run.number, learnt, run.trajectory, predicted, error, rmse, fit, inside)
+    return Unseen(place, run.number, before.learnt, run.trajectory, predicted, error, rmse, fit, inside)
 
 
 def followed(twin: Twin, flown: Trajectory, predicted: Trajectory) -> tuple[Floats, Floats, float | None]:

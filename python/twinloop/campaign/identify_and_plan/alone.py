@@ -59,9 +59,9 @@ def share_of(planner: Planner, committee: Committee, test: Test, draws: int) -> 
         draws: of the sensors' noise.
 
     Returns:
-        1 where there is no excitation, or where either quality is infinite or nothing.
+        1 where there is no excitation, where the option `alone` is off, or where either quality is infinite or nothing.
     """
-    if test.excitation is None:
+    if test.excitation is None or not planner.options.alone:
         return 1.0
     genes, excitation = test.genes[np.newaxis], test.excitation[np.newaxis]
     members = planner.stable_members(committee.members, genes, excitation)

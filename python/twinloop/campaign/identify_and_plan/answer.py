@@ -21,6 +21,7 @@ from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
+from twinloop.identification.settings import IdentificationOptions
 
 FEWEST = 4
 """Members of a committee that are kept in any case."""
@@ -60,7 +61,11 @@ class Answer:
 
     @staticmethod
     def of(
-        identified: Identified, flights: Sequence[Experiment], setup: Setup, workers: _core.Workers
+        identified: Identified,
+        flights: Sequence[Experiment],
+        setup: Setup,
+        options: IdentificationOptions,
+        workers: _core.Workers,
     ) -> Answer:
         """What was identified, with how it follows flights when it is flown by itself.
 
@@ -68,6 +73,7 @@ class Answer:
             identified: a model and a committee.
             flights: at least one.
             setup: of the campaign.
+            options: of the identification.
             workers: how the work is carried out.
         """
         followed = following(identified.members, flights, setup.limits, workers)
@@ -75,7 +81,7 @@ class Answer:
         if not np.isfinite(identified.chi_squared):
             # Of a model that diverges no more is known.
             return Answer(identified, followed, False, {}, unmoved, False)
-        causes = causes_of(identified, flights, setup.signals, setup.limits, workers)
+        causes = causes_of(identified, flights, setup.signals, setup.limits, options, workers)
         model, noise = identified.members[0], identified.noise(setup.signals)
         unit = Unit(setup.seed).part(len(flights), 1)
         missed = misses_any(model, followed, flights, noise, causes, unit, setup.limits, workers)

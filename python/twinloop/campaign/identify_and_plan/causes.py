@@ -31,6 +31,7 @@ from twinloop.errors import engine_input
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.offsets import moved
+from twinloop.identification.settings import IdentificationOptions
 from twinloop.law.flight import drawn_runs
 from twinloop.signals import Signals
 
@@ -90,6 +91,7 @@ def causes_of(
     experiments: Sequence[Experiment],
     signals: Signals,
     limits: Limits,
+    options: IdentificationOptions,
     workers: _core.Workers,
 ) -> dict[int, Cause]:
     """Causes of the correlated disturbances of a twin, by the state that each of them drives.
@@ -99,6 +101,7 @@ def causes_of(
         experiments: that it was learnt from.
         signals: of the system.
         limits: where a run counts as diverged.
+        options: of the identification; without causes whatever disturbs is taken to come from outside.
         workers: how the work is carried out.
     """
     disturbed = {
@@ -106,6 +109,8 @@ def causes_of(
         for place, chain in enumerate(identified.chains)
         if chain.motion.correlated > 0.0
     }
+    if not options.causes:
+        return dict.fromkeys(disturbed, "disturbance")
     flights = [run for run in distinct(experiments) if run.test is not None][-LATEST:]
     found = (
         observed(identified, flights, signals, limits, workers) if disturbed and len(flights) > 1 else None
@@ -134,9 +139,10 @@ def causes_of(
         if len(known) > 1 and foretold(list(zip(features, felt, strict=True))).certain(SURE):
             causes[state] = "law"
         moving = [(np.abs(gusts), fast) for gusts, fast in zip(felt, speeds, strict=True)]
-        if causes[state] == "disturbance" and (
-            acts_in_motion(moving) or may_be_inexactness(chain, drives) or not shows(missed, chain, limits)
-        ):
+        unsure = acts_in_motion(moving)
+        if options.exactness:
+            unsure = unsure or may_be_inexactness(chain, drives) or not shows(missed, chain, limits)
+        if causes[state] == "disturbance" and unsure:
             causes[state] = "undecided"
     return causes
 

@@ -125,6 +125,18 @@ class Choice:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         if tuned.tobytes() == flown.genes.tobytes():
             return "the twin knows no better ones"
+        if self.planner.options.track_record and (spoken := self._spoken_against(members, recorded, flown)):
+            return spoken
+        if better < self.confidence:
+            sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
+            return (
+                f"newly tuned ones are better in only {sure} of the twin's predictions, and proven gains are replaced"
+                f" from {asked} on"
+            )
+        return ""
+
+    def _spoken_against(self, members: Sequence[_core.Model], recorded: Floats, flown: Test) -> str:
+        """Why what the twin said of the last flights speaks against gains that it prefers; nothing if it does not."""
         measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
         without = share_of(self.planner, self.committee, flown, self.draws)
         alone = None if measured is None else measured * without
@@ -153,12 +165,6 @@ class Choice:
                     "the last flight was not what had been predicted, and of others the twin predicts"
                     f" {predicted:.3g} ± {spread:.2g} where {worth}"
                 )
-        if better < self.confidence:
-            sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
-            return (
-                f"newly tuned ones are better in only {sure} of the twin's predictions, and proven gains are replaced"
-                f" from {asked} on"
-            )
         return ""
 
     def _doubtful(

@@ -52,69 +52,87 @@ def diagnostics_of(
         Remarks, none where nothing does.
     """
     recorded = [run.trajectory for run in experiments]
-    said = [*against_derivatives(recorded, signals), *suspicious(recorded, signals)]
-    if others:
-        said.append(
-            serious(
-                "other-commands",
-                f"The commands recorded of test{'s' if len(others) > 1 else ''} {', '.join(map(str, others))} are"
-                " none that its controller gives for the recorded states: check the signs, units and order of states"
-                " and commands, and that the recorded controller is the one that the test names.",
-            )
-        )
-    if unmoved:
-        said.append(
-            serious(
-                "unmoved",
-                f"By the law nothing moves {', '.join(unmoved)}, but the flights show motion that the controller"
-                " answers to: what commands do there is lost in what disturbs. Gains for it cannot be tuned yet.",
-            )
-        )
+    said = [
+        *against_derivatives(recorded, signals),
+        *suspicious(recorded, signals),
+        *_other_commands(others),
+        *_unmoved(unmoved),
+    ]
     if not follows:
-        cause = (
-            "the remarks before this one say why"
-            if any(remark.serious for remark in said)
-            else "something acts that no term describes, such as a contact, play, friction that sticks, or a state that"
-            " nobody reads; the records themselves show no wrong sign or unit"
-        )
-        said.append(
-            serious(
-                "does-not-follow",
-                f"Flown by itself the twin does not follow the runs that it was learnt from: {cause}.",
-            )
-        )
+        said += _does_not_follow(explained=any(remark.serious for remark in said))
     elif misses:
-        said.append(_free_run(misses, len(experiments), signals))
-    if recurring:
-        said.append(
-            note(
-                "model-error",
-                f"What disturbs {', '.join(recurring)} comes again at the same times in flight after flight. So it is"
-                " an error of the law, and no disturbance: a term is missing there.",
-            )
+        said += _free_run(misses, len(experiments), signals)
+    return [*said, *_model_error(recurring), *_copies(experiments), *_none_complete(experiments, steps)]
+
+
+def _other_commands(tests: Sequence[int]) -> Iterator[Remark]:
+    """Tests whose recorded commands are none that their controllers give."""
+    if tests:
+        yield serious(
+            "other-commands",
+            f"The commands recorded of test{'s' if len(tests) > 1 else ''} {', '.join(map(str, tests))} are"
+            " none that its controller gives for the recorded states: check the signs, units and order of states"
+            " and commands, and that the recorded controller is the one that the test names.",
         )
+
+
+def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
+    """States that move though their equations say that nothing moves them."""
+    if states:
+        yield serious(
+            "unmoved",
+            f"By the law nothing moves {', '.join(states)}, but the flights show motion that the controller"
+            " answers to: what commands do there is lost in what disturbs. Gains for it cannot be tuned yet.",
+        )
+
+
+def _does_not_follow(explained: bool) -> Iterator[Remark]:
+    """That the twin does not follow its own flights, and why, where no remark before has explained it."""
+    cause = (
+        "the remarks before this one say why"
+        if explained
+        else "something acts that no term describes, such as a contact, play, friction that sticks, or a state that"
+        " nobody reads; the records themselves show no wrong sign or unit"
+    )
+    yield serious(
+        "does-not-follow",
+        f"Flown by itself the twin does not follow the runs that it was learnt from: {cause}.",
+    )
+
+
+def _model_error(states: Sequence[str]) -> Iterator[Remark]:
+    """States whose disturbance comes again in flight after flight."""
+    if states:
+        yield note(
+            "model-error",
+            f"What disturbs {', '.join(states)} comes again at the same times in flight after flight. So it is"
+            " an error of the law, and no disturbance: a term is missing there.",
+        )
+
+
+def _copies(experiments: Sequence[Experiment]) -> Iterator[Remark]:
+    """Records that equal earlier ones."""
     copies = len(experiments) - len(distinct(experiments))
     if copies:
-        said.append(
-            note(
-                "copies",
-                f"{copies} of {len(experiments)} records equal an earlier one to the last bit: they were learnt from"
-                " once.",
-            )
+        yield note(
+            "copies",
+            f"{copies} of {len(experiments)} records equal an earlier one to the last bit: they were learnt from"
+            " once.",
         )
+
+
+def _none_complete(experiments: Sequence[Experiment], steps: int) -> Iterator[Remark]:
+    """That no run was complete."""
     if not any(run.complete for run in experiments):
         longest = max(run.trajectory.steps for run in experiments)
-        said.append(
-            serious(
-                "none-complete",
-                f"No run was complete, the longest had {longest} of {steps} steps: what comes after them nobody has"
-                " seen.",
-            )
+        yield serious(
+            "none-complete",
+            f"No run was complete, the longest had {longest} of {steps} steps: what comes after them nobody has"
+            " seen.",
         )
-    return said
 
 
-def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Remark:
+def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[Remark]:
     """Which states the twin misses when it is flown by itself, on how many runs, and by how much."""
     worst = sorted(misses, key=lambda miss: (not miss.diverges, -miss.times))
     if worst[0].diverges:
@@ -133,7 +151,7 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Remark:
         if all(miss.undecided for miss in misses)
         else "Something acts that no term describes. Do not believe it beyond the flights that were made."
     )
-    return serious(
+    yield serious(
         "free-run",
         f"Flown by itself over the {runs} run{'s' if runs > 1 else ''} that it was learnt from, the twin {what}. {why}",
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.rivals import Rival
+from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.identify_and_plan.calibration import (
     OF_PARTS,
     factor,
@@ -92,7 +93,7 @@ class Knowledge:
         ]
         return (*learnt.needed, *(found for found in needed if found is not None))
 
-    def twins_before(self, latest: Learnt, asked: Learnt | None) -> tuple[tuple[int, Twin], ...]:
+    def twins_before(self, latest: Learnt, asked: Learnt | None) -> tuple[TwinBefore, ...]:
         """Twins that have not learnt all, with bands; models alone where an older version has not kept what bands need.
 
         Args:
@@ -116,7 +117,9 @@ class Knowledge:
         # Of today it is where flights were told that nobody has learnt yet.
         found[latest.experiments] = self.twin(latest, [])
         return tuple(
-            (learnt, found[learnt]) for learnt in sorted(found) if learnt < len(self.book.experiments)
+            TwinBefore(learnt, found[learnt])
+            for learnt in sorted(found)
+            if learnt < len(self.book.experiments)
         )
 
     def innovations(self, learnt: Learnt, workers: _core.Workers) -> tuple[Floats, ...] | None:
@@ -147,6 +150,6 @@ class Knowledge:
                 above,
             )
             for found in identified.sums
-            for subset, above in ((tuple(found.weights), 0.0), *found.others)
+            for subset, above in found.subsets
             if above > 0.0 or subset == tuple(found.weights)
         )

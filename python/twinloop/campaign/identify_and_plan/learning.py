@@ -76,8 +76,37 @@ class Learner:
         """
         told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
         needed = () if asked is None else knowledge.needed_factors(asked)
+        identify = self._identification(book)
+        answered = partial(
+            Answer.of, flights=book.experiments, setup=self.setup, options=self.options, workers=self.workers
+        )
+        earlier = None if asked is None else asked.identified
+        answer = answered(
+            identify(self.options, iteration=told, earlier=earlier, under_way=under_way, keep=keep)
+        )
+        if not answer.explained and self.options.earlier_twin and earlier is not None:
+            answer = or_known_before(answer, earlier, answered)
+        if not answer.explained and self.options.plain != self.options:
+            answer = or_rough(answer, partial(identify, self.options.plain, iteration=PLAIN + told), answered)
+        identified, lesson = answer.identified, self._lesson(answer, book)
+        before, models, ensembles = (
+            ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
+        )
+        learnt = Learnt(
+            told,
+            identified,
+            answer.believed,
+            answer.follows,
+            needed,
+            (*before, lesson),
+            models=(*models, identified.model),
+        )
+        return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
+
+    def _identification(self, book: Logbook) -> partial[Identified]:
+        """Identification of the flights that are learnt from; what it lacks are options and a number."""
         flights = learnt_from(book.experiments, self.options.most_readings)
-        identified_from = partial(
+        return partial(
             identify_runs,
             [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
             self.setup.signals,
@@ -86,40 +115,6 @@ class Learner:
             workers=self.workers,
             watch=self.watch,
         )
-        identified = identified_from(
-            self.options,
-            iteration=told,
-            earlier=None if asked is None else asked.identified,
-            under_way=under_way,
-            keep=keep,
-        )
-        answered = partial(Answer.of, flights=book.experiments, setup=self.setup, workers=self.workers)
-        answer = answered(identified)
-        if not answer.explained and asked is not None:
-            # It has not learnt the flights since: where it explains all of them, it knows more.
-            known = answered(as_known_before(asked.identified))
-            answer = known if known.explained else answer
-        if not answer.explained and self.options.plain != self.options:
-            # What is too coarse for a simulator may still tell better gains from worse.
-            plain = identified_from(self.options.plain, iteration=PLAIN + told)
-            rough = answered(with_remark(plain, ROUGH))
-            if rough.follows and (not answer.follows or rough.worst < answer.worst):
-                answer = rough
-        identified, follows = answer.identified, answer.follows
-        lesson = self._lesson(answer, book)
-        before, models, ensembles = (
-            ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
-        )
-        learnt = Learnt(
-            told,
-            identified,
-            answer.believed,
-            follows,
-            needed,
-            (*before, lesson),
-            models=(*models, identified.model),
-        )
-        return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
 
     def _rests(self) -> list[Floats]:
         """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
@@ -173,6 +168,35 @@ class Learner:
             recurring=recurring,
             undecided=undecided,
         )
+
+
+def or_known_before(answer: Answer, earlier: Identified, answered: Callable[[Identified], Answer]) -> Answer:
+    """What was known before the last flights, where it explains all of them: it has not learnt the last.
+
+    Args:
+        answer: of what all flights teach, which does not.
+        earlier: what was known before the last of them.
+        answered: holds what was identified against all flights.
+    """
+    known = answered(as_known_before(earlier))
+    return known if known.explained else answer
+
+
+def or_rough(
+    answer: Answer, identify: Callable[[], Identified], answered: Callable[[Identified], Answer]
+) -> Answer:
+    """What a law of linear terms makes of the flights, where it follows them, and better than the answer does.
+
+    What is too coarse for a simulator may still tell better gains from worse.
+
+    Args:
+        answer: that does not explain all flights.
+        identify: such a law.
+        answered: holds what was identified against all flights.
+    """
+    rough = answered(with_remark(identify(), ROUGH))
+    better = rough.follows and (not answer.follows or rough.worst < answer.worst)
+    return rough if better else answer
 
 
 def as_known_before(identified: Identified) -> Identified:

@@ -13,6 +13,7 @@ from twinloop._ground.elementary import log
 from twinloop._ground.steps import STEPS, Step
 from twinloop.campaign import standing
 from twinloop.campaign.examination.rivals import Rival
+from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import (
@@ -204,7 +205,7 @@ class IdentifyAndPlan:
         """The best model when the last test was asked for."""
         return None if self.memory.asked is None else self.memory.asked.identified.model
 
-    def twins_before(self, book: Logbook) -> tuple[tuple[int, Twin], ...]:
+    def twins_before(self, book: Logbook) -> tuple[TwinBefore, ...]:
         """Twins that have not learnt all, with bands; without where an older version has not kept what they need."""
         return Knowledge(self.setup, self.options, book).twins_before(self._latest(), self.memory.asked)
 
@@ -233,7 +234,7 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        confirmed = nearly_confirmed(book.experiments)
+        confirmed = not self.options.delay_margin or nearly_confirmed(book.experiments)
         slower = [] if confirmed else [delayed(latest.believed[0], self.setup.signals)]
         return Committee(latest.believed, sensors, latest.follows, delayed=slower)
 

@@ -11,7 +11,7 @@ from twinloop.campaign.examination.checking import checks
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
-from twinloop.faces.report.tables import Table, shown_value
+from twinloop.faces.report.tables.table import Table, shown_value
 from twinloop.planning.quality import quality_unit
 
 Row = tuple[str, object]

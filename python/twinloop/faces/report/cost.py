@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from twinloop.campaign.remaining import duration
-from twinloop.faces.report.tables import Table, shown_value
+from twinloop.faces.report.tables.table import Table, shown_value
 
 
 def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:

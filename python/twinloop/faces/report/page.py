@@ -16,10 +16,13 @@ from twinloop.faces.figures.figure import Figure
 from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
 from twinloop.faces.figures.svg import panel_svg
 from twinloop.faces.figures.units import words
-from twinloop.faces.report import tables
 from twinloop.faces.report.cost import cost_table
 from twinloop.faces.report.moot import moot
 from twinloop.faces.report.source import OWN, Source
+from twinloop.faces.report.tables import controller as of_controller
+from twinloop.faces.report.tables import flights as of_flights
+from twinloop.faces.report.tables import twin as of_twin
+from twinloop.faces.report.tables.table import Table
 from twinloop.faces.report.verdict import EVIDENCE, verdict
 from twinloop.faces.result import summary
 
@@ -102,15 +105,15 @@ def report_page(
         controller_figures=_figures(found, CONTROLLER if controller else ()),
         campaign_figures=_figures(found, CAMPAIGN),
         twin_tables=_present(
-            tables.states(result), tables.disturbances(result), tables.actuators(result), tables.rivals(found),
-            *tables.poles(found)[:1], tables.ranges(found),
+            of_twin.states(result), of_twin.disturbances(result), of_twin.actuators(result), of_twin.rivals(found),
+            *of_twin.poles(found)[:1], of_twin.ranges(found),
         ),
         controller_tables=_present(
-            tables.gains(result), tables.margins(found), tables.steps(found), tables.effort(found),
-            tables.envelope(found), *tables.poles(found)[1:],
+            of_controller.gains(result), of_controller.margins(found), of_controller.steps(found),
+            of_controller.effort(found), of_controller.envelope(found), *of_twin.poles(found)[1:],
         ) if controller else [],
         campaign_tables=_present(
-            *((cost_table(result, elapsed), tables.flights(result)) if controller else ()), tables.data(found)
+            *((cost_table(result, elapsed), of_flights.flights(result)) if controller else ()), of_flights.data(found)
         ),
         next=_next(campaign, result),
         failures=campaign.failures,
@@ -141,7 +144,7 @@ def _title(campaign: Campaign, name: str, system: str) -> str:
     return ", ".join(words(state) for state in campaign.signals.state_names)
 
 
-def _present(*found: tables.Table | None) -> list[tables.Table]:
+def _present(*found: Table | None) -> list[Table]:
     return [table for table in found if table is not None]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.units import said, words
-from twinloop.faces.report.tables import shown_spread, shown_value
+from twinloop.faces.report.tables.table import shown_spread, shown_value
 from twinloop.faces.text import quality_words
 
 EVIDENCE = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,9 +27,22 @@ SEATS = 4
 """One of this many members comes from a part of the only run."""
 
 
-def committee(
-    context: Context, hypothesis: Hypothesis, fit: Fit, rivals: Sequence[Hypothesis]
-) -> tuple[list[_core.Model], tuple[Chain, ...], bool]:
+@dataclass(frozen=True, eq=False)
+class Seated:
+    """A committee as identification leaves it.
+
+    Args:
+        members: models, the best first.
+        observer: all chains with noise that explains what is left.
+        of_parts: whether there are members that parts of the only run have led to.
+    """
+
+    members: list[_core.Model]
+    observer: tuple[Chain, ...]
+    of_parts: bool
+
+
+def committee(context: Context, hypothesis: Hypothesis, fit: Fit, rivals: Sequence[Hypothesis]) -> Seated:
     """The best model, draws from what the runs leave open of it, and other structures that are nearly as good.
 
     Args:
@@ -39,8 +52,7 @@ def committee(
         rivals: that were proposed on the way to it; those of parts of the only run have seats.
 
     Returns:
-        At most as many models as the options ask for, the best first; all chains with noise that explains what is left;
-        and whether there are members of parts.
+        At most as many models as the options ask for.
     """
     observer = _rescaled(hypothesis, fit)
     seats = context.options.committee_size // SEATS
@@ -55,7 +67,7 @@ def committee(
     if hypothesis.offsets.any():
         # What flies them from here on is read as the runs were.
         members = [member.with_offsets(hypothesis.offsets.tolist()) for member in members]
-    return members, observer, bool(others)
+    return Seated(members, observer, bool(others))
 
 
 def _structures(
@@ -117,6 +129,6 @@ def _rescaled(hypothesis: Hypothesis, fit: Fit) -> tuple[Chain, ...]:
 
 def _other(found: Sum, draw: _core.Stream) -> tuple[int, ...] | None:
     """A subset drawn by how likely it is; None for the best one."""
-    chances = exp(-0.5 * np.array([0.0, *(above for _, above in found.others)]))
+    chances = exp(-0.5 * np.array([0.0, *(other.above for other in found.others)]))
     pick = int(np.searchsorted(np.cumsum(chances) / chances.sum(), draw.uniform()))
-    return None if pick == 0 else found.others[min(pick, len(found.others)) - 1][0]
+    return None if pick == 0 else found.others[min(pick, len(found.others)) - 1].terms

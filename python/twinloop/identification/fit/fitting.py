@@ -57,10 +57,11 @@ def _pruned(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     best, fit = _tuned(context, hypothesis)
     if not fit.stable or not context.options.tuning:
         return best
-    cleaned = without_outliers(context, best)
+    cleaned = without_outliers(context, best) if context.options.outliers else best
     if cleaned is not best:
         best, fit = _tuned(context, cleaned)
-    for _ in range(PRUNINGS if hypothesis.form != "absolute" else 0):
+    prunes = context.options.pruning and hypothesis.form != "absolute"
+    for _ in range(PRUNINGS if prunes else 0):
         kept, saved = _without_weak(best, fit)
         if saved == 0.0:
             break
@@ -68,7 +69,7 @@ def _pruned(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         if not pruned.chi_squared - fit.chi_squared < saved:
             break
         best, fit = other, pruned
-    for _ in range(PRUNINGS):
+    for _ in range(PRUNINGS if context.options.support else 0):
         fewer = supported(context, best)
         if fewer is best:
             break

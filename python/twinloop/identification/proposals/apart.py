@@ -19,7 +19,8 @@ def apart(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     Terms were chosen behind the lag that is shared, so they are chosen again behind those that tuning has found.
     """
     fit = hypothesis.fit
-    if fit is None or not fit.stable or not (context.may_lag and context.options.tuning):
+    may_differ = context.may_lag and context.options.apart and context.options.tuning
+    if fit is None or not fit.stable or not may_differ:
         return
     lagging = [
         group

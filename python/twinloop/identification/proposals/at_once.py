@@ -15,7 +15,8 @@ NOTHING = 0.05
 
 def at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with groups of commands that act at once where they hardly lag, fitted again."""
-    if hypothesis.fit is None or not hypothesis.fit.stable or not context.options.lags:
+    wanted = context.options.lags and context.options.at_once
+    if hypothesis.fit is None or not hypothesis.fit.stable or not wanted:
         return
     actuation = hypothesis.actuation
     for group in hypothesis.alike:

@@ -55,12 +55,7 @@ def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) 
     sums = from_below(
         context, tried, posed(context, tried), driven, tried.sums, moves=context.options.moves // 4, starts=1
     )
-    near = (
-        subset
-        for found in sums
-        for subset, above in ((tuple(found.weights), 0.0), *found.others)
-        if above < NEAR
-    )
+    near = (subset for found in sums for subset, above in found.subsets if above < NEAR)
     return [
         places[term] for term in dict.fromkeys(term for subset in near for term in subset) if term in places
     ]

@@ -33,7 +33,7 @@ ROUNDS = 4
 def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with dry friction among its terms; none where its terms leave nothing but noise."""
     options, fit = context.options, hypothesis.fit
-    if not (options.contacts and options.libraries) or fit is None or not fit.stable:
+    if not (options.friction and options.libraries) or fit is None or not fit.stable:
         return
     problem = posed(context, hypothesis)
     # Friction would evade the bounds of the speed that it is made of.

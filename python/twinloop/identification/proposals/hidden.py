@@ -62,11 +62,8 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
 
     def tried(state: HiddenState) -> Hypothesis:
         behind = replace(base, actuation=replace(base.actuation, hidden=(state,)), fit=None)
-        sums = search(
-            posed(context, behind), driven, few, start,
-            moves=options.moves // 10, starts=1, largest=options.largest,
-            unit=unit.part(next(number)), purpose="hidden_subsets",
-        )  # fmt: skip
+        walks = context.walks(unit.part(next(number)), options.moves // 10, purpose="hidden_subsets")
+        sums = search(posed(context, behind), driven, few, start, walks)
         return replace(behind, sums=tuple(sums))
 
     longest = signals.dt * max(len(run.commands) for run in hypothesis.runs)
@@ -82,11 +79,8 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
     found += [tried(state._replace(time=time * longest)) for time in (TIMES[0], TIMES[2])]
     best = strongest(found)
     # Which one shows on the terms that there are; whether there is one, when all may change.
-    sums = search(
-        posed(context, best), driven, many, best.sums,
-        moves=options.moves, starts=max(1, options.starts // 2), largest=options.largest,
-        unit=unit.part(0), purpose="hidden_subsets",
-    )  # fmt: skip
+    walks = context.walks(unit.part(0), options.moves, max(1, options.starts // 2), "hidden_subsets")
+    sums = search(posed(context, best), driven, many, best.sums, walks)
     return replace(best, sums=tuple(sums), candidates=with_hidden(context, best.candidates))
 
 

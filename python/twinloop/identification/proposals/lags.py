@@ -54,11 +54,9 @@ def _trials(context: Context, hypothesis: Hypothesis) -> Trial:
 
     def trial(actuation: Actuation) -> Hypothesis:
         behind = replace(hypothesis, actuation=actuation)
-        sums = search(
-            posed(context, behind), driven, behind.candidates.ladder[0], [None] * len(driven),
-            moves=context.options.moves // 4, starts=1, largest=context.options.largest,
-            unit=unit.part(next(number)),
-        )  # fmt: skip
+        walks = context.walks(unit.part(next(number)), context.options.moves // 4)
+        terms, nothing = behind.candidates.ladder[0], [None] * len(driven)
+        sums = search(posed(context, behind), driven, terms, nothing, walks)
         return replace(behind, sums=tuple(sums))
 
     return trial

@@ -42,11 +42,9 @@ def parts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         part = climbed(brief, from_both_sides(brief, replace(part, actuation=begins)))
         whole = replace(whole, candidates=replace(whole.candidates, pool=part.pool))
         own = [term for sum_ in part.sums for term in sum_.weights]
-        sums = search(
-            posed(context, whole), [sum_.chain for sum_ in part.sums], own, part.sums,
-            moves=brief.options.moves // 4, starts=1, largest=context.options.largest,
-            unit=whole.next_unit(context.unit),
-        )  # fmt: skip
+        walks = context.walks(whole.next_unit(context.unit), brief.options.moves // 4)
+        driven = [sum_.chain for sum_ in part.sums]
+        sums = search(posed(context, whole), driven, own, part.sums, walks)
         tried = whole.searched(sums)
         whole = replace(whole, searches=tried.searches)
         answer = replace(fitted(context, tried), of_part=True)

@@ -22,7 +22,7 @@ NEAR = 40.0
 def undisturbed(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with sums that were searched as if nothing disturbed, fitted: of its own terms, then of all."""
     options = context.options
-    if hypothesis.fit is None or not options.gusts:
+    if hypothesis.fit is None or not options.undisturbed:
         return
     context.watch("terms")
     own = list(dict.fromkeys(node for found in hypothesis.sums for node in found.weights))
@@ -32,10 +32,8 @@ def undisturbed(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis
         quiet = [calm(problem, found.chain) for found in latest.sums]
         if all(chain is found.chain for chain, found in zip(quiet, latest.sums, strict=True)):
             return
-        sums = search(
-            problem, quiet, terms, latest.sums,
-            moves=moves, starts=1, largest=options.largest, unit=latest.next_unit(context.unit),
-        )  # fmt: skip
+        walks = context.walks(latest.next_unit(context.unit), moves)
+        sums = search(problem, quiet, terms, latest.sums, walks)
         latest = latest.searched(
             [
                 new if new.description_length < old.description_length + NEAR else old

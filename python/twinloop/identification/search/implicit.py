@@ -16,10 +16,10 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop._ground.streams import Unit
 from twinloop.errors import engine_input
 from twinloop.identification.search.problem import Columns, Problem
 from twinloop.identification.search.structure import Sum, prices
+from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import calm, floor_of
 from twinloop.identification.slopes import slopes
@@ -56,18 +56,14 @@ class Quotient:
     denominator: Denominator
 
 
-def implicit(
-    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
-) -> list[list[Quotient]]:
+def implicit(problem: Problem, signals: Signals, known: Sequence[Sum], walks: Walks) -> list[list[Quotient]]:
     """Quotients that may drive each chain, the shortest description first; none where none is shorter than without.
 
     Args:
         problem: of all chains.
         signals: of the system.
         known: the best sum of each chain so far.
-        moves: of each search over subsets.
-        largest: number of terms at most.
-        unit: of work.
+        walks: over subsets of terms.
     """
     pool = problem.pool
     lower = problem.usable(below(pool, signals))
@@ -84,19 +80,16 @@ def implicit(
         np.concatenate([over_line, -driving(problem, sum_)[:, :, np.newaxis] * under], axis=2)
         for sum_ in sums
     ]
-    grams = whitened(problem, sums, columns, costs, moves, largest, unit)
-    walks: list[list[tuple[list[int], float]]] = [[] for _ in sums]
+    grams = whitened(problem, sums, columns, costs, walks)
+    short = walks.with_moves(walks.moves // 2)
+    every: list[list[tuple[list[int], float]]] = [[] for _ in sums]
     for number, mask in enumerate(_masks(pool, signals, lower), NOISE_ROUNDS):
         masked = [
             np.concatenate([cost[: len(upper)], np.where(mask, cost[len(upper) :], np.inf)]) for cost in costs
         ]
-        for walked, more in zip(
-            walks,
-            walks_among(problem, grams, masked, max(1, moves // 2), largest, unit.part(number)),
-            strict=True,
-        ):
+        for walked, more in zip(every, short.part(number).among(grams, masked, problem.workers), strict=True):
             walked += more
-    for i, gram, walked in zip(posed, grams, walks, strict=True):
+    for i, gram, walked in zip(posed, grams, every, strict=True):
         subsets = sorted(walked, key=lambda answer: answer[1])
         found[i] = _quotients(problem, gram, [subset for subset, _ in subsets], upper, lower)
     return found
@@ -169,9 +162,7 @@ def whitened(
     sums: Sequence[Sum],
     columns: Sequence[Columns],
     costs: Sequence[Floats],
-    moves: int,
-    largest: int,
-    unit: Unit,
+    walks: Walks,
 ) -> list[_core.Gram]:
     """Inner products of each chain's columns, under the noise that is left behind what a search finds among them.
 
@@ -180,10 +171,9 @@ def whitened(
         sums: the best so far, with their chains.
         columns: features of each chain (3, rows, p).
         costs: of each chain's features (p,).
-        moves: of each search over subsets.
-        largest: number of features at most.
-        unit: of work.
+        walks: over subsets of features.
     """
+    short = walks.with_moves(walks.moves // 2)
     regressions = [problem.regression(sum_.chain, own) for sum_, own in zip(sums, columns, strict=True)]
     chains: list[Chain] = [sum_.chain for sum_ in sums]
     for round_ in range(NOISE_ROUNDS + 1):
@@ -193,9 +183,9 @@ def whitened(
         ]
         if round_ == NOISE_ROUNDS:
             break
-        walks = walks_among(problem, grams, costs, max(1, moves // 2), largest, unit.part(round_))
+        found = short.part(round_).among(grams, costs, problem.workers)
         posed = []
-        for regression, gram, walked, chain in zip(regressions, grams, walks, chains, strict=True):
+        for regression, gram, walked, chain in zip(regressions, grams, found, chains, strict=True):
             coefficients = np.zeros(gram.features)
             solved = gram.solve(walked[0][0]) if walked and walked[0][0] else None
             if solved is not None:
@@ -209,23 +199,6 @@ def whitened(
             for chain, (sensors, motion, _) in zip(chains, noises, strict=True)
         ]
     return grams
-
-
-def walks_among(
-    problem: Problem,
-    grams: Sequence[_core.Gram],
-    costs: Sequence[Floats],
-    moves: int,
-    largest: int,
-    unit: Unit,
-    starts: int = 1,
-) -> list[list[tuple[list[int], float]]]:
-    """Subsets of each chain's columns with their energies, the best first."""
-    with engine_input():
-        return _core.search_subsets(
-            grams, costs, moves=moves, largest=largest, starts=starts, unit=unit.named("subsets"),
-            workers=problem.workers,
-        )  # fmt: skip
 
 
 def _quotients(

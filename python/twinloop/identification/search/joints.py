@@ -11,25 +11,24 @@ Spong, Robot modeling and control, for equations of motion; Gauss's elimination 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
-from twinloop._ground.streams import Unit
 from twinloop.identification.search.description import shorter
 from twinloop.identification.search.implicit import (
     NEAREST,
     NOISE_ROUNDS,
     bounded,
     driving,
-    walks_among,
     whitened,
 )
 from twinloop.identification.search.problem import Columns, Problem
 from twinloop.identification.search.structure import Sum, prices, search, total
+from twinloop.identification.search.walks import Walks
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.libraries import angles
 from twinloop.signals import Signals
@@ -69,9 +68,7 @@ class _Equation:
         return {term: weight for (j, term), weight in self.masses.items() if j == joint}
 
 
-def with_joints(
-    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
-) -> list[Sum]:
+def with_joints(problem: Problem, signals: Signals, known: Sequence[Sum], walks: Walks) -> list[Sum]:
     """The best sums with those of joints replaced by equations that are solved together, where these are shorter.
 
     Args and returns as `with_quotients`.
@@ -81,7 +78,7 @@ def with_joints(
     free = signals.kinematics is None and not any(_told(problem, known[i]) for i in joints)
     if not (free and turning and FEWEST <= len(joints) <= MOST):
         return list(known)
-    finder = _Joints(problem, signals, [known[i] for i in joints], moves, largest, unit)
+    finder = _Joints(problem, signals, [known[i] for i in joints], walks)
     found = finder.found()
     best = list(known)
     if found is not None and shorter(total(found) + WORTH, finder.judged(found)):
@@ -98,11 +95,9 @@ def _told(problem: Problem, found: Sum) -> bool:
 class _Joints:
     """The search for the equations of some joints."""
 
-    def __init__(
-        self, problem: Problem, signals: Signals, known: Sequence[Sum], moves: int, largest: int, unit: Unit
-    ) -> None:
+    def __init__(self, problem: Problem, signals: Signals, known: Sequence[Sum], walks: Walks) -> None:
         self.problem, self.pool, self.known = problem, problem.pool, list(known)
-        self.moves, self.largest, self.unit = moves, largest, unit
+        self.walks, self.least = walks, walks.with_moves(LEAST)
         self.forces = problem.usable(forces(self.pool, signals))
         self.masses = problem.usable(masses(self.pool, signals))
         self.over, self.under = problem.values(self.forces), problem.values(self.masses)
@@ -114,7 +109,7 @@ class _Joints:
         """
         best: list[Sum] | None = None
         for turn in range(TURNS):
-            sums = self._turn(self.known if best is None else best, self.unit.part(FIRST + turn))
+            sums = self._turn(self.known if best is None else best, self.walks.part(FIRST + turn))
             if sums is None:
                 break
             if best is None or shorter(total(sums), total(best)):
@@ -125,14 +120,11 @@ class _Joints:
         """Description length of the known sums, each under the noise of a found one if it is shorter there."""
         length = 0.0
         for number, (known, new) in enumerate(zip(self.known, found, strict=True), FIRST + TURNS + MOST):
-            (again,) = search(
-                self.problem, [new.chain], list(known.weights), [None], moves=LEAST, starts=1,
-                largest=self.largest, unit=self.unit.part(number),
-            )  # fmt: skip
+            (again,) = search(self.problem, [new.chain], list(known.weights), [None], self.least.part(number))
             length += min(known.description_length, again.description_length)
         return length
 
-    def _turn(self, known: Sequence[Sum], unit: Unit) -> list[Sum] | None:
+    def _turn(self, known: Sequence[Sum], walks: Walks) -> list[Sum] | None:
         accelerations = [driving(self.problem, sum_) for sum_ in known]
         pairs = [
             [
@@ -145,13 +137,11 @@ class _Joints:
         ]
         costs = [self._costs(sum_, of_joint) for sum_, of_joint in zip(self.known, pairs, strict=True)]
         columns = [self._columns(of_joint, accelerations) for of_joint in pairs]
-        if not self._looks(known, columns, costs, pairs, unit.part(NOISE_ROUNDS + 1)):
+        if not self._looks(known, columns, costs, pairs, walks.part(NOISE_ROUNDS + 1)):
             return None
-        grams = whitened(self.problem, known, columns, costs, self.moves, self.largest, unit)
-        walks = walks_among(
-            self.problem, grams, costs, self.moves, self.largest, unit.part(NOISE_ROUNDS), STARTS
-        )
-        subsets = [list(walked[0][0]) for walked in walks]
+        grams = whitened(self.problem, known, columns, costs, walks)
+        several = replace(walks.part(NOISE_ROUNDS), starts=STARTS)
+        subsets = [list(walked[0][0]) for walked in several.among(grams, costs, self.problem.workers)]
         parts = [
             _thinned(gram, subset, cost) for gram, subset, cost in zip(grams, subsets, costs, strict=True)
         ]
@@ -169,7 +159,7 @@ class _Joints:
         columns: Sequence[Columns],
         costs: Sequence[Floats],
         pairs: Sequence[_Pairs],
-        unit: Unit,
+        walks: Walks,
     ) -> bool:
         """Whether one short walk under the noise that is known comes upon a shared mass: without, no more is spent."""
         grams = [
@@ -178,10 +168,10 @@ class _Joints:
             )
             for found, own in zip(known, columns, strict=True)
         ]
-        walks = walks_among(self.problem, grams, costs, max(1, self.moves // 2), self.largest, unit)
+        short = walks.with_moves(walks.moves // 2)
         return any(
             self._couples(i, subset, pairs[i])
-            for i, walked in enumerate(walks)
+            for i, walked in enumerate(short.among(grams, costs, self.problem.workers))
             for subset, _ in walked[:LIKELY]
         )
 
@@ -269,9 +259,8 @@ class _Joints:
             self.pool.found[node[0]] = 0.5 * (cost - float(log(max(2, readings))))
             self.pool.rungs[node[0]] = 0
             (best,) = search(
-                self.problem, [sum_.chain], [node[0]], [None], moves=LEAST, starts=1, largest=1,
-                unit=self.unit.part(number),
-            )  # fmt: skip
+                self.problem, [sum_.chain], [node[0]], [None], replace(self.least.part(number), largest=1)
+            )
             found.append(best)
         return found
 

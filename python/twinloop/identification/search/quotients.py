@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from twinloop._ground.elementary import log
-from twinloop._ground.streams import Unit
 from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.implicit import Quotient, bounded, implicit, matters
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum, prices, search
+from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.denominators import (
     Denominator,
@@ -47,14 +47,7 @@ RUNG = 0
 
 
 def with_quotients(
-    problem: Problem,
-    signals: Signals,
-    known: Sequence[Sum],
-    terms: Sequence[int],
-    *,
-    moves: int,
-    largest: int,
-    unit: Unit,
+    problem: Problem, signals: Signals, known: Sequence[Sum], terms: Sequence[int], walks: Walks
 ) -> list[Sum]:
     """The best sums with quotients among their terms, where these make descriptions shorter.
 
@@ -63,28 +56,19 @@ def with_quotients(
         signals: of the system.
         known: the best sum of each chain so far, with its noise.
         terms: of the ladder, which quotients must be shorter than.
-        moves: of each search over subsets.
-        largest: number of terms of a sum at most.
-        unit: of work.
+        walks: over subsets of terms.
 
     Returns:
         A sum for each chain, the very one that was known where no quotient is worth its price.
     """
-    finder = _Finder(problem, signals, terms, moves, largest, unit)
+    finder = _Finder(problem, signals, terms, walks)
     best = list(known)
     for number in range(ROUNDS):
         candidates = [
             [*first, *second]
             for first, second in zip(
                 *(
-                    look(
-                        problem,
-                        signals,
-                        best,
-                        moves=moves,
-                        largest=largest,
-                        unit=unit.part(FIRST + 2 * number + i),
-                    )
+                    look(problem, signals, best, walks.part(FIRST + 2 * number + i))
                     for i, look in enumerate((implicit, saturations))
                 ),
                 strict=True,
@@ -98,14 +82,12 @@ def with_quotients(
     return best
 
 
-def renewed(
-    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
-) -> list[Sum]:
+def renewed(problem: Problem, signals: Signals, known: Sequence[Sum], walks: Walks) -> list[Sum]:
     """The same sums with denominators refined on a problem's states, where that makes descriptions shorter.
 
     Args and returns as those of `with_quotients`.
     """
-    finder = _Finder(problem, signals, (), moves, largest, unit)
+    finder = _Finder(problem, signals, (), walks)
     best = [finder.renewed(found) for found in known]
     finder.price(best)
     return best
@@ -114,11 +96,9 @@ def renewed(
 class _Finder:
     """Searches among terms over denominators; each draws from the next part of the unit."""
 
-    def __init__(
-        self, problem: Problem, signals: Signals, terms: Sequence[int], moves: int, largest: int, unit: Unit
-    ) -> None:
+    def __init__(self, problem: Problem, signals: Signals, terms: Sequence[int], walks: Walks) -> None:
         self.problem, self.pool, self.signals, self.terms = problem, problem.pool, signals, terms
-        self.moves, self.largest, self.unit = moves, largest, unit
+        self.walks, self.few = walks, walks.with_moves(walks.moves // OWN)
         self._searches = FIRST + 2 * ROUNDS
 
     def best_of(self, known: Sequence[Sum], candidates: Sequence[Sequence[Quotient]]) -> list[Sum]:
@@ -165,8 +145,8 @@ class _Finder:
         Noise that was taken for too large hides in a disturbance what terms explain as well, whichever they are.
         """
         terms = [*self.terms, *known.weights]
-        tried = [self._search(chain, terms, None, {}, self.moves)]
-        tried.append(self._search(chain, list(known.weights), None, {}, self.moves // OWN))
+        tried = [self._search(chain, terms, None, {}, self.walks)]
+        tried.append(self._search(chain, list(known.weights), None, {}, self.few))
         return shortest([known, *tried], lambda found: found.description_length)
 
     def _carried(self, known: Sum, own: Denominator, there: Denominator, share: float) -> Sum:
@@ -179,7 +159,7 @@ class _Finder:
                 lengths[term] = self.pool.length(parts[0]) + CHOICE + share
                 self.pool.rungs.setdefault(term, RUNG)
             terms.append(term)
-        return self._search(known.chain, terms, None, lengths, self.moves // OWN)
+        return self._search(known.chain, terms, None, lengths, self.few)
 
     def price(self, sums: Sequence[Sum]) -> None:
         """From now on each term over a denominator costs its share of that; what was only tried stands on no rung."""
@@ -224,7 +204,7 @@ class _Finder:
             denominator = refined(self.problem, found.chain, split)
             ratios = self._over([*split.plain, *split.above], denominator)
             terms = [*split.plain, *split.above, *ratios]
-            again = self._search(found.chain, terms, None, ratios, self.moves // OWN)
+            again = self._search(found.chain, terms, None, ratios, self.few)
             again = self._paid(again, denominator)
             if not matters(self.problem, denominator) or (
                 best and not shorter(again.description_length, best.description_length)
@@ -243,17 +223,14 @@ class _Finder:
         own = [] if known is None else [p[0] for t in known.weights if (p := quotient(self.pool, t))]
         ratios = self._over([*above(self.pool, self.signals, lower), *own], denominator)
         terms = [*plain(self.pool, self.signals), *ratios, *extra]
-        return self._search(chain, terms, known, ratios, self.moves)
+        return self._search(chain, terms, known, ratios, self.walks)
 
     def _search(
-        self, chain: Chain, terms: Sequence[int], known: Sum | None, ratios: dict[int, float], moves: int
+        self, chain: Chain, terms: Sequence[int], known: Sum | None, ratios: dict[int, float], walks: Walks
     ) -> Sum:
         self._searches += 1
-        (found,) = search(
-            self.problem, [chain], terms, [known],
-            moves=max(1, moves), starts=1, largest=self.largest, unit=self.unit.part(self._searches),
-            favoured=[ratios],
-        )  # fmt: skip
+        walks = walks.part(self._searches)
+        (found,) = search(self.problem, [chain], terms, [known], walks, favoured=[ratios])
         return found
 
     def _over(self, terms: Sequence[int], denominator: Denominator) -> dict[int, float]:

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop._ground.elementary import power
-from twinloop._ground.streams import Unit
-from twinloop.identification.search.implicit import NOISE_ROUNDS, Quotient, explained, walks_among, whitened
+from twinloop.identification.search.implicit import NOISE_ROUNDS, Quotient, explained, whitened
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, prices
+from twinloop.identification.search.walks import Walks
 from twinloop.identification.terms.denominators import Denominator, plain, power_of
 from twinloop.identification.terms.libraries import angles, coordinates, rates
 from twinloop.signals import Signals
@@ -30,7 +30,7 @@ TRIED = 2
 
 
 def saturations(
-    problem: Problem, signals: Signals, known: Sequence[Sum], *, moves: int, largest: int, unit: Unit
+    problem: Problem, signals: Signals, known: Sequence[Sum], walks: Walks
 ) -> list[list[Quotient]]:
     """Quotients over one power of one state that may drive each chain, the shortest description first.
 
@@ -57,9 +57,9 @@ def saturations(
             problem.pool, below, problem.readings(sum_.chain), len(problem.runs)
         )
         costs.append(cost)
-    grams = whitened(problem, sums, [features] * len(sums), costs, moves, largest, unit)
-    walks = walks_among(problem, grams, costs, max(1, moves // 2), largest, unit.part(NOISE_ROUNDS))
-    for i, walked in zip(posed, walks, strict=True):
+    grams = whitened(problem, sums, [features] * len(sums), costs, walks)
+    short = walks.with_moves(walks.moves // 2).part(NOISE_ROUNDS)
+    for i, walked in zip(posed, short.among(grams, costs, problem.workers), strict=True):
         seen: dict[int, Quotient] = {}
         for subset, _ in walked:
             places = [j - len(upper) for j in subset if j >= len(upper)]

@@ -65,13 +65,11 @@ def from_below(
     Returns:
         A sum for each chain.
     """
-    options, terms = context.options, hypothesis.candidates.ladder[0]
+    terms = hypothesis.candidates.ladder[0]
     usable = problem.usable(terms)
-    below = [first_noise(problem, chain, usable, options.gusts) for chain in driven]
-    return search(
-        problem, below, terms, known,
-        moves=moves, starts=starts, largest=options.largest, unit=hypothesis.next_unit(context.unit),
-    )  # fmt: skip
+    below = [first_noise(problem, chain, usable, context.options.gusts) for chain in driven]
+    walks = context.walks(hypothesis.next_unit(context.unit), moves, starts)
+    return search(problem, below, terms, known, walks)
 
 
 def from_both_sides(
@@ -97,12 +95,8 @@ def from_both_sides(
     if not options.noise_from_above:
         return replace(low, from_above=low.sums)
     above = [unexplained(problem, chain, options.gusts) for chain in hypothesis.driven]
-    high = low.searched(
-        search(
-            problem, above, terms, nothing,
-            moves=options.moves, starts=2, largest=options.largest, unit=low.next_unit(context.unit),
-        )
-    )  # fmt: skip
+    walks = context.walks(low.next_unit(context.unit), options.moves, starts=2)
+    high = low.searched(search(problem, above, terms, nothing, walks))
     both = zip(low.sums, high.sums, strict=True)
     return replace(
         high,
@@ -125,23 +119,17 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
     problem, ladder = posed(context, climber, inputs), climber.candidates.ladder
     for number, terms in enumerate((ladder[:1] if brief else ladder) if options.libraries else ()):
         starts = options.starts if number == 0 and not brief else max(1, options.starts // 2)
-        sums = search(
-            problem, [found.chain for found in climber.sums], terms, climber.sums,
-            moves=options.moves, starts=starts, largest=options.largest,
-            unit=climber.next_unit(context.unit), fixed_noise=number > 0,
-        )  # fmt: skip
+        walks = context.walks(climber.next_unit(context.unit), options.moves, starts)
+        driven = [found.chain for found in climber.sums]
+        sums = search(problem, driven, terms, climber.sums, walks, fixed_noise=number > 0)
         climber = climber.searched(sums)
     if options.generations and not (brief and options.libraries):
         context.watch("evolution")
         seeds = [problem.pool.one, *range(problem.pool.inputs)] if options.libraries else list(ladder[0])
         seeds += [node for found in climber.sums for node in found.weights]
         for _ in range(options.restarts):
-            sums = evolve(
-                problem, climber.sums, seeds,
-                operators=options.operators, generations=options.generations,
-                population=options.population, longest=options.longest, moves=options.moves // 4,
-                largest=options.largest, unit=climber.next_unit(context.unit), signals=context.signals,
-            )  # fmt: skip
+            walks = context.walks(climber.next_unit(context.unit), options.moves // 4, starts=2)
+            sums = evolve(problem, climber.sums, seeds, options, walks, context.signals)
             climber = climber.searched(sums)
     return _with_implicit_laws(context, climber, inputs, brief)
 
@@ -163,14 +151,12 @@ def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages
         return hypothesis
     grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
     problem, signals = posed(context, grown, inputs), context.signals
-    moves, largest = options.moves // 2, options.largest
-    unit = grown.next_unit(context.unit)
-    sums = with_joints(problem, signals, grown.sums, moves=moves, largest=largest, unit=unit)
+    walks = context.walks(grown.next_unit(context.unit), options.moves // 2)
+    sums = with_joints(problem, signals, grown.sums, walks)
     if again:
-        sums = renewed(problem, signals, sums, moves=moves, largest=largest, unit=unit)
+        sums = renewed(problem, signals, sums, walks)
     else:
-        terms = grown.candidates.ladder[-1]
-        sums = with_quotients(problem, signals, sums, terms, moves=moves, largest=largest, unit=unit)
+        sums = with_quotients(problem, signals, sums, grown.candidates.ladder[-1], walks)
     changed = any(new is not old for new, old in zip(sums, grown.sums, strict=True))
     return grown.searched(sums) if changed else hypothesis
 
@@ -188,10 +174,8 @@ def undisturbed(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         driven = [calm(problem, found.chain) for found in calmer.sums]
         if all(quiet is found.chain for quiet, found in zip(driven, calmer.sums, strict=True)):
             break
-        found = search(
-            problem, driven, terms, calmer.sums,
-            moves=tried, starts=1, largest=context.options.largest, unit=calmer.next_unit(context.unit),
-        )  # fmt: skip
+        walks = context.walks(calmer.next_unit(context.unit), tried)
+        found = search(problem, driven, terms, calmer.sums, walks)
         calmer = calmer.searched(
             [
                 new if shorter(new.description_length + CALMER, old.description_length) else old

@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import ClassVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log, power
-from twinloop._ground.streams import Purpose, Unit
 from twinloop.errors import engine_input
 from twinloop.identification.search.moderation import precisions
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.subsets import Judged, all_judged
+from twinloop.identification.search.walks import Subsets, Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
 from twinloop.identification.terms.pool import Pool
-from twinloop.records import Recorded
+from twinloop.records import Record, Recorded
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
-Subsets = Sequence[tuple[Sequence[int], float]]
-"""Subsets of features with their description lengths, the best first."""
 Walk = Callable[[Sequence[_core.Gram], Sequence[Floats], int], Sequence[Subsets]]
 """Annealed walks: from inner products and prices, a pair for each chain, and the number of the walks."""
+OTHERS = 40
+"""Subsets of a chain that are kept, the best one among them."""
 NOISE_ROUNDS = 5
 """Times at most that terms are searched and the noise that they leave is estimated."""
 FEW_RUNS = 5
@@ -43,6 +42,18 @@ RUNG = 20.0
 """What a richer library must gain before it is believed, in units of χ²: it holds many aliases of the law."""
 
 
+class Other(NamedTuple):
+    """Another subset of terms that is nearly as good.
+
+    Args:
+        terms: of it, as nodes.
+        above: by what its description is longer, in units of χ².
+    """
+
+    terms: tuple[int, ...]
+    above: float
+
+
 @dataclass(eq=False)
 class Sum(Recorded, kind="sum"):
     """A sum of terms that drives a chain.
@@ -51,16 +62,36 @@ class Sum(Recorded, kind="sum"):
         weights: coefficients by node.
         description_length: of it: −2 log of the likelihood at `chain`'s noise, and the price of its terms.
         chain: with the noise under which it was found.
-        others: other subsets that are nearly as good, with what their description is longer by.
+        others: other subsets that are nearly as good, the best first.
     """
 
     weights: Weights
     description_length: float
     chain: Chain
-    others: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
+    others: list[Other] = field(default_factory=list)
 
-    VERSION = 2
+    VERSION = 3
     RENAMED: ClassVar[Mapping[str, str]] = {"energy": "description_length"}
+
+    @property
+    def subsets(self) -> list[Other]:
+        """Its own terms, and the others behind them."""
+        return [Other(tuple(self.weights), 0.0), *self.others]
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version, in which other subsets had no names."""
+        found = super().renewed(record)
+        others = found.get("others")
+        if isinstance(others, list):
+            found["others"] = [
+                dict(zip(Other._fields, other, strict=True)) if _is_pair(other) else other for other in others
+            ]
+        return found
+
+
+def _is_pair(value: object) -> bool:
+    return isinstance(value, list) and len(value) == len(Other._fields)
 
 
 def prices(
@@ -102,12 +133,8 @@ def search(
     chains: Sequence[Chain],
     terms: Sequence[int],
     known: Sequence[Sum | None],
+    walks: Walks,
     *,
-    moves: int,
-    starts: int,
-    largest: int,
-    unit: Unit,
-    purpose: Purpose = "subsets",
     favoured: Sequence[Mapping[int, float]] = (),
     forbidden: Sequence[set[int]] = (),
     fixed_noise: bool = False,
@@ -119,11 +146,7 @@ def search(
         chains: with the noise to begin with.
         terms: to choose from.
         known: for each chain a sum that is already known, or None; the answer is never worse.
-        moves: of each walk.
-        starts: walks for each chain.
-        largest: number of terms at most.
-        unit: of work; each round of walks is a part of it.
-        purpose: of the random numbers.
+        walks: over subsets of them; those of the rounds after the first are half as long and as many.
         favoured: for each chain, description lengths in nats of terms that are known from elsewhere.
         forbidden: for each chain, terms that it may not use.
         fixed_noise: whether the chains' noise is to be believed.
@@ -141,42 +164,59 @@ def search(
     columns = problem.values(usable)
     regressions = [problem.regression(chain, columns) for chain in chains]
     priors = [precisions(problem, chain, usable) for chain in chains]
-
-    def walked(
-        grams: Sequence[_core.Gram], costs: Sequence[Floats], number: int, round_: int
-    ) -> Sequence[Subsets]:
-        """The walks of a number in a round; those of each draw from a stream of their own."""
-        share = 1 if round_ == 0 else 2
-        return _core.search_subsets(
-            grams, costs, moves=moves // share, largest=largest, starts=max(1, starts // share),
-            unit=unit.part(number * NOISE_ROUNDS + round_).named(purpose), workers=problem.workers,
-        )  # fmt: skip
-
     current = list(chains)
     for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
         grams = [
             r.gram(c.sensors, c.motion, problem.workers).with_prior(prior)
             for r, c, prior in zip(regressions, current, priors, strict=True)
         ]
-        subsets = _chosen(problem, usable, chains, known, grams, costs, partial(walked, round_=round_))
-        coefficients = [_spread(judged[0], len(usable)) for judged in subsets]
+        subsets = _chosen(problem, usable, chains, known, grams, costs, _walk_of(walks, round_, problem))
+        coefficients = [judged[0].spread(len(usable)) for judged in subsets]
         if fixed_noise:
             break
-        before, used = current, [len(judged[0][0]) for judged in subsets]
+        before, used = current, [len(judged[0].features) for judged in subsets]
         current = _noisy(problem, regressions, coefficients, before, used)
         if not any(_differ(*pair, problem) for pair in zip(current, before, strict=True)):
             break
-    sums = []
-    for i, (judged, chain) in enumerate(zip(subsets, current, strict=True)):
-        subset, length, weights = judged[0]
-        others = [(tuple(usable[j] for j in s), max(0.0, longer - length)) for s, longer, _ in judged[1:40]]
-        score = regressions[i].likelihood(coefficients[i], chain.sensors, chain.motion)
-        score += float((priors[i] * np.square(coefficients[i])).sum())
-        rung = RUNG * problem.pool.rung(usable[j] for j in subset)
-        total = rung + score + float(costs[i][list(subset)].sum())
-        chosen = {usable[j]: float(w) for j, w in zip(subset, weights, strict=True)}
-        sums.append(Sum(chosen, total, chain, others))
-    return sums
+    return [
+        _sum(problem, usable, *of_chain)
+        for of_chain in zip(subsets, current, regressions, costs, priors, strict=True)
+    ]
+
+
+def _walk_of(walks: Walks, round_: int, problem: Problem) -> Walk:
+    """The walks of a round; those of each number draw from a stream of their own."""
+    share = 1 if round_ == 0 else 2
+    shorter = replace(walks, moves=walks.moves // share, starts=max(1, walks.starts // share))
+
+    def walk(grams: Sequence[_core.Gram], costs: Sequence[Floats], number: int) -> Sequence[Subsets]:
+        return shorter.part(number * NOISE_ROUNDS + round_).among(grams, costs, problem.workers)
+
+    return walk
+
+
+def _sum(
+    problem: Problem,
+    usable: Sequence[int],
+    judged: Sequence[Judged],
+    chain: Chain,
+    regression: _core.Regression,
+    costs: Floats,
+    prior: Floats,
+) -> Sum:
+    """The best of some subsets as a sum under a chain's noise, with the others beside it."""
+    best = judged[0]
+    others = [
+        Other(tuple(usable[j] for j in other.features), max(0.0, other.length - best.length))
+        for other in judged[1:OTHERS]
+    ]
+    coefficients = best.spread(len(usable))
+    score = regression.likelihood(coefficients, chain.sensors, chain.motion)
+    score += float((prior * np.square(coefficients)).sum())
+    rung = RUNG * problem.pool.rung(usable[j] for j in best.features)
+    length = rung + score + float(costs[list(best.features)].sum())
+    weights = {usable[j]: float(w) for j, w in zip(best.features, best.weights, strict=True)}
+    return Sum(weights, length, chain, others)
 
 
 def _chosen(
@@ -204,11 +244,13 @@ def _chosen(
             subsets.append(tuple(sorted(place[term] for term in before.weights)))
         return sorted(
             all_judged(gram, subsets, costs[i], problem.limits(chains[i], usable)),
-            key=lambda found: (found[1] + RUNG * problem.pool.rung(usable[j] for j in found[0]), found[0]),
+            key=lambda found: (
+                found.length + RUNG * problem.pool.rung(usable[j] for j in found.features),
+                found.features,
+            ),
         )
 
-    with engine_input():
-        walks = walk(grams, costs, 0)
+    walks = walk(grams, costs, 0)
     subsets = [best(i, gram, walked) for i, (gram, walked) in enumerate(zip(grams, walks, strict=True))]
     for i, (chain, gram) in enumerate(zip(chains, grams, strict=True)):
         if (
@@ -220,7 +262,7 @@ def _chosen(
         for attempt, price in enumerate(FEEDTHROUGH_PRICES):
             with engine_input():
                 dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
-                (walked,) = walk([dear], [costs[i]], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
+            (walked,) = walk([dear], [costs[i]], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
             # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
             found = [
                 law
@@ -236,19 +278,10 @@ def _chosen(
 
 def _feedthrough(problem: Problem, chain: Chain, usable: Sequence[int], judged: Judged) -> float:
     """Share of a reading's noise that is in a law's prediction of the same reading."""
-    subset, _, weights = judged
-    if not subset:
+    if not judged.features:
         return 0.0
-    shares = problem.feedthrough(chain, [usable[j] for j in subset]).mean(axis=0)
-    return float((shares * weights).sum())
-
-
-def _spread(judged: Judged, features: int) -> Floats:
-    """The coefficients of all features, 0 for those outside the subset."""
-    subset, _, weights = judged
-    coefficients = np.zeros(features)
-    coefficients[list(subset)] = weights
-    return coefficients
+    shares = problem.feedthrough(chain, [usable[j] for j in judged.features]).mean(axis=0)
+    return float((shares * judged.weights).sum())
 
 
 def _noisy(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,8 +11,26 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.identification.terms.bounds import Limits, bounded_solution, excludes_zero
 
-Judged = tuple[tuple[int, ...], float, Floats]
-"""A subset of features, its description length, its coefficients."""
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A subset of features as least squares have it.
+
+    Args:
+        features: of it, in order.
+        length: of the description, without what is the same for all subsets, in units of χ².
+        weights: coefficients of the features.
+    """
+
+    features: tuple[int, ...]
+    length: float
+    weights: Floats
+
+    def spread(self, features: int) -> Floats:
+        """Coefficients of so many features, 0 for those outside the subset."""
+        coefficients = np.zeros(features)
+        coefficients[list(self.features)] = self.weights
+        return coefficients
 
 
 def all_judged(
@@ -40,7 +59,7 @@ def all_judged(
         if nothing and len(nothing) < len(subset):
             # A term that is held at 0 is no term.
             return judged(tuple(j for j in subset if j not in nothing))
-        return subset, chi_squared + float(costs[list(subset)].sum()), weights
+        return Judged(subset, chi_squared + float(costs[list(subset)].sum()), weights)
 
     bounded = [i for i, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[i])]
     if must := _distinguishable(gram, bounded):

@@ -7,13 +7,14 @@ term.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from twinloop import _core
 from twinloop._ground.elementary import log
-from twinloop._ground.streams import Unit
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, search
+from twinloop.identification.search.walks import Walks
+from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.sizes import in_shares, size
 from twinloop.law.expressions import UNARY
@@ -23,20 +24,18 @@ PRODUCTS = 0.5
 """Share of new nodes that are products: most laws of machines are made of them."""
 CONSTANTS = 0.15
 """Share of new nodes that hold a constant of their own."""
+GOOD = 10.0
+"""Units of χ² by which a subset may be worse than the best whose nodes survive."""
+LIFE = 3
+"""Generations that a node survives which no good subset uses."""
 
 
 def evolve(
     problem: Problem,
     known: Sequence[Sum],
     terms: Sequence[int],
-    *,
-    operators: Sequence[str],
-    generations: int,
-    population: int,
-    longest: float,
-    moves: int,
-    largest: int,
-    unit: Unit,
+    options: IdentificationOptions,
+    walks: Walks,
     signals: Signals,
 ) -> list[Sum]:
     """Grows terms for a number of generations.
@@ -45,32 +44,19 @@ def evolve(
         problem: of all chains.
         known: the best sum of each chain so far, with the noise to begin with.
         terms: the nodes to begin with.
-        operators: that new nodes may use.
-        generations: how often new nodes are drawn.
-        population: nodes that are judged at once.
-        longest: description length, in nats, of an expression at most.
-        moves: of each search over subsets.
-        largest: number of terms of a sum at most.
-        unit: of work, for its random numbers.
+        options: of the identification: operators, generations, population and longest.
+        walks: over subsets of terms; nodes are drawn from their unit as well.
         signals: of the system, whose scales new nodes are made in.
 
     Returns:
         The best sum of each chain, never worse than the known one.
     """
-    pool = problem.pool
-    draw = unit.stream("terms")
-    best = list(known)
+    pool, draw = problem.pool, walks.unit.stream("terms")
+    best, last = list(known), options.generations - 1
     survivors: dict[int, int] = dict.fromkeys(terms, 0)
     taken: set[int] = set()
-    for generation in range(generations):
-        parents = list(survivors)
-        candidates = dict.fromkeys(parents)
-        tries = 0
-        while len(candidates) < population and tries < 20 * population:
-            tries += 1
-            node = _drawn(pool, parents, operators, draw, signals)
-            if node is not None and pool.length(node) <= longest:
-                candidates.setdefault(node)
+    for generation in range(options.generations):
+        candidates = _grown(pool, list(survivors), options, draw, signals)
         wholes = [_whole(pool, found, taken) for found in best]
         # A chain may use what drives another one; its own sum would be a law that nobody has paid for, and so would
         # sums that use each other.
@@ -80,22 +66,43 @@ def evolve(
         ]
         usable = problem.usable([*candidates, *(node for whole in wholes for node in whole)])
         best = search(
-            problem, [found.chain for found in best], usable, best,
-            moves=moves, starts=2, largest=largest, unit=unit.part(generation),
+            problem, [found.chain for found in best], usable, best, walks.part(generation),
             favoured=favoured, forbidden=[set(whole) for whole in wholes],
-            fixed_noise=generation % 4 != 0 and generation != generations - 1,
+            fixed_noise=generation % 4 != 0 and generation != last,
         )  # fmt: skip
-        # A node survives where a good subset uses it, and a few generations after that.
-        used: set[int] = set()
-        for found in best:
-            used.update(found.weights)
-            for subset, above in found.others:
-                if above < 10.0:
-                    used.update(subset)
-        aged = {term: age + 1 for term, age in survivors.items() if age < 3 and term not in used}
-        kept = dict.fromkeys(sorted(used), 0) | dict(list(aged.items())[: population // 4])
-        survivors = dict.fromkeys(range(pool.inputs), 0) | {pool.one: 0} | kept
+        survivors = _surviving(pool, survivors, best, options.population // 4)
     return best
+
+
+def _grown(
+    pool: Pool,
+    parents: Sequence[int],
+    options: IdentificationOptions,
+    draw: _core.Stream,
+    signals: Signals,
+) -> list[int]:
+    """Parents and new nodes, as many as are judged at once, or as can be drawn."""
+    candidates = dict.fromkeys(parents)
+    tries = 0
+    while len(candidates) < options.population and tries < 20 * options.population:
+        tries += 1
+        node = _drawn(pool, parents, options.operators, draw, signals)
+        if node is not None and pool.length(node) <= options.longest:
+            candidates.setdefault(node)
+    return list(candidates)
+
+
+def _surviving(pool: Pool, survivors: Mapping[int, int], best: Sequence[Sum], unused: int) -> dict[int, int]:
+    """Nodes that stay, with their ages: where a good subset uses them, and some of the others for a few generations."""
+    used: set[int] = set()
+    for found in best:
+        used.update(found.weights)
+        for other in found.others:
+            if other.above < GOOD:
+                used.update(other.terms)
+    aged = {term: age + 1 for term, age in survivors.items() if age < LIFE and term not in used}
+    kept = dict.fromkeys(sorted(used), 0) | dict(list(aged.items())[:unused])
+    return dict.fromkeys(range(pool.inputs), 0) | {pool.one: 0} | kept
 
 
 def _drawn(

@@ -1,0 +1,58 @@
+"""Tables of the flights: what was predicted and flown, and how good their data are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from twinloop.campaign.examination.examination import Examination
+from twinloop.faces.figures.units import said, words
+from twinloop.faces.report.tables.table import Table, shown_spread, table_of
+from twinloop.faces.text import counted, quality_words
+
+
+def flights(result: Mapping[str, Any]) -> Table:
+    """Predicted and flown, with the reason of each."""
+    rows = [
+        [
+            said(run["test"]), run["predicted"], shown_spread(run.get("spread")), run["measured"],
+            run.get("predicted_minus_measured"),
+            run.get("risk"), run.get("why") or ("" if run["test"] is None else "Gains of your own."),
+        ]
+        for run in result["experiments"]
+    ]  # fmt: skip
+    measure = result["quality"]
+    unit = f" ({measure['unit']})" if measure["unit"] else ""
+    head = ["flight", f"predicted{unit}", f"± spread{unit}", f"flown{unit}", f"predicted − flown{unit}",
+            "risk (probability)", "why"]  # fmt: skip
+    note = (
+        f"Quality: {quality_words(measure['kind'], measure['unit'])}; less is better. What counts: {counted(measure)}."
+        " Predicted and its spread are what was said before the flight."
+    )
+    return table_of("flights-table", "Flights", head, rows, note, texts=(6,))
+
+
+def data(found: Examination) -> Table:
+    """Data quality, flight by flight."""
+    rows = [
+        [said(each.number), each.seconds, each.ended,
+         None if each.moved is None else f"{each.moved:.3g} ({words(each.least)})", 100.0 * each.saturated,
+         None if each.large is None else 100.0 * each.large, 100.0 * each.usage, each.fingerprint]
+        for each in found.data
+    ]  # fmt: skip
+    head = [
+        "flight",
+        "length (s)",
+        "ended",
+        "least moved, in noises",
+        "at a bound (%)",
+        "beyond 3 σ (%)",
+        "envelope (%)",
+        "SHA-256 of the data",
+    ]
+    note = (
+        "Least moved: the state that moved least, in standard deviations of its sensor; below about 10 little can be"
+        " learnt of it. Beyond 3 σ: innovations; 0.3 % are expected of noise. The last column begins the SHA-256 of"
+        " times, states and commands as little-endian doubles."
+    )
+    return table_of("data", "Data, flight by flight", head, rows, note)

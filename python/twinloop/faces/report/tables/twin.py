@@ -1,0 +1,144 @@
+"""Tables of the twin: what it leaves, what disturbs, what else the flights would allow, where it was flown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.examination.poles import Pole
+from twinloop.faces.figures.units import shown_unit, words
+from twinloop.faces.report.tables.table import Table, shown_value, table_of
+
+RIVALS = 3
+"""Rivals of each equation that are shown."""
+CAUSES = {
+    "disturbance": "a disturbance",
+    "law": "an error of the law",
+    "undecided": "not decided yet",
+}
+"""What a correlated disturbance is, by its cause."""
+
+
+def states(result: Mapping[str, Any]) -> Table | None:
+    """What the twin leaves beside the sensors' noise."""
+    twin = result["twin"]
+    if "states" not in twin:
+        return None
+    rows = [
+        [
+            words(state["name"]), state["unit"] or "1", state["error"], state["sensor"],
+            state["error"] / state["sensor"] if state["sensor"] and state["error"] is not None else None,
+            1e3 * state["offset"],
+        ]
+        for state in twin["states"]
+    ]  # fmt: skip
+    head = ["state", "unit", "error of whole flights", "sensor's noise", "ratio", "read late by (ms)"]
+    note = (
+        "Errors are root mean squares of flown minus simulated; noise is a standard deviation, as estimated. A ratio"
+        " of 1 leaves nothing but the sensors."
+    )
+    return table_of("noise", "What the twin leaves, state by state", head, rows, note)
+
+
+def disturbances(result: Mapping[str, Any]) -> Table | None:
+    """What moves the states beside the commands."""
+    found = result["twin"].get("disturbances")
+    if not found:
+        return None
+    rows = [
+        [
+            words(each["name"]),
+            each["unit"] or "1",
+            each["white"] or None,
+            each["correlated"] or None,
+            each["correlation_time"] or None,
+            CAUSES[each["cause"]] if each["correlated"] else None,
+        ]
+        for each in found
+    ]
+    head = [
+        "state",
+        "unit",
+        "white, each period",
+        "correlated, each second",
+        "correlation time (s)",
+        "which is",
+    ]
+    return table_of("disturbances", "Disturbances (standard deviations)", head, rows)
+
+
+def actuators(result: Mapping[str, Any]) -> Table | None:
+    """Lags and delays."""
+    found = result["twin"].get("actuators")
+    if not found:
+        return None
+    rows = [[words(each["name"]), each["lag"], each["delay"]] for each in found]
+    return table_of("actuators", "Actuators", ["command", "lag (s)", "delay (periods)"], rows)
+
+
+def rivals(found: Examination) -> Table | None:
+    """Other equations that the flights tell apart the least."""
+    rows: list[list[object]] = []
+    for state in dict.fromkeys(rival.state for rival in found.rivals):
+        others = sorted((r for r in found.rivals if r.state == state and not r.chosen), key=lambda r: r.above)
+        chosen = next((set(r.terms) for r in found.rivals if r.state == state and r.chosen), set())
+        for rival in others[:RIVALS]:
+            gone = ", ".join(sorted(chosen - set(rival.terms))) or "–"
+            come = ", ".join(sorted(set(rival.terms) - chosen)) or "–"
+            rows.append([words(state), len(rival.terms), come, gone, rival.above])
+    if not rows:
+        return None
+    head = ["equation of", "terms", "with", "without", "above the chosen (χ²)"]
+    note = "From about 10 on the flights speak against a rival; below that they cannot tell the two apart."
+    return table_of("rivals", "Rival equations", head, rows, note, (2, 3))
+
+
+def poles(found: Examination) -> list[Table]:
+    """Of the twin alone, and closed."""
+    both = [
+        _poles(
+            "poles", "Poles of the twin at the target", found.open_poles, "A negative time constant grows."
+        ),
+        _poles("closed-poles", "Poles with the loops closed", found.closed_poles, ""),
+    ]
+    return [table for table in both if table is not None]
+
+
+def _poles(name: str, title: str, found: Sequence[Pole], note: str) -> Table | None:
+    if not found:
+        return None
+    rows = [
+        [f"{pole.real:.3g} ± {pole.imaginary:.3g} j".replace("-", "−") if pole.imaginary else shown_value(pole.real),
+         pole.frequency, pole.damping, pole.time]
+        for pole in found
+    ]  # fmt: skip
+    # Six integrators are one row.
+    count = {str(row): rows.count(row) for row in rows}
+    rows = [[f"{row[0]}, {count[str(row)]} times", *row[1:]] if count[str(row)] > 1 else row
+            for row in {str(row): row for row in rows}.values()]  # fmt: skip
+    return table_of(
+        name, title, ["pole (1/s)", "frequency (rad/s)", "damping", "time constant (s)"], rows, note
+    )
+
+
+def ranges(found: Examination) -> Table:
+    """What was flown: where the twin's word holds."""
+    runs = [run.trajectory for run in found.experiments]
+    rows: list[list[object]] = []
+    of_states = [(state.name, *shown_unit(state.unit)) for state in found.signals.states]
+    # Commands keep their units, as in the figures: a rotor's speed is no angle.
+    of_commands = [(command.name, 1.0, command.unit or "1") for command in found.signals.commands]
+    for signals, values in (
+        (of_states, [run.states for run in runs]),
+        (of_commands, [run.commands for run in runs]),
+    ):
+        every = np.concatenate(values)
+        for (name, factor, unit), low, high in zip(
+            signals, every.min(axis=0), every.max(axis=0), strict=True
+        ):
+            rows.append([words(name), unit, factor * float(low), factor * float(high)])
+    note = "Of all flights together. Beyond, the twin goes on from its equations, and nobody has looked."
+    return table_of("ranges", "The range that was flown", ["signal", "unit", "from", "to"], rows, note)
