@@ -54,6 +54,7 @@ def campaign(
         seed=seed,
         options=who.options,
         threads=threads,
+        progress=None,
         **arguments,  # type: ignore[arg-type]
     )
     predicts = "final_distance" if who.preset == "paper" else subject.quality
