@@ -403,7 +403,15 @@ class Campaign(Shown, Persistent, kind="campaign"):
     def twin(self) -> Twin:
         """The best model, after learning all runs; the best so far after an interruption."""
         self._learn()
-        return self._method.twin(self._book)
+        known, twin = self._shown_twin or (None, None)
+        now = self._method.memory.latest, self._book.revision
+        if twin is None or known is None or known[0] is not now[0] or known[1] != now[1]:
+            twin = self._method.twin(self._book)
+            self._shown_twin = (
+                now,
+                twin,
+            )  # one object as long as nothing is learnt or told: it remembers what it flew
+        return twin
 
     @property
     def best_test(self) -> Test:

@@ -23,6 +23,7 @@ from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, engine_input
+from twinloop.law.twin import Twin
 from twinloop.records import Record, Recorded, checked_record
 from twinloop.store import Stored
 
@@ -53,6 +54,7 @@ class Persistent(Recorded):
         self._book = Logbook(self.setup)
         self._method = self._chosen()
         self._controller: Controller | None = None
+        self._shown_twin: tuple[tuple[object, int], Twin] | None = None
         self._keeping: Keeping | None = None
 
     def _open(self, where: str | Path, name: str) -> None:
@@ -133,6 +135,7 @@ class Persistent(Recorded):
         campaign._book = self._book.copied()
         campaign._method = campaign._chosen()
         campaign._method.memory, campaign._controller = self._method.memory, None
+        campaign._shown_twin = self._shown_twin
         campaign._keeping = None  # a store has one writer
         return campaign
 

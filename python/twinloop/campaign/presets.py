@@ -98,6 +98,11 @@ class Options:
         """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
         return False
 
+    @property
+    def example(self) -> str:
+        """An option with another value, as text."""
+        return "pages=3"
+
     def __post_init__(self) -> None:
         _check(self, _RANGES)
         for name, choices in (("form", FORMS), ("tradeoff", TRADEOFFS)):
@@ -141,6 +146,11 @@ class DefaultOptions(PlanningOptions, IdentificationOptions):
     def identifies(self) -> Literal[True]:
         """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
         return True
+
+    @property
+    def example(self) -> str:
+        """An option with another value, as text."""
+        return "lags=false"
 
     def __post_init__(self) -> None:
         _check(self, _DEFAULT_RANGES)

@@ -80,6 +80,7 @@ class Twin(Shown, Recorded, kind="twin"):
         self.signals = signals
         self.errors = ErrorTable(errors)
         self.limits = Limits(signals, divergence_factor)
+        self._free_runs: dict[tuple[int, int], tuple[Test | Replay, Trajectory, Trajectory]] = {}
 
     @property
     def divergence_factor(self) -> float:
@@ -246,6 +247,22 @@ class Twin(Shown, Recorded, kind="twin"):
         explained = np.zeros_like(begun) if self.noise is None else STARTS * self.noise.sensors
         off = np.abs(self.signals.difference(begun, test.initial_state)) > explained
         return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
+
+    def free_run(self, test: Test | Replay, flown: Trajectory) -> Trajectory:
+        """A test flown on the twin from where its flight began, to be shown beside the flight.
+
+        Args:
+            test: of the flight, or the commands of an attached flight.
+            flown: the flight.
+
+        Returns:
+            The predicted run, as from `simulate`. It is remembered: whoever asks again for the same flight gets it.
+        """
+        key = id(test), id(flown)
+        if key not in self._free_runs:
+            # With both of them: as long as they are here, their numbers are nobody else's.
+            self._free_runs[key] = test, flown, self.simulate(self.as_flown(test, flown))
+        return self._free_runs[key][2]
 
     def began(self, flown: Trajectory) -> Floats:
         """The initial state of a flight, from its first reading.

@@ -64,7 +64,7 @@ def unseen_flights(
 
 
 def _beside(place: int, run: Experiment, learnt: int, twin: Twin) -> Unseen:
-    predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
+    predicted = twin.free_run(run.replayed, run.trajectory)
     rmse, fit, inside = followed(twin, run.trajectory, predicted)
     lasted = bool(np.isfinite(rmse).all())
     squares = float(np.square(rmse).mean()) if lasted else float("inf")
