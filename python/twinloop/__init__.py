@@ -2,6 +2,7 @@
 
 from twinloop import autopilots, contracts, controllers, errors, objectives, pareto, systems
 from twinloop._core import __version__
+from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop.campaign import Campaign, identify
 from twinloop.errors import (
@@ -26,6 +27,7 @@ __all__ = [
     "Campaign",
     "Command",
     "InvalidInput",
+    "Limits",
     "NoAnswer",
     "NotAvailable",
     "Remark",
