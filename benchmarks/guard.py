@@ -16,6 +16,7 @@ def report(smoke: bool) -> Section:
     campaign = tl.Campaign(
         system.signals, controller=system.controller, initial_state=system.initial_state,
         target_state=system.target_state, duration=system.duration, threads=1, options=QUICK if smoke else {},
+        progress=None,
     )  # fmt: skip
     campaign.run(system, 1 if smoke else 2)
     test = campaign.test(system.default_gains)

@@ -47,6 +47,7 @@ def ask(experiments, steps, options):
     campaign = tl.Campaign(
         SIGNALS, controller=tl.controllers.PID(axes=[("angle", "rate")], gains=GAINS), initial_state=[0.0, 0.0],
         target_state=[1.0, 0.0], duration=steps * SIGNALS.dt, threads=1, options=options,
+        progress=None,
     )  # fmt: skip
     stream = np.random.default_rng(0)
     for _ in range(experiments):

@@ -287,13 +287,14 @@ def campaign_of(system: str, options: dict[str, object]) -> tuple[tl.Campaign, t
         gains = {"speed.kp": (0.0, 3.0), "speed.ki": (0.0, 3.0), "speed.kd": (0.0, 0.1)}
         campaign = tl.Campaign(
             SIGNALS, controller=tl.controllers.PID(axes=[("speed", None)], gains=gains),
-            initial_state=[0.0], target_state=[1.0], duration=5.0, options=options,
+            initial_state=[0.0], target_state=[1.0], duration=5.0, options=options, progress=None,
         )  # fmt: skip
     else:
         plant = tl.systems.Quadrotor(noise=1e-3) if system == "quadrotor" else tl.systems.Quadrotor.harsh()
         campaign = tl.Campaign(
             plant.signals, controller=plant.controller, initial_state=plant.initial_state,
             target_state=plant.target_state, duration=plant.duration, options=options,
+            progress=None,
         )  # fmt: skip
     first = campaign.test(plant.default_gains)
     campaign.tell(first, plant.run(first))

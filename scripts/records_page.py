@@ -37,6 +37,9 @@ FIELDS = {
         "quality": 'what is minimised: "iae", "ise" or "final_distance"',
     },
     "quadrotor": {"runs": "how many it has made: the noise of the next one depends on it"},
+    "twin": {
+        "divergence_factor": "multiple of a state's scale beyond which a simulated run counts as diverged"
+    },
     "rotorpy": {"runs": "how many it has made: the noise of the next one depends on it"},
 }
 """Fields that are no arguments of their class, or other than these."""

@@ -212,6 +212,7 @@ def begun(plant: Plant, way: str, seed: int, smoke: bool) -> tuple[tl.Campaign, 
         duration=plant.duration,
         seed=seed,
         threads=1,
+        progress=None,
         options=options,
     )
     if way == "alone":

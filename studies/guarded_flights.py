@@ -145,7 +145,7 @@ def study(
         campaign = tl.Campaign(
             rig.signals, controller=rig.controller, initial_state=rig.initial_state,
             target_state=rig.target_state, duration=rig.duration, seed=seed, threads=1,
-            options=QUICK if smoke else {},
+            options=QUICK if smoke else {}, progress=None,
         )  # fmt: skip
         campaign.run(rig, 2)
         first, random = campaign.tests[0].genes, np.random.Generator(np.random.Philox([seed, 11]))

@@ -14,6 +14,7 @@ from twinloop import (
     systems,
 )
 from twinloop._core import __version__
+from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop.campaign import Campaign, identify
 from twinloop.campaign.examination.log_check import check_log
@@ -39,6 +40,7 @@ __all__ = [
     "Campaign",
     "Command",
     "InvalidInput",
+    "Limits",
     "NoAnswer",
     "NotAvailable",
     "Remark",

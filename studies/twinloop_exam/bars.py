@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinloop_exam.measures import number
 from twinloop_exam.results import Results, spread
 
 Verdict = tuple[str, bool] | None
@@ -51,7 +52,7 @@ def held_out(system: str, k: int, median: float, tail: float | None = None, lear
         if middle is None or upper is None:
             return None
         met = middle.median <= median and (tail is None or upper.median <= tail)
-        text = f"{middle.median:.2g}" + ("" if tail is None else f" / {upper.median:.2g}")
+        text = number(middle.median, 2) + ("" if tail is None else f" / {number(upper.median, 2)}")
         return f"{text} ({middle.seeds} seeds)", met
 
     limit = f"≤ {median:.0e}" + ("" if tail is None else f" / {tail:.0e}")
@@ -73,7 +74,8 @@ def no_forgetting(system: str) -> Bar:
             best, worst_seed = min(best, found.median), max(worst_seed, found.most)
         if len(ks) < 2:
             return None
-        text = f"{worst_ratio:.2g} of the bar, worst seed {worst_seed:.2g} (to k = {ks[-1]})"
+        ratio = f"{worst_ratio:.2g} of the bar" if np.isfinite(worst_ratio) else "diverges"
+        text = f"{ratio}, worst seed {number(worst_seed, 2)} (to k = {ks[-1]})"
         return text, worst_ratio <= 1.0 and worst_seed <= 1e-4
 
     return Bar(

@@ -14,9 +14,9 @@ from twinloop.law.twin import Twin
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 from twinloop_exam import quality
-from twinloop_exam.held_out import PENALTY, HeldOut
+from twinloop_exam.held_out import HeldOut
 from twinloop_exam.kinds import Campaigner
-from twinloop_exam.measures import coverage, number_of_terms, quantiles, violated
+from twinloop_exam.measures import QUANTILES, coverage, number_of_terms, quantiles, violated
 from twinloop_exam.systems import Draw, Subject
 
 Measured = tuple[int, dict[str, float | None], Trajectory | None, float]
@@ -54,6 +54,7 @@ def campaign(
         seed=seed,
         options=who.options,
         threads=threads,
+        progress=None,
         **arguments,  # type: ignore[arg-type]
     )
     predicts = "final_distance" if who.preset == "paper" else subject.quality
@@ -109,11 +110,9 @@ def of_twin(twin: Twin, held_out: HeldOut) -> dict[str, float | None]:
     """
     # Without the committee's band, which `twin.simulate` would draw for each of the controllers.
     errors = held_out.errors(lambda test: fly(twin.model, test, limits=twin.limits))
-    median, tail = quantiles(errors)
     return {
-        "error_median": median,
-        "error_p90": tail,
-        "diverged": float(np.sum(errors >= PENALTY)),
+        **dict(zip(QUANTILES, quantiles(errors, list(QUANTILES.values())), strict=True)),
+        "diverged": float(np.isinf(errors).sum()),
         "terms": float(number_of_terms(twin.model.program)),
     }
 

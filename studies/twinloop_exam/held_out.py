@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,8 +18,6 @@ from twinloop_exam.systems import Subject
 
 COUNT = 100
 SEED = 20_090_518
-PENALTY = 1e6
-"""Normalised error of a twin that diverges: this times (2 − share of the run that it lasted)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +39,8 @@ class HeldOut:
             simulate: flies a test on the twin.
 
         Returns:
-            Errors (tests,), all finite: mean squared error over that of the model that never moves on the
-            same test; for a run that ends before the truth does, a penalty.
+            Errors (tests,): mean squared error over that of the model that never moves on the same test; infinite for
+            a run that ends before the truth does.
         """
         return np.array(
             [
@@ -66,20 +65,20 @@ def normalised_error(simulated: Trajectory, truth: Floats) -> float:
         truth: true states (n + 1, n_x).
 
     Returns:
-        A finite number of at least 0.
+        At least 0; infinite where the twin diverges.
     """
     steps = len(truth) - 1
     if steps == 0:
         return 1.0  # a truth that was cut at once tells no twin from one that never moves
     if simulated.steps < steps:
-        return PENALTY * (2.0 - simulated.steps / steps)
+        return math.inf
     wrong = true_states(simulated)[1 : steps + 1] - truth[1:]
     moved = truth[1:] - truth[0]
     frozen = float(np.mean(moved**2))
     error = float(np.mean(wrong**2))
     if frozen == 0.0:
-        return 0.0 if error == 0.0 else PENALTY
-    return min(error / frozen, PENALTY)
+        return 0.0 if error == 0.0 else math.inf
+    return error / frozen
 
 
 def controllers(subject: Subject) -> Floats:

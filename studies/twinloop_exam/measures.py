@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
@@ -80,14 +84,55 @@ def number_of_terms(program: _core.Program) -> int:
     return sums + sum(not zero[register] for register in outputs)
 
 
-def quantiles(errors: Floats) -> tuple[float, float]:
-    """Median and 90th percentile.
+QUANTILES = {"error_median": 0.5, "error_p90": 0.9}
+"""Shares of the held-out controllers whose errors are below these measures."""
+
+
+def quantiles(values: ArrayLike, shares: Sequence[float]) -> list[float]:
+    """Quantiles of numbers of which some may be infinite.
 
     Args:
-        errors: (n,).
+        values: (n,), at least one.
+        shares: 0 to 1.
 
     Returns:
-        The two.
+        One a share, between the two values whose ranks are nearest; infinite where the upper one is.
     """
-    median, tail = np.quantile(errors, [0.5, 0.9])
-    return float(median), float(tail)
+    numbers = np.sort(np.asarray(values, dtype=np.float64))
+    upper = [math.ceil((len(numbers) - 1) * share) for share in shares]
+    finite = np.where(np.isfinite(numbers), numbers, np.finfo(np.float64).max)
+    found = np.quantile(finite, shares).tolist()
+    return [
+        value if np.isfinite(numbers[place]) else math.inf for value, place in zip(found, upper, strict=True)
+    ]
+
+
+def ranked(measures: Mapping[str, float | None], controllers: int) -> dict[str, float | None]:
+    """Measures as a store has them, with held-out errors that are infinite where too many of the runs diverged.
+
+    A store has no number there, or one that earlier versions put in its place; it has how many runs diverged.
+
+    Args:
+        measures: by name.
+        controllers: how many were held out.
+
+    Returns:
+        The same with those errors.
+    """
+    diverged = measures.get("diverged") or 0.0
+    lost = [
+        name
+        for name, share in QUANTILES.items()
+        if diverged >= controllers - math.ceil((controllers - 1) * share)
+    ]
+    return {**measures, **dict.fromkeys(lost, math.inf)}
+
+
+def number(value: float, digits: int) -> str:
+    """An error as text.
+
+    Args:
+        value: infinite if the twin diverges.
+        digits: significant ones.
+    """
+    return f"{value:.{digits}g}" if math.isfinite(value) else "diverges"

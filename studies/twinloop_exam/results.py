@@ -6,10 +6,9 @@ import copy
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from twinloop_exam.kinds import Learner
 from twinloop_exam.learners import key
+from twinloop_exam.measures import quantiles
 from twinloop_exam.plan import TUNING_SEEDS
 from twinloop_exam.store import Row, Store
 
@@ -117,7 +116,7 @@ class Results:
 
 
 def spread(values: Mapping[int, float] | Sequence[float]) -> Spread | None:
-    """Statistics over seeds.
+    """Statistics over seeds, by rank: some may be infinite.
 
     Args:
         values: by seed, or in any order.
@@ -128,5 +127,5 @@ def spread(values: Mapping[int, float] | Sequence[float]) -> Spread | None:
     numbers = list(values.values()) if isinstance(values, Mapping) else list(values)
     if not numbers:
         return None
-    low, middle, high = np.quantile(numbers, [0.25, 0.5, 0.75])
-    return Spread(float(middle), float(low), float(high), min(numbers), max(numbers), len(numbers))
+    low, middle, high = quantiles(numbers, [0.25, 0.5, 0.75])
+    return Spread(middle, low, high, min(numbers), max(numbers), len(numbers))

@@ -17,6 +17,7 @@ import numpy as np
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.trajectory import Trajectory
 from twinloop_exam import held_out
+from twinloop_exam.measures import ranked
 from twinloop_exam.systems import Subject
 
 SCHEMA = 2
@@ -170,7 +171,13 @@ class Store:
             (system, learner, settings),
         )
         return [
-            Row(Address(system, learner, seed, settings), k, json.loads(measures), seconds, failure)
+            Row(
+                Address(system, learner, seed, settings),
+                k,
+                ranked(json.loads(measures), held_out.COUNT),
+                seconds,
+                failure,
+            )
             for seed, k, measures, seconds, failure in found
         ]
 

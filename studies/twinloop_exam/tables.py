@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from twinloop.faces.result import to_json
 from twinloop.faces.text import table
 from twinloop_exam.bars import BARS
+from twinloop_exam.measures import number
 from twinloop_exam.results import Results, Spread, spread
 from twinloop_exam.systems import subject
 
@@ -86,14 +87,29 @@ def tables(results: Results) -> list[Table]:
 def _held_out(results: Results, system: str, learners: Sequence[str]) -> Table:
     learners = [who for who in learners if _has_twin(results, system, who)]
     columns = _columns(results, system, learners)
-    rows = [[who, *(_error_cell(results, system, who, k) for k in columns)] for who in learners]
+    rows = [
+        [
+            who,
+            *(_error_cell(results, system, who, k) for k in columns),
+            _diverged(results, system, who, columns),
+        ]
+        for who in learners
+    ]
     notes = (
         "Cells: median over seeds of the median / of the 90th percentile over 100 held-out controllers,"
-        " [quartiles over seeds of the median], number of seeds. 1 is a model that never moves.",
+        " [quartiles over seeds of the median], number of seeds. 1 is a model that never moves. Medians and percentiles"
+        " are of ranks, in which a run that diverges comes last. The last column: how many of the 100 diverge, median"
+        " over seeds, for each of the columns before, or for all of them.",
     )
-    return Table(
-        f"{system}: normalised error on held-out controllers", _headed("after Υ0 +", columns), rows, notes
-    )
+    head = [*_headed("after Υ0 +", columns), "of 100 diverge"]
+    return Table(f"{system}: normalised error on held-out controllers", head, rows, notes)
+
+
+def _diverged(results: Results, system: str, learner: str, columns: Sequence[int]) -> str:
+    """How many of the held-out runs diverge, for each column."""
+    counts = [spread(results.values(system, learner, "diverged", k)) for k in columns]
+    shown = ["–" if count is None else f"{count.median:g}" for count in counts]
+    return shown[0] if len(set(shown)) == 1 else ", ".join(shown)
 
 
 def _has_twin(results: Results, system: str, learner: str) -> bool:
@@ -109,7 +125,8 @@ def _error_cell(results: Results, system: str, learner: str, k: int) -> str:
     failed = results.failures(system, learner, k)
     if middle is None or upper is None:
         return f"– ({failed} failed)" if failed else "–"
-    text = f"{middle.median:.2g} / {upper.median:.2g} [{middle.low:.2g}, {middle.high:.2g}]"
+    shown = [number(value, 2) for value in (middle.median, upper.median, middle.low, middle.high)]
+    text = "{} / {} [{}, {}]".format(*shown)
     return f"{text} {_seeds(middle, failed)}"
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import product
 
 from twinloop_exam.kinds import Fitter, Tuner
+from twinloop_exam.measures import quantiles
 from twinloop_exam.results import Results
 from twinloop_exam.tables import Table
 
@@ -48,9 +49,9 @@ def score(results: Results, system: str, who: Tunable) -> float:
         who: the variant.
 
     Returns:
-        The geometric mean over seeds, of a fit's median and 90th percentile of the held-out error after
-        each of `EXPERIMENTS`, or of an optimiser's last quality. It lets a few runs that diverge count, and
-        no more. Infinite if anything failed or is missing.
+        The median over seeds of a fit's median and 90th percentile of the held-out error after each of
+        `EXPERIMENTS`, and the geometric mean of these four; or the median of an optimiser's last quality. It lets a
+        few runs that diverge count, and no more. Infinite if more do, or if anything failed or is missing.
     """
     fits = isinstance(who, Fitter)
     measures = ("error_median", "error_p90") if fits else ("quality",)
@@ -62,8 +63,8 @@ def score(results: Results, system: str, who: Tunable) -> float:
             found = results.values(system, who.name, measure, k)
             if not found:
                 return math.inf
-            numbers += [max(value, 1e-300) for value in found.values()]
-    return math.exp(math.fsum(math.log(value) for value in numbers) / len(numbers))
+            numbers += quantiles(list(found.values()), [0.5])
+    return math.exp(math.fsum(math.log(max(value, 1e-300)) for value in numbers) / len(numbers))
 
 
 def tuned(who: Tunable, scores: Sequence[tuple[Tunable, float]]) -> Table:
@@ -85,4 +86,4 @@ def tuned(who: Tunable, scores: Sequence[tuple[Tunable, float]]) -> Table:
         ]
         for variant, found in sorted(scores, key=lambda pair: pair[1])
     ]
-    return Table(f"{who.name}: geometric mean over seeds", [*names, "score", ""], rows)
+    return Table(f"{who.name}: geometric mean of medians over seeds", [*names, "score", ""], rows)

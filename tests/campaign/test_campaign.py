@@ -272,7 +272,7 @@ def test_a_twin_that_runs_away_is_cut_at_the_same_step_with_and_without_a_contro
     text = "program inputs=3 outputs=2 registers=5\npage 1\n  r3 = r0 * 1.0\n  r4 = r1 * 2.0\n"
     model = tl._core.Model(tl._core.Program.parse(text), "absolute", pendulum_signals.engine)
     for factor in (0.5, 1.0, 2.0, 3.0):  # limits of the rate that are powers of two, and one that is not
-        twin = tl.Twin(model, pendulum_signals, divergence_factor=factor)
+        twin = tl.Twin(model, pendulum_signals, limits=tl.Limits(pendulum_signals, factor))
         flown, driven = twin.simulate(test), twin.simulate_commands([1.0, 1.0], np.zeros((9, 1)))
         assert flown.ended == driven.ended == "diverged"
         assert flown.steps == driven.steps

@@ -239,11 +239,11 @@ def test_a_test_search_goes_on_from_its_record_with_the_same_bits(searched):
 
     setup, models = searched.setup, searched.models
     search = start_tests(
-        models, setup.family, setup.task, setup.options, seed=3, iteration=1, workers=WORKERS
+        models, setup.setting, setup.task, setup.options, seed=3, iteration=1, workers=WORKERS
     ).advance(2, WORKERS)
     snapshot = TestSnapshot.of(search)
     assert same(again(snapshot), snapshot)
-    restored = again(snapshot).restored(models, setup.family, setup.task, setup.options, WORKERS)
+    restored = again(snapshot).restored(models, setup.setting, setup.task, setup.options, WORKERS)
     moved = [TestSnapshot.of(s.advance(3, WORKERS)) for s in (search, restored)]
     assert same(*moved)
     assert restored.flat == search.flat
@@ -286,11 +286,11 @@ def test_genes_outside_their_bounds_are_no_tests(searched):
 
     setup, models = searched.setup, searched.models
     search = start_tests(
-        models, setup.family, setup.task, setup.options, seed=3, iteration=1, workers=WORKERS
+        models, setup.setting, setup.task, setup.options, seed=3, iteration=1, workers=WORKERS
     )
     wrong = dataclasses.replace(TestSnapshot.of(search), population=search.population + 100.0)
     with pytest.raises(tl.InvalidInput, match="bounds"):
-        wrong.restored(models, setup.family, setup.task, setup.options, WORKERS)
+        wrong.restored(models, setup.setting, setup.task, setup.options, WORKERS)
 
 
 # Setups and systems

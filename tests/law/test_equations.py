@@ -1,6 +1,8 @@
 """The printed equations, read again by a small parser and by SymPy, give what the engine computes."""
 
 import re
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,10 +11,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
+from law_twins import TWINS, twin_of
 from oracles import EXACT, evaluate, registers_of, same_bits
 from strategies import exact_programs, program_text, programs, rows
 from twinloop import _core
 from twinloop.law.equations import equations
+from twinloop.law.forms import FORMS
 from twinloop.law.law import Law
 
 SIGNALS = tl.Signals(
@@ -183,37 +187,128 @@ def test_an_acceleration_is_written_as_derivatives():
     assert same_bits(read(text, [[2.0, 7.0, 0.25, 0.0]]), [[7.0, -0.75]])
 
 
-def later(text):
-    """With names in the place of states a period later."""
-    return text.replace("[k+1]", "_later")
+def stepped(law, state, command):
+    """A step of Euler by a law's text alone; its head says of which states derivatives are taken later."""
+    text = equations(law, digits=17)
+    head = " ".join(line.removeprefix("#").strip() for line in text.split("\n\n")[0].splitlines())
+    (dt,) = re.findall(r"x\[k\+1\] = x \+ (\S+) \* d x / dt, of the states as they are", head)
+    late = re.search(r", but (.*) of (.*) as (?:it has|they have) become;", head)
+    moved, by = ([], []) if late is None else (part.split(", ") for part in late.groups())
+    scales = [one.size for one in law.signals.commands]
+    names = law.signals.state_names
+    values = dict(zip(law.symbols, [*state, *(command / scales)], strict=True))
+    slopes = dict(written(text))
+    after = dict(values)
+    for name in sorted(names, key=lambda name: f"d {name} / dt" in moved):
+        seen = values | ({each: after[each] for each in by} if f"d {name} / dt" in moved else {})
+        after[name] = values[name] + float(dt) * evaluate(slopes[f"d {name} / dt"], seen)
+    return np.array([after[name] for name in names])
 
 
-@pytest.mark.parametrize("form", ["explicit-euler", "semi-implicit-euler"])
-def test_a_step_of_euler_is_written_as_the_state_and_a_period_times_its_derivative(form):
-    law = law_of(parsed(4, 1, 5, ["r4 = r0 * -0.5", "r4 = r4 + r2"]), form)
+@pytest.mark.parametrize(
+    "which",
+    [
+        "explicit Euler",
+        "semi-implicit Euler",
+        "kinematics, explicit Euler",
+        "kinematics, semi-implicit Euler",
+    ],
+)
+def test_a_step_of_euler_is_written_as_derivatives_and_the_step_in_words(which):
+    law = Law.of(TWINS[which]().model, TWINS[which]().signals)
+    at_once = replace(law, actuation=law.actuation.direct(law.signals))
     text = equations(law)
-    after = "[k+1]" if form == "semi-implicit-euler" else ""
-    assert f"x[k+1] = x + 0.1*v{after}" in text and "v[k+1] = v + 0.1*(-0.5*x + u_scaled)" in text
-    inputs = np.array([[1.0, 2.0, 0.5, 0.1], [3.0, -2.0, 0.0, 0.1]])
-    values = dict(zip(NAMES, inputs.T, strict=True))
-    for left, right in reversed(written(later(equations(law, digits=17)))):
-        values[left] = evaluate(right, values)
-    found = np.stack([values["x_later"], values["v_later"]], axis=1)
-    assert same_bits(found, law.model().step(inputs[:, :2], inputs[:, 2:] * [2.0, 1.0]))
+    assert ("become" in text) == ("semi-implicit" in which)
+    random = np.random.default_rng(4)
+    for _ in range(5):
+        state = random.uniform(-1.2, 1.2, law.signals.n_x)
+        command = np.array([random.uniform(*one.bounds) for one in law.signals.commands])
+        (expected,) = at_once.model().step([state], [command])
+        np.testing.assert_allclose(stepped(law, state, command), expected, rtol=1e-12, atol=1e-14)
 
 
-def test_the_constants_of_a_step_of_euler_have_their_spread():
-    drags = [-0.5, -0.52, -0.47]
-    members = [
-        law_of(parsed(4, 1, 6, [f"r4 = r1 * {drag}", "r5 = r0 * 0.25", "r4 = r4 + r5"]), "explicit-euler")
-        for drag in drags
-    ]
-    text = equations(members[0], members)
-    (line,) = (line for line in text.splitlines() if "0.5*v" in line)
-    assert line.endswith(f"# ± {np.std(drags, ddof=1):.2g}")
-    right = dict(written(later(text)))["v_later"]
-    x, v = sympy.symbols("x v")
-    assert sympy.expand(sympy.sympify(right) - (v + 0.1 * (0.25 * x - 0.5 * v))) == 0
+def test_states_that_others_move_by_turns_are_each_named_in_the_step():
+    states = [tl.State("x", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="x"),
+              tl.State("a", "m/s2", 1.0, derivative_of="v")]  # fmt: skip
+    signals = tl.Signals(states=states, commands=[tl.Command("u", "V", (-1.0, 1.0))], dt=0.1)
+    program = parsed(4, 1, 6, ["r4 = r3 * 2.0", "r5 = r0 * 0.5", "r4 = r4 - r5"])
+    law = Law.of(_core.Model(program, "semi-implicit-euler", signals.engine), signals)
+    assert "but d x / dt, d v / dt of v, a as they have become" in " ".join(equations(law).split())
+
+
+def perturbed(law, share):
+    """The law with each constant, lag, time and offset a little larger."""
+    program = str(law.model().program)
+    program = re.sub(r"-?\d+\.\d+(?:e-?\d+)?", lambda m: repr(float(m[0]) * (1.0 + share)), program)
+    actuators = [(each.lag * (1.0 + share), each.delay, each.rest) for each in law.actuation.actuators]
+    hidden = [(*each[:3], each.time * (1.0 + share)) for each in law.actuation.hidden]
+    offsets = [offset * (1.0 + share) for offset in law.offsets]
+    signals = law.signals
+    found = _core.Model(
+        _core.Program.parse(program),
+        law.form,
+        signals.engine,
+        actuators,
+        hidden,
+        offsets if any(offsets) else (),
+    )
+    return Law.of(found, signals)
+
+
+LONG = ["r4 = sin(r0)", "r4 = r4 * -9.0", "r5 = cos(r0)", "r6 = tanh(r1)", "r5 = r5 * r6", "r5 = r5 * r1",
+        "r5 = r5 * r2", "r6 = sin(r1)", "r5 = r5 * r6", "r6 = r3 * 0.25", "r6 = cos(r6)", "r5 = r5 * r6",
+        "r5 = r5 * 0.125", "r4 = r4 + r5", "r5 = r4 * r1", "r4 = r4 + r5"]  # fmt: skip
+"""Terms of more than half a line."""
+FAR = tl.Signals(
+    states=[tl.State(f"{axis}_of_the_hull", "rad", 3.0) for axis in ("roll", "pitch", "yaw")]
+    + [tl.State(f"{axis}_rate_of_the_hull", "rad/s", 5.0) for axis in ("roll", "pitch", "yaw")],
+    commands=[tl.Command("thrust", "N", (-2.0, 2.0))],
+    dt=0.05,
+    kinematics=tl.RigidBody(
+        tuple(f"{axis}_of_the_hull" for axis in ("roll", "pitch", "yaw")),
+        tuple(f"{axis}_rate_of_the_hull" for axis in ("roll", "pitch", "yaw")),
+    ),
+)
+TURNED = ["r7 = r6 * 2.0", "r8 = r3 * r5", "r8 = r8 * -0.3", "r9 = sin(r0)"]
+LAWS = {
+    **TWINS,
+    **{f"long terms, {form}": partial(twin_of, LONG, form) for form in FORMS},
+    **{f"long names, {form}": partial(twin_of, TURNED, form, FAR, 7) for form in FORMS[2:]},
+}
+
+
+@pytest.mark.parametrize("digits", [6, 17])
+@pytest.mark.parametrize("which", LAWS)
+def test_each_line_of_every_form_is_read_by_sympy_and_has_its_deviation(which, digits):
+    twin = LAWS[which]()
+    law = Law.of(twin.model, twin.signals)
+    members = [law, *(perturbed(law, share) for share in (0.01, -0.02))]
+    text = equations(law, members, digits)
+    each_line_is_read_by_sympy(text)
+    assert all(len(line) <= 100 for line in text.splitlines())
+    assert len(written(text)) >= law.signals.n_x + len(law.actuation.hidden)
+    if digits == 17:
+        return
+    head, body = text.split("\n\n")
+    lags = {each for each in law.actuation.actuators if each.lag > 0.0}
+    assert head.count("±") == 1 + len(lags) + np.count_nonzero(law.offsets)
+    for left, right, said in blocks(body):
+        part = re.fullmatch(r"t_*\d+", left)  # whose constants have theirs where it is used
+        constants = re.findall(r"(?<![\w*])\d", right)
+        assert part or not constants or "±" in said, f"{left} = {right}"
+
+
+def blocks(body):
+    """Left side, right side and notes of each equation."""
+    found = []
+    for line in body.splitlines():
+        bare, _, note = line.partition("#")
+        if " = " in bare:
+            found.append([*bare.split(" = ", 1), ""])
+        else:
+            found[-1][1] += bare
+        found[-1][2] += note
+    return found
 
 
 def test_the_legend_says_what_the_symbols_mean():

@@ -99,3 +99,19 @@ def test_a_newer_record_is_refused_with_a_sentence(tmp_path):
     (tmp_path / "twin.json").write_text(json.dumps({**record, "version": 99}), encoding="utf-8")
     with pytest.raises(tl.InvalidInput, match="99"):
         tl.load_twin(tmp_path / "twin.json")
+
+
+@pytest.mark.parametrize("path", SAVED, ids=lambda path: path.stem)
+def test_a_record_has_the_factor_of_divergence_of_which_limits_are_made(path, tmp_path):
+    record = json.loads(json.loads(path.read_text(encoding="utf-8"))["twin"])
+    (tmp_path / "twin.json").write_text(json.dumps({**record, "divergence_factor": 3.5}), encoding="utf-8")
+    twin = tl.load_twin(tmp_path / "twin.json")
+    for i, state in enumerate(twin.signals.states):
+        assert twin.limits.states[i] == (np.inf if state.periodic else 3.5 * state.scale)
+    assert twin.to_record()["divergence_factor"] == 3.5
+
+
+def test_limits_of_other_signals_are_refused(pendulum_signals, quadrotor):
+    model = tl._core.Model(tl._core.Grammar(3, 1).random(0)[0], "acceleration", pendulum_signals.engine)
+    with pytest.raises(tl.InvalidInput, match="limits"):
+        tl.Twin(model, pendulum_signals, limits=tl.Limits(quadrotor.signals))

@@ -25,7 +25,7 @@ def twin_of(signals, lines, offsets=(), factor=10.0):
     inputs, outputs = signals.n_x + signals.n_u, len(signals.driven)
     program = _core.Program.parse(program_text(inputs, outputs, inputs + outputs + 2, [lines]))
     model = _core.Model(program, "acceleration", signals.engine, offsets=list(offsets))
-    return tl.Twin(model, signals, divergence_factor=factor)
+    return tl.Twin(model, signals, limits=tl.Limits(signals, factor))
 
 
 def late_by(signals, late):

@@ -93,7 +93,7 @@ def test_the_result_and_its_text_say_what_counts():
 def test_a_gain_at_a_bound_is_marked_in_json_text_and_report(value, bound, monkeypatch):
     campaign = lived(begun(), ("tell",))
     best = dataclasses.replace(campaign.experiments[0].test, genes=np.array([value, 2.0, 0.3]))
-    monkeypatch.setattr("twinloop.faces.result.controller_to_fly", lambda campaign: (best, ""))
+    monkeypatch.setattr(type(campaign), "best_test", best)
     result = summary(campaign, {"name": "it"}, {})
     assert [gain["at_bound"] for gain in result["controller"]["gains"]] == [bound, "", ""]
     assert render(result).count("at its ") == (bound != "") and f"{bound} bound" * (bound != "") in render(

@@ -8,6 +8,8 @@ import sqlite3
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
 
 import twinloop as tl
 from twinloop import _core
@@ -127,15 +129,63 @@ def test_the_truth_has_no_error_and_what_never_moves_has_1(rig, judge):
     np.testing.assert_allclose(judge.errors(frozen), 1.0)
 
 
-def test_a_twin_that_diverges_pays_a_large_finite_penalty_less_the_longer_it_lasts(rig, judge):
+def test_a_twin_that_diverges_has_an_infinite_error_however_long_it_lasts(rig, judge):
     def cut(steps):
         return lambda test: tl.Trajectory(
             0.02 * np.arange(steps + 1), np.zeros((steps + 1, 6)), np.ones((steps, 4))
         )
 
-    early, late = judge.errors(cut(1)), judge.errors(cut(99))
-    assert np.isfinite(early).all() and (late >= held_out.PENALTY).all()
-    assert (early > late).all()
+    assert np.isinf(judge.errors(cut(1))).all() and np.isinf(judge.errors(cut(99))).all()
+    assert np.isfinite(judge.errors(cut(100))).all()
+
+
+@given(
+    st.lists(st.one_of(st.floats(0.0, 1e9), st.just(math.inf)), min_size=1, max_size=120),
+    st.sampled_from([0.0, 0.25, 0.5, 0.9, 1.0]),
+)
+def test_quantiles_are_numpys_where_they_lie_between_finite_numbers_and_else_infinite(values, share):
+    (found,) = measures.quantiles(values, [share])
+    ranks = sorted(values)
+    place = (len(ranks) - 1) * share
+    if math.isinf(ranks[math.ceil(place)]):
+        assert math.isinf(found)
+    else:
+        low, high = ranks[math.floor(place)], ranks[math.ceil(place)]
+        assert found == pytest.approx(low + (place - math.floor(place)) * (high - low))
+    if all(map(math.isfinite, values)):
+        assert found == np.quantile(values, share)
+
+
+@pytest.mark.parametrize("diverged", [0, 9, 10, 49, 50, 100])
+def test_a_store_gives_back_infinite_errors_and_reads_those_of_earlier_versions(store, diverged):
+    """Earlier versions had 1e6 to 2e6 for a run that diverged, and interpolated between it and a finite error."""
+    errors = np.concatenate([np.linspace(0.1, 0.5, 100 - diverged), np.full(diverged, math.inf)])
+    median, tail = measures.quantiles(errors, [0.5, 0.9])
+    before = np.quantile(np.where(np.isinf(errors), 1.7e6, errors), [0.5, 0.9]).tolist()
+    for seed, (middle, upper) in enumerate([(median, tail), before]):
+        values = {"error_median": middle, "error_p90": upper, "diverged": float(diverged), "terms": 3.0}
+        store.write(Row(Address("quadrotor", "ours", 20 + seed, "x"), 0, values, 1.0))
+    now, earlier = store.rows("quadrotor", "ours", "x")
+    assert now.measures == earlier.measures
+    assert (now.measures["error_median"], now.measures["error_p90"]) == (median, tail)
+    assert math.isinf(now.measures["error_p90"]) == (diverged >= 10)
+    assert math.isinf(now.measures["error_median"]) == (diverged >= 50)
+
+
+def test_tables_say_that_a_twin_diverges_and_on_how_many_of_the_controllers(store):
+    ours = Campaigner("ours", "paper")
+    for seed, lost in ((10, 20.0), (11, 40.0), (12, 70.0)):
+        for k, diverged in ((0, lost), (1, 0.0)):
+            values = {"error_median": 0.5, "error_p90": 0.7, "diverged": diverged}
+            store.write(Row(Address("quadrotor", "ours", seed, key(ours)), k, values, 1.0))
+    results = Results(store, ["quadrotor"], [ours], ours)
+    (row,) = tables(results)[0].rows
+    assert row == ["ours", "0.5 / diverges [0.5, diverges] (3)", "0.5 / 0.7 [0.5, 0.5] (3)", "40, 0"]
+    cell = json.loads(render(results, "json"))["cells"][0]
+    assert cell["error_p90"]["median"] is None and cell["diverged"]["median"] == 40.0
+    text, met = bars.held_out("quadrotor", 0, 1.0, 1.0).judge(results)
+    assert text == "0.5 / diverges (3 seeds)" and not met
+    assert bars.no_forgetting("quadrotor").judge(results) is None
 
 
 def test_held_out_runs_come_back_from_a_store_with_the_same_bits(rig, judge, tmp_path):
@@ -545,7 +595,7 @@ def filled(store):
 def test_cells_are_medians_over_seeds_with_quartiles_and_failures(filled):
     shown = {table.title: table for table in tables(filled)}
     errors = shown["quadrotor: normalised error on held-out controllers"]
-    assert list(errors.head) == ["after Υ0 +", "0", "1", "2"]
+    assert list(errors.head) == ["after Υ0 +", "0", "1", "2", "of 100 diverge"]
     assert errors.rows[0][2] == "0.0002 / 0.002 [0.00015, 0.00025] (3, 1 failed)"
     controllers = shown["quadrotor: controller to fly"]
     assert controllers.rows[0][1] == "0.2 [0.15, 0.25] (3)"
@@ -567,7 +617,7 @@ def test_ablations_stand_beside_ours_on_the_same_seeds(store, filled):
 
 def test_a_table_reads_as_markdown_and_as_json(filled):
     lines = as_markdown(tables(filled)[0]).splitlines()
-    assert lines[2].startswith("| after Υ0 + | 0 | 1") and lines[3] == "| --- | --- | --- | --- |"
+    assert lines[2].startswith("| after Υ0 + | 0 | 1") and lines[3] == "| --- | --- | --- | --- | --- |"
     cells = json.loads(render(filled, "json"))["cells"]
     cell = next(cell for cell in cells if cell["learner"] == "ours" and cell["k"] == 1)
     assert cell["failed"] == 1 and cell["error_median"]["seeds"] == 3

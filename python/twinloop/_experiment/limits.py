@@ -13,6 +13,9 @@ from twinloop.controllers import Family
 from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
+DIVERGENCE_FACTOR = 10.0
+"""Multiple of a state's scale beyond which a run counts as diverged, where nobody says another one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Limits:
@@ -27,7 +30,7 @@ class Limits:
     """
 
     signals: Signals
-    divergence_factor: float = 10.0
+    divergence_factor: float = DIVERGENCE_FACTOR
 
     def __post_init__(self) -> None:
         with engine_input():

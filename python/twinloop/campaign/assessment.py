@@ -11,13 +11,15 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
-from twinloop.campaign.history import Cause, Experiment, Lesson
+from twinloop.campaign.history import Cause, Experiment, Iteration, Lesson
+from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.identification.sensors.noise import exact
 from twinloop.law.flight import fly
 from twinloop.law.twin import Twin
 from twinloop.test import Test
+from twinloop.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from twinloop.campaign.campaign import Campaign
@@ -165,6 +167,41 @@ def rmse(twin: Twin, experiments: Sequence[Experiment]) -> Floats:
         squares += np.square(twin.signals.difference(flown, simulated[: len(flown)])).sum(axis=0)
         rows += len(flown)
     return np.asarray(np.sqrt(squares / max(1, rows)), dtype=np.float64)
+
+
+def foreseen(campaign: Campaign, test: Test) -> Trajectory | None:
+    """The run that the twin of today predicts of a test, with its band; None before there is any run.
+
+    Args:
+        campaign: that asked for it.
+        test: to be flown.
+    """
+    return campaign.twin.simulate(test) if campaign.experiments else None
+
+
+def latest_lesson(campaign: Campaign) -> Lesson | None:
+    """The record of the last identification; None where the preset identifies nothing, or nothing is learnt yet.
+
+    Args:
+        campaign: with or without runs.
+    """
+    last = campaign.history[-1] if campaign.history else None
+    return last if isinstance(last, Lesson) else None
+
+
+def behind(campaign: Campaign) -> bool:
+    """Whether what was learnt last was interrupted, or is not of all runs.
+
+    Args:
+        campaign: that has learnt something.
+    """
+    last, options = campaign.history[-1], campaign.options
+    running = (
+        isinstance(last, Iteration)
+        and isinstance(options, Options)
+        and last.generations < options.model_generations
+    )
+    return running or len(last.tests) < len(campaign.experiments)
 
 
 def expected_quality(twin: Twin, setup: Setup, test: Test) -> float | None:

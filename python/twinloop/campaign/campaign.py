@@ -70,7 +70,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
             other states with 1, each in units of its scale ("final_distance": all with 1, as they are).
         operators: that evolved programs may use; by default the preset's.
         threads: number of threads of the engine, by default all; no result depends on it.
-        progress: called with a `Progress` a few times a second during the work.
+        progress: called with a `Progress` a few times a second during the work. True: a table on standard error with
+            the remaining time, if that is a terminal, and nothing elsewhere. None or False: nothing.
         store: a file of SQLite, or the address of a database such as "postgresql+psycopg://user@host/database", where
             each test and each run is committed before the call returns. An existing campaign of this name, with the
             same arguments, continues with the same bits. None: the campaign ends with the process.
@@ -98,7 +99,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         weights: Mapping[str, float] | None = None,
         operators: Sequence[str] | None = None,
         threads: int | None = None,
-        progress: Callable[[Progress], None] | None = None,
+        progress: Callable[[Progress], None] | bool | None = True,
         store: str | Path | None = None,
         name: str = "campaign",
         **other: object,
@@ -176,9 +177,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
             NotAvailable: there is no run yet.
         """
         self.interrupted = False
-        self._learn()
-        with self._interruptible(), self._entering():
-            return self._method.ask(self._book, bool(last))
+        with self._at_work():
+            self._learn()
+            with self._entering():
+                return self._method.ask(self._book, bool(last))
 
     def ask_batch(self, size: int = 3) -> tuple[Test, ...]:
         """Alternatives: the waiting tests, with new ones from `ask` until there are `size`.
@@ -325,7 +327,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self.interrupted = False
         if self._keeping is not None:
             self._keeping.fly(system, budget)
-        with self._interruptible():
+        runs = len(self._book.experiments) + budget - self.runs
+        with self._at_work(type(system).__name__, runs):
             fly(self, system, budget, timeout, allowed, self._report_experiment)
         return self
 
@@ -398,7 +401,15 @@ class Campaign(Shown, Persistent, kind="campaign"):
     def twin(self) -> Twin:
         """The best model, after learning all runs; the best so far after an interruption."""
         self._learn()
-        return self._method.twin(self._book)
+        known, twin = self._shown_twin or (None, None)
+        now = self._method.memory.latest, self._book.revision
+        if twin is None or known is None or known[0] is not now[0] or known[1] != now[1]:
+            twin = self._method.twin(self._book)
+            self._shown_twin = (
+                now,
+                twin,
+            )  # one object as long as nothing is learnt or told: it remembers what it flew
+        return twin
 
     @property
     def best_test(self) -> Test:
@@ -413,8 +424,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
             NotAvailable: there is no run; or, with "default", no controller to fly: no flight was completed, and the
                 twin does not support its preferred gains.
         """
-        self._learn()
-        with self._interruptible():
+        with self._at_work():
+            self._learn()
             best = self._method.best_test(self._book, at_once=self.interrupted)
             self._keep()  # who looks later need not tune again
             return best
@@ -640,7 +651,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
                 "trust: test = campaign.test(gains), then campaign.tell(test, system.run(test))."
             )
         before = self._method.memory
-        with self._interruptible():
+        with self._at_work():
             self._method.learn(self._book, at_once=self.interrupted)
             self._keep()
         latest = self.history[-1] if self._method.memory is not before and self.history else None
@@ -653,9 +664,12 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return None if model is None else float(closed_loop([model], alone, self._workers)[0, 0])
 
     @contextmanager
-    def _interruptible(self) -> Iterator[None]:
+    def _at_work(self, name: str = "campaign", experiments: int | None = None) -> Iterator[None]:
+        """Work that shows its progress, and that Ctrl-C interrupts without loss."""
+        total = len(self._book.experiments) if experiments is None else experiments
         try:
-            yield
+            with self._own_progress.during(name, total):
+                yield
         except KeyboardInterrupt:
             self.interrupted = True
             self._keep()

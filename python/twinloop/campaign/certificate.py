@@ -91,7 +91,7 @@ def certificate(campaign: Campaign) -> Certificate:
     """
     found = campaign.examine()
     best, twin = found.best, found.twin
-    step = None if best is None else twin.simulate(best)
+    step = found.planned
     uses = () if step is None else _uses(found.experiments, step)
     # Around a twin that does not follow its own flights margins say nothing of the system's.
     margins = found.margins if twin.follows else None

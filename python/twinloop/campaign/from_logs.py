@@ -20,7 +20,7 @@ def identify(
     seed: int = 0,
     options: Mapping[str, object] | None = None,
     threads: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[Progress], None] | bool | None = True,
 ) -> Twin:
     """Learns a twin from recorded runs of any length, under any commands.
 
@@ -32,7 +32,7 @@ def identify(
         seed: of all random numbers; equal seeds give equal bits.
         options: other values for some of the preset's options, by name.
         threads: number of threads of the engine, by default all; no result depends on it.
-        progress: called with a `Progress` a few times a second.
+        progress: as in `Campaign`.
 
     Returns:
         The twin, with its errors on each run, its committee and its remarks.
@@ -51,7 +51,7 @@ def learnt_from_logs(
     seed: int = 0,
     options: Mapping[str, object] | None = None,
     threads: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[Progress], None] | bool | None = True,
 ) -> tuple[Twin, Campaign]:
     """The twin of `identify`, and the campaign behind it to be examined; what that says of a controller means nothing.
 
@@ -62,7 +62,7 @@ def learnt_from_logs(
         seed: of all random numbers; equal seeds give equal bits.
         options: other values for some of the preset's options, by name.
         threads: how many the engine may use, by default all that there are.
-        progress: called with a `Progress` a few times a second.
+        progress: as in `Campaign`.
 
     Raises:
         InvalidInput: no runs, or a run that cannot be learnt.

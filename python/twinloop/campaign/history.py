@@ -10,6 +10,7 @@ from twinloop._experiment.envelope import readings_leave
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
+from twinloop.objectives import normalised_error
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.test import Test
@@ -60,6 +61,17 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     def kept_envelope(self) -> bool:
         """Whether it ran to its end and never left the envelope; False for a run that was cut."""
         return self.complete and not self.left_envelope
+
+    @property
+    def miss(self) -> float | None:
+        """Predicted minus measured quality; None without both."""
+        predicted = None if self.test is None else self.test.predicted
+        return None if predicted is None or self.quality is None else predicted - self.quality
+
+    @property
+    def normalised_before(self) -> float | None:
+        """`before` over the error of the model that never moves; None as long as there was no `ask`."""
+        return None if self.before is None else normalised_error(self.before, self.frozen)
 
     @property
     def usage(self) -> float:

@@ -18,10 +18,12 @@ from twinloop.campaign.identify_and_plan.method import IdentifyAndPlan
 from twinloop.campaign.keeping import Keeping, heading, look
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
+from twinloop.campaign.own_progress import OwnProgress
 from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, engine_input
+from twinloop.law.twin import Twin
 from twinloop.records import Record, Recorded, checked_record
 from twinloop.store import Stored
 
@@ -32,22 +34,27 @@ if TYPE_CHECKING:
 class Persistent(Recorded):
     """The parts of a campaign that stay: its setup, its logbook, what its method remembers; and where they are kept."""
 
-    def _begin(self, setup: Setup, threads: int | None, progress: Callable[[Progress], None] | None) -> None:
+    def _begin(
+        self, setup: Setup, threads: int | None, progress: Callable[[Progress], None] | bool | None
+    ) -> None:
         self.setup = setup
         self.threads = (
             available_threads() if threads is None else whole("Campaign, threads", threads, least=1)
         )
-        if progress is not None and not callable(progress):
+        if progress is not None and not isinstance(progress, bool) and not callable(progress):
             raise InvalidInput(
-                f"Campaign, progress: expected something to call with a Progress, found {progress!r}; pass a function."
+                f"Campaign, progress: expected something to call with a Progress, True or False, found"
+                f" {progress!r}; pass a function."
             )
         self.progress = progress
+        self._own_progress = OwnProgress(setup.options)
         self.interrupted = False
         with engine_input():
             self._workers = _core.Workers(threads=self.threads)
         self._book = Logbook(self.setup)
         self._method = self._chosen()
         self._controller: Controller | None = None
+        self._shown_twin: tuple[tuple[object, int], Twin] | None = None
         self._keeping: Keeping | None = None
 
     def _open(self, where: str | Path, name: str) -> None:
@@ -92,7 +99,7 @@ class Persistent(Recorded):
         record: object,
         *given: object,
         threads: int | None = None,
-        progress: Callable[[Progress], None] | None = None,
+        progress: Callable[[Progress], None] | bool | None = True,
     ) -> Self:
         """The campaign that a record was written of; it goes on with the same bits.
 
@@ -100,7 +107,7 @@ class Persistent(Recorded):
             record: such as `to_record` gives, or JSON gives back.
             given: nothing; a campaign is whole.
             threads: how many the engine may use, by default all that there are.
-            progress: called with a `Progress` a few times a second while the loops run.
+            progress: as in `Campaign`.
 
         Returns:
             A campaign of its own.
@@ -123,10 +130,12 @@ class Persistent(Recorded):
         campaign = object.__new__(type(self))
         campaign.setup, campaign.threads = self.setup, self.threads
         campaign.progress, campaign.interrupted = self.progress, self.interrupted
+        campaign._own_progress = OwnProgress(self.setup.options)
         campaign._workers = _core.Workers(threads=self.threads)
         campaign._book = self._book.copied()
         campaign._method = campaign._chosen()
         campaign._method.memory, campaign._controller = self._method.memory, None
+        campaign._shown_twin = self._shown_twin
         campaign._keeping = None  # a store has one writer
         return campaign
 
@@ -169,7 +178,7 @@ class Persistent(Recorded):
         *,
         read_only: bool = False,
         threads: int | None = None,
-        progress: Callable[[Progress], None] | None = None,
+        progress: Callable[[Progress], None] | bool | None = True,
     ) -> Self:
         """A campaign from a store, where it is kept from now on too; it goes on with the same bits.
 
@@ -178,7 +187,7 @@ class Persistent(Recorded):
             name: of the campaign there; None: the only one.
             read_only: whether to look only: others may write it meanwhile, and what is done here is not kept.
             threads: how many the engine may use, by default all that there are.
-            progress: called with a `Progress` a few times a second while the loops run.
+            progress: as in `Campaign`.
 
         Returns:
             The campaign.
@@ -235,8 +244,10 @@ class Persistent(Recorded):
         if self._keeping is not None:
             self._keeping.checkpoint(self._method)
             self._keeping.say(progress)
-        if self.progress is not None:
+        if callable(self.progress):
             self.progress(progress)
+        elif self.progress:
+            self._own_progress(progress)
 
 
 def available_threads() -> int:

@@ -10,6 +10,7 @@ from typing import Any, Literal, overload
 
 import numpy as np
 
+from twinloop._experiment.limits import DIVERGENCE_FACTOR
 from twinloop.errors import InvalidInput, unknown
 from twinloop.identification.settings import FORMS as ALL_FORMS
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
@@ -83,7 +84,7 @@ class Options:
     reproduction_share: float = 0.1
     elite_share: float = 0.1
     ranking_pressure: float = 1.8
-    divergence_factor: float = 10.0
+    divergence_factor: float = DIVERGENCE_FACTOR
     archive_cap: int = 10_000
     committee_size: int = 100
     tradeoff: str = "raw"
@@ -97,6 +98,11 @@ class Options:
     def identifies(self) -> Literal[False]:
         """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
         return False
+
+    @property
+    def example(self) -> str:
+        """An option with another value, as text."""
+        return "pages=3"
 
     def __post_init__(self) -> None:
         _check(self, RANGES["paper"])
@@ -141,6 +147,11 @@ class DefaultOptions(PlanningOptions, IdentificationOptions):
     def identifies(self) -> Literal[True]:
         """Whether a twin is identified by regression, with its noise and a committee, and not evolved as a whole."""
         return True
+
+    @property
+    def example(self) -> str:
+        """An option with another value, as text."""
+        return "lags=false"
 
     def __post_init__(self) -> None:
         _check(self, RANGES["default"])

@@ -27,7 +27,7 @@ def taken_twin(
             " tests, or pass force=True (--force)."
         )
     setup = campaign.setup
-    episode = Episode(setup.initial_state, setup.final_target, setup.steps, setup.options.divergence_factor)
+    episode = Episode(setup.initial_state, setup.final_target, setup.steps, setup.limits)
     return campaign.twin.export(to, kind=kind, precision=precision, force=force, episode=episode)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from twinloop.campaign import Campaign
+from twinloop.campaign.assessment import foreseen
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
@@ -93,7 +94,7 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
 
 def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, object]]:
     """The sheet of a test, and the same as facts; its file is written."""
-    predicted = campaign.twin.simulate(test) if campaign.experiments else None
+    predicted = foreseen(campaign, test)
     beside = file_beside(store)
     stem = Path("campaign") if beside is None else beside.with_suffix("")
     file = stem.with_name(f"{stem.name}-test-{test.number}.csv")

@@ -240,7 +240,7 @@ def _refuse_beside_a_file(context: click.Context) -> None:
 def _change(preset: str, text: str) -> tuple[str, object]:
     name, separator, value = (part.strip() for part in text.partition("="))
     if not separator:
-        example = "pages=3" if preset == "paper" else "lags=false"
+        example = options_of(preset).example
         raise InvalidInput(f"--set: expected NAME=VALUE, found {text!r}; such as --set {example}.")
     if preset in PRESETS and not hasattr(PRESETS[preset], name):
         for other, options in PRESETS.items():
@@ -265,10 +265,10 @@ def _weight(text: str) -> tuple[str, float]:
 def _generations(preset: str, models: int | None, tests: int | None) -> dict[str, object]:
     given = {"model_generations": models, "test_generations": tests}
     options: dict[str, object] = {name: value for name, value in given.items() if value is not None}
-    if options and preset == "default":
+    if options and options_of(preset).identifies:
         raise InvalidInput(
-            "--generations, --test-generations: expected the preset 'paper', found 'default', which identifies instead"
-            " of evolving whole models; leave them out, or choose --preset paper."
+            f"--generations, --test-generations: expected the preset 'paper', found {preset!r}, which identifies"
+            " instead of evolving whole models; leave them out, or choose --preset paper."
         )
     return options
 

@@ -46,9 +46,17 @@ class Watch:
         self._last_line = -LINE_SECONDS
 
     def _table_on_terminal(self) -> Live:
+        # What a system prints meanwhile goes above the table, but not to where nobody sent it.
+        same = sys.stdout is not None and sys.stdout.isatty()
         if self._in_steps:  # a step may take seconds: the clock goes on within it
-            return Live(console=self._console, get_renderable=self._now, refresh_per_second=4, transient=True)
-        return Live(console=self._console, auto_refresh=False, transient=True)
+            return Live(
+                console=self._console,
+                get_renderable=self._now,
+                refresh_per_second=4,
+                transient=True,
+                redirect_stdout=same,
+            )
+        return Live(console=self._console, auto_refresh=False, transient=True, redirect_stdout=same)
 
     def __enter__(self) -> Watch:
         if self._live is not None:
@@ -82,7 +90,9 @@ class Watch:
             self._seen = progress
             remaining = self._estimate.remaining(progress)
         if self._live is not None:
-            if not self._in_steps:
+            if self._in_steps:
+                self._live.refresh()
+            else:
                 self._live.update(self._table(progress, rate, remaining), refresh=True)
         elif now - self._last_line >= LINE_SECONDS:
             self._last_line = now

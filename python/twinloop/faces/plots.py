@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from twinloop.campaign import Campaign, assessment, controller_to_fly
+from twinloop.campaign.examination.beside import Beside
 from twinloop.errors import NotAvailable
 from twinloop.faces.figures.units import shown_unit
-from twinloop.objectives import normalised_error
 from twinloop.signals import State
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -111,10 +111,11 @@ def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
                 learnt.setdefault(test, float(record.iteration))
     label = "before it was learnt"
     for i, run in enumerate(campaign.experiments):
-        if run.before is None or not run.before > 0.0 or run.test is None or run.test.number not in learnt:
+        before = run.normalised_before
+        if before is None or not before > 0.0 or run.test is None or run.test.number not in learnt:
             continue
         axes.plot(
-            learnt[run.test.number] - 1.0, normalised_error(run.before, run.frozen),
+            learnt[run.test.number] - 1.0, before,
             color=CYCLE[i % len(CYCLE)], marker="o", markersize=6.0, markerfacecolor="none", linestyle="none",
             label=label,
         )  # fmt: skip
@@ -193,13 +194,13 @@ def _save(figure: Any, path: Path) -> None:
 
 
 def _runs(figure: Any, campaign: Campaign) -> None:
-    states, runs, twin = campaign.signals.states, campaign.experiments, campaign.twin
-    banded = twin.noise is not None
+    states, runs, found = campaign.signals.states, campaign.experiments, campaign.examine()
+    banded = found.twin.noise is not None
     rows = len(states) + banded
     grid = figure.subplots(rows, len(runs), sharex=True, sharey="row", squeeze=False)
-    best = controller_to_fly(campaign)[0]
-    for column, run in enumerate(runs):
-        predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
+    best = found.best
+    for column, each in enumerate(found.beside):
+        run, predicted = each.run, each.simulated
         start = run.trajectory.t[0]
         title = "attached" if run.test is None else f"test {run.test.number}"
         if run.test is not None and best is not None and run.test.number == best.number:
@@ -227,7 +228,7 @@ def _runs(figure: Any, campaign: Campaign) -> None:
             if column == 0:
                 axes.set_ylabel(f"{state.name.replace('_', ' ')}\n({unit})")
         if banded:
-            _inside_the_band(grid[-1, column], run.trajectory, predicted, first=column == 0)
+            _inside_the_band(grid[-1, column], each, first=column == 0)
         grid[-1, column].set_xlabel("time (s)")
     for row, state in enumerate(states):
         low, high = _extent([shown_unit(state.unit)[0] * run.trajectory.states[:, row] for run in runs])
@@ -237,16 +238,16 @@ def _runs(figure: Any, campaign: Campaign) -> None:
     figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
 
 
-def _inside_the_band(axes: Any, flown: Trajectory, predicted: Trajectory, first: bool) -> None:
+def _inside_the_band(axes: Any, found: Beside, first: bool) -> None:
     """Every state's distance to the middle of the band, in half-widths: 1 is its edge."""
-    assert predicted.band is not None
-    rows = min(len(flown.states), len(predicted.states))
-    low, high = predicted.band[0, :rows], predicted.band[1, :rows]
-    places = (flown.states[:rows] - 0.5 * (low + high)) / np.maximum(0.5 * (high - low), 1e-300)
-    inside = float((np.abs(places[1:]) <= 1.0).mean()) if rows > 1 else 1.0
-    axes.fill_between(predicted.t[:rows], -1.0, 1.0, **BAND)
-    axes.plot(predicted.t[:rows], places, color=INK, linewidth=0.5, alpha=0.8)
-    axes.set_title(f"{100.0 * inside:.0f} % of the readings inside the band", loc="left", fontsize=8.0)
+    assert found.places is not None
+    times = found.simulated.t[: len(found.places)]
+    axes.fill_between(times, -1.0, 1.0, **BAND)
+    axes.plot(times, found.places, color=INK, linewidth=0.5, alpha=0.8)
+    if found.inside is not None:
+        axes.set_title(
+            f"{100.0 * found.inside:.0f} % of the readings inside the band", loc="left", fontsize=8.0
+        )
     axes.set_ylim(-3.5, 3.5)
     if first:
         axes.set_ylabel("all states,\nin the band")

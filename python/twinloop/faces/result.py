@@ -10,16 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from twinloop.campaign import Campaign, controller_to_fly
-from twinloop.campaign.assessment import disturbances, expected_quality, predicted_quality
+from twinloop.campaign import Campaign
+from twinloop.campaign.assessment import (
+    disturbances,
+    expected_quality,
+    latest_lesson,
+    predicted_quality,
+)
 from twinloop.campaign.cost import Cost
+from twinloop.campaign.examination.beside import Beside
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
-from twinloop.objectives import normalised_error
 from twinloop.planning.quality import Quality, quality_unit
 from twinloop.test import Test
+from twinloop.trajectory import Trajectory
 
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 Result = dict[str, Value]
@@ -40,8 +46,9 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         KeyboardInterrupt: while learning; calling again gives the best so far.
         NotAvailable: nothing was told.
     """
-    twin, (best, why) = campaign.twin, controller_to_fly(campaign)
-    identified = campaign.options.identifies
+    found = campaign.examine()
+    twin, best, identified = found.twin, found.best, campaign.options.identifies
+    foretold = {each.place: each.predicted for each in found.unseen}
     result: dict[str, object] = {
         "system": dict(system),
         "preset": campaign.setup.preset,
@@ -55,19 +62,15 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             "target_state": campaign.setup.target_state.tolist(),
             "steps": campaign.setup.steps,
             "dt": campaign.signals.dt,
-            "distance": float(
-                np.linalg.norm(
-                    campaign.signals.difference(campaign.setup.final_target, campaign.setup.initial_state)
-                )
-            ),
+            "distance": found.distance,
         },
         "signals": {
             "states": [dataclasses.asdict(state) for state in campaign.signals.states],
             "commands": [dataclasses.asdict(command) for command in campaign.signals.commands],
         },
         "experiments": [
-            {**_experiment(run, row, identified), "series": _series(run, twin)}
-            for run, row in zip(campaign.experiments, twin.errors, strict=True)
+            {**_experiment(each.run, row, identified), "series": _series(each, foretold.get(place))}
+            for place, (each, row) in enumerate(zip(found.beside, twin.errors, strict=True))
         ],
         "iterations": [dataclasses.asdict(iteration) for iteration in campaign.history],
         "twin": {
@@ -82,13 +85,14 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             for failure in campaign.failures
         ],
         "cost": _cost(campaign.cost),
-        "controller": None if best is None else _controller(campaign, best, identified),
-        "no_controller": why or None,
+        "controller": None if best is None else _controller(campaign, best, found.planned, identified),
+        "no_controller": found.no_controller or None,
         "first_controller": _first_controller(campaign, twin, identified),
         "run_info": dict(run_info),
     }
-    if identified:
-        _add_identified(result, campaign)
+    lesson = latest_lesson(campaign)
+    if lesson is not None:
+        _add_identified(result, campaign, lesson)
     return plain_dict(result)
 
 
@@ -111,7 +115,9 @@ def _quality(quality: Quality) -> dict[str, object]:
     }
 
 
-def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, object]:
+def _controller(
+    campaign: Campaign, best: Test, planned: Trajectory | None, identified: bool
+) -> dict[str, object]:
     bounds = campaign.family.at_bounds(best.genes)
     predicted, spread = predicted_quality(best, campaign.experiments)
     found: dict[str, object] = {
@@ -129,6 +135,9 @@ def _controller(campaign: Campaign, best: Test, identified: bool) -> dict[str, o
         ],
         "predicted": predicted,
         "measured": best.measured,
+        "series": None
+        if planned is None
+        else {"t": planned.t, "commands": planned.commands, **_foretold(planned)},
     }
     if identified:
         flown = any(run.number == best.number for run in campaign.experiments)
@@ -153,48 +162,53 @@ def _first_controller(campaign: Campaign, twin: Twin, identified: bool) -> dict[
 
 def _experiment(run: Experiment, row: TestErrors, identified: bool) -> dict[str, object]:
     test = run.test
-    predicted = None if test is None else test.predicted
     found: dict[str, object] = {
         "test": run.number,
         "gains": None if test is None else test.parameters,
         "ended": run.trajectory.ended,
         "reason": run.trajectory.reason,
         "steps": run.trajectory.steps,
-        "predicted": predicted,
+        "predicted": None if test is None else test.predicted,
         "measured": run.quality if identified else run.final_distance,
         **{key: value for key, value in dataclasses.asdict(row).items() if key != "test"},
         "frozen": run.frozen,
     }
     if identified:
-        both = predicted is not None and run.quality is not None
         found |= {
             "spread": None if test is None else test.spread,
-            "predicted_minus_measured": predicted - run.quality if both else None,  # type: ignore[operator]
+            "predicted_minus_measured": run.miss,
             "risk": None if test is None else test.risk,
             "why": "" if test is None else test.reason,
             "excited": test is not None and test.excitation is not None,
             "final_distance": run.final_distance,
-            "normalised_before": None if row.before is None else normalised_error(row.before, run.frozen),
+            "normalised_before": run.normalised_before,
         }
     return found
 
 
-def _series(run: Experiment, twin: Twin) -> dict[str, object]:
-    """A flight and what the twin makes of it: times, states, commands; a band where a committee stands behind it."""
-    predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
+def _series(found: Beside, foretold: Trajectory | None) -> dict[str, object]:
+    """A flight, what the twin makes of it now, and what it foretold; bands where a committee stood behind it."""
+    flown, simulated = found.run.trajectory, found.simulated
     return {
-        "t": run.trajectory.t,
-        "states": run.trajectory.states,
-        "commands": run.trajectory.commands,
-        "simulated": predicted.states,
-        "band": predicted.band,
+        "t": flown.t,
+        "states": flown.states,
+        "commands": flown.commands,
+        "simulated": simulated.states,
+        "band": simulated.band,
+        **_foretold(foretold),
     }
 
 
-def _add_identified(result: dict[str, Any], campaign: Campaign) -> None:
+def _foretold(run: Trajectory | None) -> dict[str, object]:
+    """What a twin says of a flight that it has not learnt."""
+    if run is None:
+        return {"predicted": None, "predicted_band": None}
+    return {"predicted": run.states, "predicted_band": run.band}
+
+
+def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) -> None:
     """What only the preset `default` knows: noise, actuators, what is left, what another experiment would bring."""
-    twin, lesson = campaign.twin, campaign.history[-1]
-    assert isinstance(lesson, Lesson)
+    twin = campaign.twin
     result["twin"] |= {
         "terms": lesson.terms,
         "misfit": lesson.misfit,

@@ -10,6 +10,7 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop.autopilots.sweep import AXES
 from twinloop.campaign import Campaign
+from twinloop.campaign.assessment import foreseen
 from twinloop.errors import NotAvailable
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.files import write_text
@@ -79,7 +80,9 @@ def _columns(campaign: Campaign, test: Test) -> dict[str, Floats]:
     columns = {TIME: signals.dt * np.arange(test.steps, dtype=np.float64)}
     added = np.zeros((test.steps, signals.n_u)) if test.excitation is None else test.excitation
     columns |= {f"excitation_{name}": added[:, i] for i, name in enumerate(signals.command_names)}
-    if campaign.experiments:
-        sent = campaign.twin.simulate(test).commands
-        columns |= {f"predicted_{name}": sent[:, i] for i, name in enumerate(signals.command_names)}
+    predicted = foreseen(campaign, test)
+    if predicted is not None:
+        columns |= {
+            f"predicted_{name}": predicted.commands[:, i] for i, name in enumerate(signals.command_names)
+        }
     return columns

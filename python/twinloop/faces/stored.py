@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.history import Iteration
+from twinloop.campaign.assessment import behind
 from twinloop.campaign.keeping import look
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.faces.console import Watch
@@ -112,9 +112,7 @@ def show(store: str, name: str | None, as_json: bool) -> None:
 def _result(campaign: Campaign, held: Stored) -> dict[str, Any]:
     """The twin when the store was written last; `interrupted` if it has not learnt all runs."""
     result: dict[str, Any] = summary(campaign, _named(held), Stopwatch(campaign.threads).info())
-    last = campaign.history[-1]
-    running = isinstance(last, Iteration) and last.generations < held.setup["options"]["model_generations"]
-    result["interrupted"] = running or len(last.tests) < len(campaign.experiments)
+    result["interrupted"] = behind(campaign)
     return result
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from twinloop._experiment.limits import DIVERGENCE_FACTOR
 from twinloop.identification.terms.libraries import LIBRARIES
 from twinloop.law import forms as law_forms
 from twinloop.signals import Signals
@@ -126,7 +127,7 @@ class IdentificationOptions:
     rough: bool = True
     causes: bool = True
     exactness: bool = True
-    divergence_factor: float = 10.0
+    divergence_factor: float = DIVERGENCE_FACTOR
 
     def form_for(self, signals: Signals) -> str:
         """What formulas of a user are taken for where the form is "auto": it is not searched under them."""

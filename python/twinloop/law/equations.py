@@ -13,7 +13,7 @@ from twinloop.errors import InvalidInput
 from twinloop.law.actuation import Actuator
 from twinloop.law.expansion import Expansion, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
-from twinloop.law.forms import DERIVATIVES, EULER
+from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
 from twinloop.law.spread import Spread, spreads
 from twinloop.law.writing import EXACT, TEXT, Term, Writer
@@ -93,9 +93,8 @@ class _Page:
             "absolute": f"the state one period of {dt:g} s later",
             "increment": f"the state one period of {dt:g} s later, as the state and what is added to it",
             "acceleration": f"derivatives, integrated by {_steps(signals)} of {dt / signals.substeps:g} s",
-            "explicit-euler": f"one Euler step a period of {dt:g} s, in which states go on by others as they were",
-            "semi-implicit-euler": f"one Euler step a period of {dt:g} s, in which states go on by others as they"
-            " have become",
+            "explicit-euler": self._step(),
+            "semi-implicit-euler": f"{self._step()}{self._become()}",
         }
         units = ", ".join(f"{state.name} in {state.unit or 'units'}" for state in signals.states)
         lines = [f"Form {self.law.form!r}: {kinds[self.law.form]}; {units}."]
@@ -124,6 +123,23 @@ class _Page:
         lines += self._actuators() + self._offsets()
         return [part for line in lines for part in _comment(line)]
 
+    def _step(self) -> str:
+        """A step of Euler, for any state x."""
+        dt = self.writer.number(self.signals.dt)
+        return f"derivatives, in one Euler step a period: x{LATER} = x + {dt} * d x / dt, of the states as they are"
+
+    def _become(self) -> str:
+        """Which derivatives a semi-implicit step takes last, and of which states."""
+        body, states = self.signals.kinematics, self.signals.states
+        moved = [state.derivative_of for state in states if state.derivative_of is not None]
+        by = [state.name for state in states if state.derivative_of is not None]
+        if body is not None:
+            moved, by = [*moved, *body.angles], [*by, *body.rates]
+        if not moved:
+            return ""
+        become = "it has become" if len(by) == 1 else "they have become"
+        return f", but {', '.join(f'd {name} / dt' for name in moved)} of {', '.join(by)} as {become}"
+
     def _actuators(self) -> list[str]:
         """What stands between commands and their effect, one line for those that are alike."""
         alike: dict[Actuator, list[int]] = {}
@@ -144,31 +160,33 @@ class _Page:
         return f" ± {np.std(values, ddof=1):.2g}" if len(values) > 1 else ""
 
     def _offsets(self) -> list[str]:
-        return [
-            f"{name} is read {abs(offset):.3g} s {'later' if offset > 0.0 else 'earlier'} than the states that"
-            " outputs drive"
-            for name, offset in zip(self.signals.state_names, self.law.offsets, strict=True)
-            if offset != 0.0
-        ]
+        lines = []
+        for place, (name, offset) in enumerate(zip(self.signals.state_names, self.law.offsets, strict=True)):
+            if offset != 0.0:
+                deviation = self._deviation([member.offsets[place] for member in self.members])
+                when = "later" if offset > 0.0 else "earlier"
+                lines.append(
+                    f"{name} is read {abs(offset):.3g}{deviation} s {when} than the states that outputs drive"
+                )
+        return lines
 
     # The equations
 
     def body(self) -> list[str]:
         """Parts that have a name, then an equation for each state, then one for each hidden state."""
         law, names = self.law, self.signals.state_names
-        lines = [
-            line
-            for node, name in self.writer.names.items()
-            for line in _equation(name, [_Piece(self.writer.terms(node, define=True))])
-        ]
+        lines = _named(self.writer)
         pieces = [self._pieces(output) for output in range(len(self.outputs))]
         if law.form in DERIVATIVES:
-            driven = self.signals.driven
+            driven, slopes = self.signals.driven, dict(enumerate(law.derivatives()))
+            given = [node for place, node in slopes.items() if place not in driven]
+            prefix = _unused("t", [*law.symbols, *self.writer.names.values()])
+            kinematics = Writer(law.expressions, given, law.symbols, EXACT, prefix, False)
+            lines += _named(kinematics)
             for place, name in enumerate(names):
-                own = pieces[driven.index(place)] if place in driven else [_Piece(self._given(place))]
-                if law.form in EULER:
-                    own = self._stepped(name, own)
-                lines += _equation(f"{name}{LATER}" if law.form in EULER else f"d {name} / dt", own)
+                known = place not in driven
+                own = [_Piece(kinematics.terms(slopes[place]))] if known else pieces[driven.index(place)]
+                lines += _equation(f"d {name} / dt", own)
         else:
             for name, own in zip(names, pieces, strict=True):
                 if law.form == "increment":
@@ -179,24 +197,6 @@ class _Page:
         for number, name in enumerate(law.hidden_symbols):
             lines += self._filling(name, number)
         return lines
-
-    def _given(self, place: int) -> list[Term]:
-        """The derivative of a state that others give."""
-        roots, symbols = self.law.derivatives(), given_symbols(self.law, place, LATER)
-        return Writer(self.law.expressions, roots, symbols, EXACT, "", False).terms(roots[place])
-
-    def _stepped(self, name: str, own: Sequence[_Piece]) -> list[_Piece]:
-        """A step of Euler: the state, and a period times its derivative."""
-        dt = "" if self.signals.dt == 1.0 else f"{self.writer.number(self.signals.dt)}*"
-        terms = [list(piece.terms) for piece in own]
-        (sign, first), (_, last) = terms[0][0], terms[-1][-1]
-        if sum(map(len, terms)) == 1 and sign == "+" and first.removesuffix(LATER).isidentifier():
-            terms[0][0] = "+", f"{dt}{first}"
-        else:
-            terms[-1][-1] = terms[-1][-1][0], f"{last})"
-            terms[0][0] = "+", f"{dt}({'' if sign == '+' else '-'}{terms[0][0][1]}"
-        scaled = (_Piece(each, piece.note) for each, piece in zip(terms, own, strict=True))
-        return [_Piece([("+", name)]), *scaled]
 
     def _pieces(self, output: int) -> list[_Piece]:
         """An output, in pieces that share a constant where a committee stands behind it."""
@@ -246,6 +246,15 @@ def _note(spread: Spread) -> str:
     return coefficient + (f", inside {', '.join(inside)}" if inside else "") + having
 
 
+def _named(writer: Writer) -> list[str]:
+    """An equation for each part that has a name."""
+    return [
+        line
+        for node, name in writer.names.items()
+        for line in _equation(name, [_Piece(writer.terms(node, define=True))])
+    ]
+
+
 def _equation(left: str, pieces: Sequence[_Piece]) -> list[str]:
     """Lines of one equation; where there are notes each piece begins a line, and its note stands behind its last."""
     noted = any(piece.note for piece in pieces)
@@ -265,34 +274,17 @@ def _equation(left: str, pieces: Sequence[_Piece]) -> list[str]:
         notes[len(rows)] = piece.note
         rows.append(row)
         row = indent
-    column = 2 + max(len(rows[place]) for place in notes)
+    column = 2 + max(min(len(rows[place]), room) for place in notes)
     lines = []
     for place, row in enumerate(rows):
         note = notes.get(place)
-        if note and len(note) <= NOTE:
+        if note and len(note) <= NOTE and len(row) < column:
             lines.append(f"{row:<{column}}# {note}")
         else:
             lines += (
                 [row, *(f"{indent} {line}" for line in _comment(note, len(indent) + 1))] if note else [row]
             )
     return lines
-
-
-def given_symbols(law: Law, place: int, later: str) -> list[str]:
-    """Symbols for the derivative of a state that others give, where they may stand for these a period later.
-
-    Args:
-        law: whose symbols they are.
-        place: of the state.
-        later: what is written behind such a state.
-    """
-    symbols, signals = list(law.symbols), law.signals
-    body, name = signals.kinematics, signals.state_names[place]
-    turned = body is not None and name in body.angles
-    for i, state in enumerate(signals.states if law.form == "semi-implicit-euler" else ()):
-        if not turned or (body is not None and state.name in body.rates):
-            symbols[i] += later
-    return symbols
 
 
 def _comment(text: str, indent: int = 0) -> list[str]:

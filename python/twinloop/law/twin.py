@@ -48,7 +48,7 @@ class Twin(Shown, Recorded, kind="twin"):
         model: the engine's model.
         signals: of the system.
         errors: on the selected tests.
-        divergence_factor: multiple of a state's scale beyond which a simulated run counts as diverged.
+        limits: where a simulated run counts as diverged; None: at ten times a state's scale.
         members: of the committee, for the band of a simulated run; none: no band.
         noise: of sensors and disturbances, for the band.
         seed: of the band's random numbers.
@@ -62,7 +62,7 @@ class Twin(Shown, Recorded, kind="twin"):
         model: _core.Model,
         signals: Signals,
         errors: Iterable[TestErrors] = (),
-        divergence_factor: float = 10.0,
+        limits: Limits | None = None,
         members: Sequence[_core.Model] = (),
         noise: Noise | None = None,
         seed: int = 0,
@@ -79,12 +79,22 @@ class Twin(Shown, Recorded, kind="twin"):
         self.model = model
         self.signals = signals
         self.errors = ErrorTable(errors)
-        self.limits = Limits(signals, divergence_factor)
+        self._limits = Limits(signals) if limits is None else limits
+        if self._limits.signals != signals:
+            raise InvalidInput(
+                "Twin, limits: expected those of its signals, found others; make Limits(signals)."
+            )
+        self._free_runs: dict[tuple[int, int], tuple[Test | Replay, Trajectory, Trajectory]] = {}
+
+    @property
+    def limits(self) -> Limits:
+        """Where a simulated run counts as diverged."""
+        return self._limits
 
     @property
     def divergence_factor(self) -> float:
-        """Multiple of a state's scale beyond which a simulated run counts as diverged."""
-        return self.limits.divergence_factor
+        """Multiple of a state's scale at which that is, as records have it."""
+        return self._limits.divergence_factor
 
     VERSION = 4
 
@@ -113,7 +123,9 @@ class Twin(Shown, Recorded, kind="twin"):
             models[0],
             signals,
             read(tuple[TestErrors, ...], found["errors"], f"{where}.errors"),
-            number(f"Record {where}.divergence_factor", found["divergence_factor"], above=0.0),
+            Limits(
+                signals, number(f"Record {where}.divergence_factor", found["divergence_factor"], above=0.0)
+            ),
             models[1:],
             read(Noise | None, found["noise"], f"{where}.noise"),
             read(int, found["seed"], f"{where}.seed"),
@@ -246,6 +258,22 @@ class Twin(Shown, Recorded, kind="twin"):
         explained = np.zeros_like(begun) if self.noise is None else STARTS * self.noise.sensors
         off = np.abs(self.signals.difference(begun, test.initial_state)) > explained
         return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
+
+    def free_run(self, test: Test | Replay, flown: Trajectory) -> Trajectory:
+        """A test flown on the twin from where its flight began, to be shown beside the flight.
+
+        Args:
+            test: of the flight, or the commands of an attached flight.
+            flown: the flight.
+
+        Returns:
+            The predicted run, as from `simulate`. It is remembered: whoever asks again for the same flight gets it.
+        """
+        key = id(test), id(flown)
+        if key not in self._free_runs:
+            # With both of them: as long as they are here, their numbers are nobody else's.
+            self._free_runs[key] = test, flown, self.simulate(self.as_flown(test, flown))
+        return self._free_runs[key][2]
 
     def began(self, flown: Trajectory) -> Floats:
         """The initial state of a flight, from its first reading.

@@ -81,7 +81,9 @@ def _distances(
     workers = _core.Workers(threads=campaign.threads)
     distances = []
     for seed in np.random.SeedSequence([setting.seed, 3]).generate_state(setting.runs).tolist():
-        first = start_tests(models, campaign.family, task, options, seed=seed, iteration=1, workers=workers)
+        first = start_tests(
+            models, campaign.setup.setting, task, options, seed=seed, iteration=1, workers=workers
+        )
         generations = options.generations_of_tests
         for search, left in chunks(first, lambda s, n: s.advance(n, workers), generations):
             iteration = campaign.history[-1].iteration

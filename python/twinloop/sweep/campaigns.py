@@ -71,7 +71,7 @@ def sweep(jobs: Sequence[Job], store: str | Path, cluster: str | Client = HERE) 
         elif flown.record is None:
             yield Outcome(job, None, flown.failure, flown.seconds)
         else:
-            campaign = Campaign.from_record(flown.record, threads=1)
+            campaign = Campaign.from_record(flown.record, threads=1, progress=None)
             campaign.save(store, job.name)
             yield Outcome(job, campaign, None, flown.seconds)
 
@@ -92,7 +92,7 @@ def _stored(job: Job, store: str | Path) -> Campaign | None:
             f"Sweep, store {store}: expected the campaign {job.name!r} to be of the same setup, found another one;"
             " choose another store."
         )
-    campaign = Campaign.load(store, job.name, read_only=True, threads=1)
+    campaign = Campaign.load(store, job.name, read_only=True, threads=1, progress=None)
     if len(campaign.experiments) + len(campaign.failures) != job.experiments:
         raise InvalidInput(
             f"Sweep, store {store}: expected the campaign {job.name!r} with {job.experiments} experiments, found"

@@ -68,4 +68,5 @@ def begun(job: Job, system: Any, threads: int | None = None) -> Campaign:
         seed=job.seed,
         options=job.values(),
         threads=threads,
+        progress=None,  # the sweep shows its own
     )

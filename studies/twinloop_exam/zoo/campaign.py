@@ -120,6 +120,7 @@ def _fly(job: Job, plant: Plant, found: Measured) -> None:
         seed=job.seed,
         options=dict(job.options) or None,
         threads=1,
+        progress=None,
     )
     flown: list[Flight] = []
     test = campaign.test(asked.first)

@@ -5,6 +5,7 @@ import pytest
 
 from oracles import same_bits
 from twinloop import _core
+from twinloop._experiment.limits import Limits
 from twinloop.campaign.coevolution.search import start_models, start_tests
 from twinloop.campaign.presets import options_of
 
@@ -53,7 +54,8 @@ def learnt(told, workers, form="absolute", seed=7, cuts=(17,)):
 
 def asked(told, models, workers, seed=7, iteration=1, cuts=(7,)):
     family, task, _, _ = told
-    search = start_tests(models, family, task, OPTIONS, seed=seed, iteration=iteration, workers=workers)
+    setting = Limits(family.signals).setting(family)
+    search = start_tests(models, setting, task, OPTIONS, seed=seed, iteration=iteration, workers=workers)
     for generations in cuts:
         search = search.advance(generations, workers)
     return search

@@ -15,6 +15,7 @@ from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.checking import _damping, _delay
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
 from twinloop.campaign.examination.data import movements
+from twinloop.campaign.examination.use import strongest_commands
 from twinloop.law.linear.margins import LoopMargins
 
 STREAM = np.random.default_rng(7)
@@ -99,6 +100,30 @@ def test_flights_that_were_not_learnt_are_those_after_what_was_known(good):
     assert last.inside == pytest.approx(((read >= low) & (read <= high)).mean())
     assert str(asked.program) == str(good._method.memory.asked.models[-1].program)
     assert last.error == pytest.approx(run.before / run.frozen)
+
+
+def test_each_flight_stands_beside_the_free_run_of_today_and_its_readings_in_the_band(good):
+    found = good.examine()
+    assert [each.run for each in found.beside] == list(good.experiments)
+    for each in found.beside:
+        read, (low, high) = each.run.trajectory.states, each.simulated.band
+        np.testing.assert_array_equal(each.flown.states, read)
+        np.testing.assert_allclose(low + 0.5 * (each.places + 1.0) * (high - low), read, atol=1e-12)
+        assert each.inside == pytest.approx(((read >= low) & (read <= high))[1:].mean())
+
+
+def test_the_commands_that_are_shown_with_a_state_are_those_that_correlate_with_its_derivative():
+    signals = tl.Signals(
+        states=[tl.State("x", "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of="x")],
+        commands=[tl.Command(name, "1", (-9.0, 9.0)) for name in "abcd"],
+        dt=0.1,
+    )
+    sent = STREAM.normal(size=(50, 4))
+    v = np.concatenate([[0.0], np.cumsum(3.0 * sent[:, 3] - 2.0 * sent[:, 1] + 0.1 * sent[:, 0])])
+    flight = tl.Trajectory(0.1 * np.arange(51), np.stack([np.cumsum(v), v], axis=1), sent)
+    assert strongest_commands(flight, signals, 0) == strongest_commands(flight, signals, 1) == [1, 3]
+    by_numpy = np.abs([np.corrcoef(np.diff(v), u)[0, 1] for u in sent.T])
+    assert set(np.argsort(by_numpy)[2:]) == {1, 3}
 
 
 def test_looking_at_a_campaign_changes_nothing(good):

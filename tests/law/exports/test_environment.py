@@ -82,14 +82,14 @@ print(json.dumps([seen, reward, truncated]))
 def test_the_exported_file_begins_as_the_campaign_says_and_ends_where_the_twin_diverges():
     twin, names = TWINS["acceleration"](), {}
     scales = np.array([state.scale for state in twin.signals.states])
-    episode = Episode(np.array([0.3, 0.0]), np.array([1.0, 0.0]), 7, twin.divergence_factor)
+    episode = Episode(np.array([0.3, 0.0]), np.array([1.0, 0.0]), 7, twin.limits)
     exec(twin.export("gymnasium", episode=episode), names)
     env = names["TwinEnv"]()
     np.testing.assert_array_equal(env.reset()[0], [0.3, 0.0])
     steps = [env.step(env.action_space.low) for _ in range(7)]
     assert [truncated for *_, truncated, _ in steps] == [False] * 6 + [True]
     assert steps[0][1] == pytest.approx(-0.05 * (np.abs(steps[0][0] - [1.0, 0.0]) / scales).sum())
-    env.reset(options={"initial_state": 0.999 * twin.divergence_factor * scales})
+    env.reset(options={"initial_state": 0.999 * twin.limits.divergence_factor * scales})
     lost = [env.step(env.action_space.high) for _ in range(40)]
     assert any(terminated for _, _, terminated, _, _ in lost)
     assert all(np.isfinite(state).all() and np.isfinite(earned) for state, earned, *_ in lost)
@@ -132,7 +132,7 @@ def test_commands_are_clipped_rewards_are_errors_and_noise_is_that_of_the_sensor
 def test_what_diverges_terminates_with_a_finite_state():
     twin = next(iter(TWINS.values()))()
     env = env_of(twin)
-    far = 0.999 * twin.divergence_factor * np.array([state.scale for state in twin.signals.states])
+    far = 0.999 * twin.limits.divergence_factor * np.array([state.scale for state in twin.signals.states])
     env.reset(options={"initial_state": far})
     for _ in range(20):
         state, earned, terminated, _, _ = env.step(env.action_space.high)

@@ -66,7 +66,7 @@ def late_twin(case, periods):
     for k, place in enumerate(given):
         offsets[place] = periods * DT * (0.5 if k == 1 else 1.0)
     model = _core.Model(program, form, signals.engine, offsets=offsets)
-    return tl.Twin(model, signals, divergence_factor=100.0)
+    return tl.Twin(model, signals, limits=tl.Limits(signals, 100.0))
 
 
 def flown(twin, seed=0):
@@ -154,7 +154,7 @@ def test_an_environment_of_the_package_shows_readings(case, periods):
 def test_an_export_that_reads_something_else_is_refused(kind, monkeypatch, tmp_path):
     twin = late_twin("pendulum", 0.6)
     flight = flown(twin)
-    learnt = tl.Twin(twin.model, twin.signals, divergence_factor=100.0, flights=[flight])
+    learnt = tl.Twin(twin.model, twin.signals, limits=twin.limits, flights=[flight])
     assert learnt.export(tmp_path / "twin.py")
     for module in ("python_source", "sensor_source", "c_sensors"):
         found = __import__(f"twinloop.law.exports.{module}", fromlist=["groups"])

@@ -125,7 +125,7 @@ class Coevolution:
             setup = self.setup
             search = start_tests(
                 self.models,
-                setup.family,
+                setup.setting,
                 setup.task,
                 self.options,
                 seed=setup.seed,
@@ -156,7 +156,7 @@ class Coevolution:
         model = self.models.best_model
         rows = errors_of(model, book, self.workers)
         flights = [run.trajectory for run in book.experiments]
-        return Twin(model, self.setup.signals, rows, self.options.divergence_factor, flights=flights)
+        return Twin(model, self.setup.signals, rows, self.setup.limits, flights=flights)
 
     @property
     def models(self) -> _core.ModelSearch:
@@ -175,7 +175,7 @@ class Coevolution:
         asked, latest = self.memory.asked, self.memory.latest
         if asked is None or latest is None or len(asked.experiments) >= len(latest.experiments):
             return ()
-        twin = Twin(asked.models.best_model, self.setup.signals, (), self.options.divergence_factor)
+        twin = Twin(asked.models.best_model, self.setup.signals, (), self.setup.limits)
         return (TwinBefore(len(asked.experiments), twin),)
 
     def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:

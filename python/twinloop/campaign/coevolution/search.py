@@ -7,9 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 from twinloop import _core
-from twinloop._experiment.limits import Limits
 from twinloop.campaign.presets import Options
-from twinloop.controllers import Family
 from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
@@ -151,7 +149,7 @@ def start_models(
 
 def start_tests(
     models: _core.ModelSearch,
-    family: Family,
+    setting: _core.Setting,
     task: _core.Task,
     options: Options,
     *,
@@ -163,7 +161,7 @@ def start_tests(
 
     Args:
         models: the model loop.
-        family: of the controllers.
+        setting: what tests are flown in.
         task: start, target and length of the tests.
         options: of the campaign.
         seed: of the campaign.
@@ -179,7 +177,7 @@ def start_tests(
     with engine_input():
         return _core.TestSearch.start(
             committee(models, options.committee_size),
-            Limits(family.signals, options.divergence_factor).setting(family),
+            setting,
             task,
             settings_of_tests(options),
             variation(options, options.test_population),

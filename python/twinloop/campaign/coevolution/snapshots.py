@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop import _core
-from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats
 from twinloop.campaign.coevolution.search import committee, grammar, settings_of_tests, variation
 from twinloop.campaign.presets import Options
-from twinloop.controllers import Family
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.records import Recorded
 from twinloop.signals import Signals
@@ -128,7 +126,7 @@ class TestSnapshot(Recorded, kind="test_search"):
     def restored(
         self,
         models: _core.ModelSearch,
-        family: Family,
+        setting: _core.Setting,
         task: _core.Task,
         options: Options,
         workers: _core.Workers,
@@ -137,7 +135,7 @@ class TestSnapshot(Recorded, kind="test_search"):
 
         Args:
             models: the model loop whose committee judges, as it was.
-            family: of the controllers.
+            setting: what tests are flown in.
             task: start, target and length of the tests.
             options: of the campaign.
             workers: how the work is carried out.
@@ -148,7 +146,7 @@ class TestSnapshot(Recorded, kind="test_search"):
         with engine_input():
             return _core.TestSearch.restored(
                 committee(models, options.committee_size),
-                Limits(family.signals, options.divergence_factor).setting(family),
+                setting,
                 task,
                 settings_of_tests(options),
                 variation(options, options.test_population),

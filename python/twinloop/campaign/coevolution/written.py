@@ -112,7 +112,7 @@ class WrittenChoosing(Recorded, kind="choosing"):
                 f"Record choosing: expected at most {options.generations_of_tests} generations left, found"
                 f" {self.ahead}."
             )
-        return self.tests.restored(models, setup.family, setup.task, options, workers), self.ahead
+        return self.tests.restored(models, setup.setting, setup.task, options, workers), self.ahead
 
 
 @dataclass(frozen=True, eq=False)

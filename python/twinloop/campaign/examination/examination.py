@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.examination.beside import Beside, beside
 from twinloop.campaign.examination.correlation import (
     Correlations,
     autocorrelation,
@@ -31,7 +32,14 @@ from twinloop.campaign.examination.poles import Pole, poles
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.examination.steps import StepAnswer, moved_states, step_answer
 from twinloop.campaign.examination.unseen import TwinBefore, Unseen, unseen_flights
-from twinloop.campaign.examination.use import Effort, GainSlope, effort, gain_slopes, outside_of
+from twinloop.campaign.examination.use import (
+    Effort,
+    GainSlope,
+    effort,
+    gain_slopes,
+    outside_of,
+    strongest_commands,
+)
 from twinloop.campaign.history import Experiment
 from twinloop.controllers import Mixer
 from twinloop.errors import NotAvailable
@@ -105,6 +113,12 @@ class Examination:
         except NotAvailable as reason:
             self.no_controller = str(reason)
 
+    @property
+    def distance(self) -> float:
+        """From the task's start to its target, in the states' units."""
+        way = self.signals.difference(self.setup.final_target, self.setup.initial_state)
+        return float(np.linalg.norm(way))
+
     # The twin
 
     @property
@@ -117,6 +131,11 @@ class Examination:
     def unseen(self) -> tuple[Unseen, ...]:
         """Flights beside their predictions from before learning, in the order of `tell`."""
         return unseen_flights(self.experiments, self.twins_before)
+
+    @cached_property
+    def beside(self) -> tuple[Beside, ...]:
+        """Each experiment beside the free run of the twin of today."""
+        return tuple(beside(self.twin, run) for run in self.experiments)
 
     @cached_property
     def _lags(self) -> int:
@@ -323,6 +342,18 @@ class Examination:
             )
             for i in moved_states(start, target, scales)
         )
+
+    def strongest(self, state: int) -> list[int]:
+        """The two commands that go most with a state in the planned flight, or in the last one; all if there are few.
+
+        Args:
+            state: its place.
+
+        Returns:
+            Their places.
+        """
+        flight = self.experiments[-1].trajectory if self.planned is None else self.planned
+        return strongest_commands(flight, self.signals, state)
 
     def effort(self, trajectory: Trajectory) -> tuple[Effort, ...]:
         """The use of each command by a flight.

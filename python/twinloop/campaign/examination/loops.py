@@ -94,6 +94,16 @@ class ClosedCurves:
     to_states: Floats
     noise_of_commands: Floats
 
+    @property
+    def of_noise(self) -> Floats:
+        """Root sum of squares over the states' sensors of |C S| (n_u, f)."""
+        return np.asarray(np.sqrt(np.square(self.to_commands).sum(axis=1)))
+
+    @property
+    def of_disturbances(self) -> Floats:
+        """Root sum of squares over the disturbed commands of |P S| (n_x, f)."""
+        return np.asarray(np.sqrt(np.square(self.to_states).sum(axis=1)))
+
 
 def loop_curves(loops: Sequence[Loops], names: Sequence[str]) -> tuple[LoopCurves, ...]:
     """Each loop over frequency.

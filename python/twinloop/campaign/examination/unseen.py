@@ -75,7 +75,7 @@ def unseen_flights(experiments: Sequence[Experiment], twins: Sequence[TwinBefore
 
 def _beside(place: int, run: Experiment, before: TwinBefore) -> Unseen:
     twin = before.twin
-    predicted = twin.simulate(twin.as_flown(run.replayed, run.trajectory))
+    predicted = twin.free_run(run.replayed, run.trajectory)
     rmse, fit, inside = followed(twin, run.trajectory, predicted)
     lasted = bool(np.isfinite(rmse).all())
     squares = float(np.square(rmse).mean()) if lasted else float("inf")

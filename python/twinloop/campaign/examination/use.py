@@ -111,6 +111,28 @@ def _quality(twin: Twin, setup: Setup, test: Test) -> float:
     return setup.quality.flown(run, test.target_state) if run.steps == test.steps else float("inf")
 
 
+def strongest_commands(flight: Trajectory, signals: Signals, state: int) -> list[int]:
+    """The two commands that go most with a state, or with its derivative where that is declared; all if there are few.
+
+    Args:
+        flight: flown or predicted.
+        signals: of the system.
+        state: its place.
+
+    Returns:
+        Their places, in order.
+    """
+    if signals.n_u <= 2:
+        return list(range(signals.n_u))
+    name = signals.state_names[state]
+    rate = next((k for k, s in enumerate(signals.states) if s.derivative_of == name), state)
+    values = np.diff(flight.states[:, rate])
+    sent = flight.commands - flight.commands.mean(axis=0)
+    together = np.abs((sent * (values - values.mean())[:, np.newaxis]).sum(axis=0))
+    size = together / (1e-12 + np.sqrt(np.square(sent).sum(axis=0)))
+    return sorted(np.argsort(-size, kind="stable")[:2].tolist())
+
+
 def envelope_use(states: Floats, signals: Signals) -> tuple[tuple[str, float], ...]:
     """The most that each state with an envelope uses of it: 1 at a bound.
 

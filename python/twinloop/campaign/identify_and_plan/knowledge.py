@@ -51,7 +51,7 @@ class Knowledge:
             learnt.identified.model,
             self.setup.signals,
             errors,
-            self.options.divergence_factor,
+            self.setup.limits,
             members=ensemble.members,
             noise=ensemble.noise,
             seed=self.setup.seed,
@@ -100,16 +100,16 @@ class Knowledge:
             latest: what was learnt last.
             asked: what was known when the last test was asked for.
         """
-        divergence, seed = self.options.divergence_factor, self.setup.seed
+        limits, seed = self.setup.limits, self.setup.seed
         told = [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
         found = {
-            learnt: Twin(model, self.setup.signals, (), divergence)
+            learnt: Twin(model, self.setup.signals, (), limits)
             for learnt, model in zip(told, latest.models, strict=True)
         }
         # Both end with what was learnt last.
         for learnt, ensemble in zip(reversed(told), reversed(latest.ensembles), strict=False):
             found[learnt] = Twin(
-                found[learnt].model, self.setup.signals, (), divergence,
+                found[learnt].model, self.setup.signals, (), limits,
                 members=ensemble.members, noise=ensemble.noise, seed=seed, inflation=ensemble.inflation,
             )  # fmt: skip
         if asked is not None:

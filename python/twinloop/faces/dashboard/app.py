@@ -16,6 +16,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
+from twinloop.campaign.assessment import foreseen
 from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
 from twinloop.faces.dashboard.desk import Desk
 from twinloop.faces.dashboard.fence import App, Fence
@@ -214,7 +215,7 @@ class Pages:
     def _sheet(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
         test = numbered(campaign, number)
-        predicted = campaign.twin.simulate(test) if campaign.experiments else None
+        predicted = foreseen(campaign, test)
         return sheet(
             Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup.quality
         )
@@ -222,7 +223,7 @@ class Pages:
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)
         test = numbered(campaign, number)
-        predicted = campaign.twin.simulate(test) if campaign.experiments else None
+        predicted = foreseen(campaign, test)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "columns.csv"
             write_columns(path, columns(test, predicted))

@@ -53,7 +53,7 @@ class Desk:
         Raises:
             InvalidInput: no such campaign.
         """
-        return Campaign.load(self.store, name, read_only=True, threads=self.threads)
+        return Campaign.load(self.store, name, read_only=True, threads=self.threads, progress=None)
 
     def state(self, name: str) -> dict[str, object]:
         """Whether anything has changed, what is going on, and why the last long thing failed.
@@ -217,7 +217,7 @@ class Desk:
             self._turn.release()
 
     def _campaign(self, name: str) -> closing[Campaign]:
-        return closing(Campaign.load(self.store, name, threads=self.threads))
+        return closing(Campaign.load(self.store, name, threads=self.threads, progress=None))
 
 
 def in_words(seen: Doing) -> str:

@@ -60,21 +60,13 @@ def unseen(found: Examination) -> Figure | None:
 
 def flights(found: Examination) -> Figure:
     """All flights, the last ones where there are many, beside free runs of the twin of today."""
-    panels, twin = [], found.twin
-    shown = list(found.experiments)[-MOST:]
-    runs = [
-        (
-            run,
-            continued(run.trajectory, found.signals, run.trajectory.states[0]),
-            twin.simulate(twin.as_flown(run.replayed, run.trajectory)),
-        )
-        for run in shown
-    ]
+    panels = []
+    shown = found.beside[-MOST:]
     for i, state in enumerate(found.signals.states):
-        for run, flown, predicted in runs:
-            title = f"{said(run.number)}: {words(state.name)}"
-            target = None if run.test is None else run.test.target_state
-            panels.append(_state_panel(found.signals, i, flown, predicted, title, target))
+        for each in shown:
+            title = f"{said(each.run.number)}: {words(state.name)}"
+            target = None if each.run.test is None else each.run.test.target_state
+            panels.append(_state_panel(found.signals, i, each.flown, each.simulated, title, target))
     return Figure(
         "flights",
         "All flights beside the twin" if len(shown) == len(found.experiments) else f"The last {MOST} flights",

@@ -130,13 +130,16 @@ def closed(found: Examination) -> Figure | None:
     """The rest of the gang of four: what noise does to the commands, and disturbances to the states."""
     if found.closed is None:
         return None
-    curves = found.closed
-    noise = np.sqrt(np.square(curves.to_commands).sum(axis=1))
-    moved = np.sqrt(np.square(curves.to_states).sum(axis=1))
+    curves, signals = found.closed, found.signals
     x_label, panels = "frequency (rad/s)", []
     for title, label, rows, names in (
-        ("C S: sensors' noise → commands", "half ranges per scale", noise, found.signals.command_names),
-        ("P S: disturbance of commands → states", "scales per half range", moved, found.signals.state_names),
+        ("C S: sensors' noise → commands", "half ranges per scale", curves.of_noise, signals.command_names),
+        (
+            "P S: disturbance of commands → states",
+            "scales per half range",
+            curves.of_disturbances,
+            signals.state_names,
+        ),
     ):
         most = float(rows.max())
         lines = [

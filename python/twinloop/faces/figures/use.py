@@ -25,7 +25,7 @@ def coverage(found: Examination) -> Figure | None:
     panels = []
     signals = found.signals
     for i in found.moved:
-        for j in _strongest(found, i):
+        for j in found.strongest(i):
             x_factor, x_label = labelled(signals.states[i].name, signals.states[i].unit)
             y_factor, y_label = 1.0, f"{words(signals.commands[j].name)} ({signals.commands[j].unit or '1'})"
             low, high = signals.commands[j].bounds
@@ -65,20 +65,6 @@ def coverage(found: Examination) -> Figure | None:
         if planned is None
         else f"Where the line leaves the dots the twin is asked about what nobody has seen.{leaves}",
     )
-
-
-def _strongest(found: Examination, state: int) -> list[int]:
-    """The two commands that go most with a state or its derivative in the planned flight, or in the last one."""
-    flight = found.experiments[-1].trajectory if found.planned is None else found.planned
-    if found.signals.n_u <= 2:
-        return list(range(found.signals.n_u))
-    name = found.signals.state_names[state]
-    rate = next((k for k, s in enumerate(found.signals.states) if s.derivative_of == name), state)
-    values = np.diff(flight.states[:, rate])
-    sent = flight.commands - flight.commands.mean(axis=0)
-    together = np.abs((sent * (values - values.mean())[:, np.newaxis]).sum(axis=0))
-    size = together / (1e-12 + np.sqrt(np.square(sent).sum(axis=0)))
-    return sorted(np.argsort(-size, kind="stable")[:2].tolist())
 
 
 def gains(found: Examination) -> Figure | None:

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats, whole
 from twinloop.errors import NotAvailable
 from twinloop.law.law import Law
@@ -34,8 +35,8 @@ class Simulator(Protocol):
         ...
 
     @property
-    def divergence_factor(self) -> float:
-        """Multiple of a state's scale beyond which a run counts as diverged."""
+    def limits(self) -> Limits:
+        """Where a run counts as diverged."""
         ...
 
     @property
@@ -85,8 +86,7 @@ def environment(
     target = floats("Twin.env, target state", target_state, (signals.n_x,))
     length = whole("Twin.env, steps", steps, least=1)
     scales = np.array([state.scale for state in signals.states])
-    free = np.array([state.periodic for state in signals.states])
-    limits = np.where(free, np.inf, twin.divergence_factor * scales)
+    limits = twin.limits.states
     low, high = (np.array([command.bounds[i] for command in signals.commands]) for i in (0, 1))
     deviations = twin.noise.sensors if noisy and twin.noise is not None else np.zeros(signals.n_x)
 

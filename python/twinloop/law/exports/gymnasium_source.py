@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop.law.exports.python_source import python_source
 from twinloop.law.law import Law
@@ -75,13 +76,13 @@ class Episode:
         initial_state: (n_x,), SI units, radians.
         target_state: for the reward (n_x,), the same units.
         steps: after which an episode is truncated.
-        divergence_factor: multiple of a state's scale beyond which it terminates.
+        limits: beyond which it terminates.
     """
 
     initial_state: Floats
     target_state: Floats
     steps: int
-    divergence_factor: float
+    limits: Limits
 
 
 def gymnasium_source(law: Law, episode: Episode) -> str:
@@ -100,7 +101,7 @@ def gymnasium_source(law: Law, episode: Episode) -> str:
     states = law.signals.states
     constants = [
         f"SIZES = {tuple(state.scale for state in states)!r}  # of the states, for the reward",
-        f"LIMITS = {tuple(episode.divergence_factor * state.scale for state in states)!r}  # beyond: diverged",
+        f"LIMITS = {tuple(episode.limits.divergence_factor * state.scale for state in states)!r}  # beyond: diverged",
         f"PERIODS = {tuple(state.period for state in states)!r}  # of angles that wrap",
         f"INITIAL_STATE = {tuple(episode.initial_state.tolist())!r}",
         f"TARGET_STATE = {tuple(episode.target_state.tolist())!r}",

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from twinloop._core import __version__
 from twinloop._ground.texts import one_line
-from twinloop.law.equations import LATER, equations, given_symbols
+from twinloop.law.equations import equations
 from twinloop.law.expansion import Expansion, written
 from twinloop.law.exports.python_source import equation_roots, joined
 from twinloop.law.expressions import Expressions
@@ -83,10 +83,15 @@ def _late(law: Law) -> list[tuple[int, float]]:
     return [(i, offset) for i, offset in enumerate(law.offsets) if offset != 0.0]
 
 
-def _latex_symbol(symbol: str) -> str:
-    """The name of a signal now or a period later."""
-    later = "_{k+1}" if symbol.endswith(LATER) else ""
-    return latex_name(symbol.removesuffix(LATER)) + later
+def _given_symbols(law: Law, place: int) -> list[str]:
+    """Names of the signals in the derivative of a state that others give, now or a period later."""
+    symbols, signals = [latex_name(symbol) for symbol in law.symbols], law.signals
+    body, name = signals.kinematics, signals.state_names[place]
+    turned = body is not None and name in body.angles
+    for i, state in enumerate(signals.states if law.form == "semi-implicit-euler" else ()):
+        if not turned or (body is not None and state.name in body.rates):
+            symbols[i] += "_{k+1}"
+    return symbols
 
 
 def _latex_number(value: float, digits: int) -> str:
@@ -143,8 +148,9 @@ def latex_source(law: Law, digits: int = 6) -> str:
         if law.form not in DERIVATIVES or place in law.signals.driven:
             terms = writer.terms(outputs[root])
         else:
-            symbols = [_latex_symbol(each) for each in given_symbols(law, place, LATER)]
-            terms = Writer(law.expressions, every, symbols, digits, "t_", False, IN_FULL).terms(root)
+            terms = Writer(
+                law.expressions, every, _given_symbols(law, place), digits, "t_", False, IN_FULL
+            ).terms(root)
         right = joined(terms, " ")
         if law.form == "acceleration":
             left = rf"\frac{{\mathrm{{d}} {symbol}}}{{\mathrm{{d}} t}}"

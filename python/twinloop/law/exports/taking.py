@@ -56,6 +56,6 @@ def _first_flown(twin: Twin) -> Episode:
     """What an environment of Gymnasium begins with where nobody says it."""
     rest = np.zeros(twin.signals.n_x)
     if not twin.flights:
-        return Episode(rest, rest, 100, twin.divergence_factor)
+        return Episode(rest, rest, 100, twin.limits)
     first = twin.flights[0]
-    return Episode(twin.began(first), rest, max(1, first.steps), twin.divergence_factor)
+    return Episode(twin.began(first), rest, max(1, first.steps), twin.limits)
