@@ -21,7 +21,7 @@ WIDTH = 100
 SECTIONS = {
     "Campaign": ["Campaign", "identify"],
     "Twin": ["Twin", "load_twin", "Remark"],
-    "Experiments": ["Test", "Trajectory", "Replay"],
+    "Experiments": ["Test", "Trajectory", "Replay", "Limits"],
     "Signals": ["Signals", "State", "Command", "RigidBody"],
     "Logs": ["load", "check_log"],
     "Systems": ["System", "systems.*"],

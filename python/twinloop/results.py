@@ -5,6 +5,7 @@ from twinloop._experiment.hold_back import HoldBack
 from twinloop.campaign.assessment import Advice
 from twinloop.campaign.certificate import Certificate, Use
 from twinloop.campaign.cost import Cost
+from twinloop.campaign.examination.beside import Beside
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.correlation import Correlations
 from twinloop.campaign.examination.data import DataQuality
@@ -30,6 +31,7 @@ __all__ = [
     "Actuation",
     "Actuator",
     "Advice",
+    "Beside",
     "Certificate",
     "Check",
     "Checks",

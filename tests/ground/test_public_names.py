@@ -10,7 +10,7 @@ import pytest
 
 import twinloop as tl
 
-HANDLES = {"engine", "task", "dynamics"}
+HANDLES = {"engine", "setting", "task", "dynamics"}
 """Members that give the engine what it reads itself; nobody annotates with these."""
 
 

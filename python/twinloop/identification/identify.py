@@ -135,13 +135,23 @@ def identify_runs(
             context.watch("noise")
             searches.append(Found(start()))
             keep(replace(under_way, searches=tuple(searches)))
-        for propose in PROPOSALS[searches[number].made :]:
+        for propose in PROPOSALS[searches[number].made :] if goes_on(searches, number) else ():
             searches[number] = decided(searches[number], propose(context, searches[number].best))
             keep(replace(under_way, searches=tuple(searches)))
     first, *others = searches
     found = decided(first, [found for other in others for found in (other.best, *other.rivals)])
     context.watch("committee")
     return concluded(context, found, under_way.said)
+
+
+def goes_on(searches: Sequence[Found], number: int) -> bool:
+    """Whether proposals are made from a start: not from a law known before that those found anew are ahead of.
+
+    What is hidden they may have missed, so from such a law they are made in any case.
+    """
+    own = searches[number].best
+    known = own.fit is not None and not own.actuation.hidden
+    return not (known and any(other.best.evidence.beats(own.evidence) for other in searches[:number]))
 
 
 def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:

@@ -10,6 +10,7 @@ from twinloop.campaign.identify_and_plan import causes
 from twinloop.campaign.identify_and_plan.causes import acts_in_motion, cause, causes_of
 from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.identification.settings import IdentificationOptions
+from twinloop.signals import State
 
 STEPS = 300
 
@@ -130,18 +131,24 @@ def test_what_acts_in_motion_alone_is_found_though_each_flight_has_another(fligh
 
 def causes_of_gusts(flights, size, options):
     """The cause of gusts of such a size on a chain of a law that drives motions of variance 1, in some flights."""
-    signals = SimpleNamespace(n_x=1, difference=lambda one, other: one - other)
+    signals = SimpleNamespace(
+        n_x=1, difference=lambda one, other: one - other, states=[State("x", "m", 1.0)], commands=[]
+    )
     chain = Chain((0,), 0, "acceleration", np.full(1, 1e-8), np.full(1, 1e-8), Motion(0.0, size**2, 0.1))
     told = [
         SimpleNamespace(
             test=SimpleNamespace(target_state=np.zeros(1)), trajectory=SimpleNamespace(states=free)
         )
-        for free in (np.linspace(0.0, 1.0, STEPS)[:, np.newaxis] for _ in range(flights))
+        for free in (np.linspace(0.0, 1.0, STEPS + 1)[:, np.newaxis] for _ in range(flights))
     ]
+
+    def alone(model, run, *_):
+        return run.trajectory.states + 0.1, np.zeros((STEPS, 0))
+
     seen = [(None, None, size * gusts(seed, 3.0, STEPS + 1)[:, np.newaxis]) for seed in range(flights)]
     with mock.patch.multiple(
         causes, observed=lambda *_: seen, runs_of=lambda *_: [], driven=lambda *_: np.ones(1),
-        distinct=lambda runs: runs, alone=lambda model, run, *_: run.trajectory.states + 0.1,
+        distinct=lambda runs: runs, alone=alone,
     ):  # fmt: skip
         identified = SimpleNamespace(chains=[chain], members=[None], model=None)
         return causes_of(identified, told, signals, SimpleNamespace(signals=signals), options, None)

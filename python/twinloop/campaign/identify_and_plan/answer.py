@@ -66,6 +66,7 @@ class Answer:
         setup: Setup,
         options: IdentificationOptions,
         workers: _core.Workers,
+        number: int = 0,
     ) -> Answer:
         """What was identified, with how it follows flights when it is flown by itself.
 
@@ -75,6 +76,7 @@ class Answer:
             setup: of the campaign.
             options: of the identification.
             workers: how the work is carried out.
+            number: of the answer to these flights, which tells its draws from those of others.
         """
         followed = following(identified.members, flights, setup.limits, workers)
         unmoved = unmoved_states(identified, flights, setup)
@@ -83,7 +85,7 @@ class Answer:
             return Answer(identified, followed, False, {}, unmoved, False)
         causes = causes_of(identified, flights, setup.signals, setup.limits, options, workers)
         model, noise = identified.members[0], identified.noise(setup.signals)
-        unit = Unit(setup.seed).part(len(flights), 1)
+        unit = Unit(setup.seed).part(len(flights), 1, number)
         missed = misses_any(model, followed, flights, noise, causes, unit, setup.limits, workers)
         lost = _lost(identified, followed, flights, setup, workers)
         return Answer(identified, followed, 2 * lost <= len(flights), causes, unmoved, missed)

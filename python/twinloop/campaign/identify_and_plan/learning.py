@@ -170,7 +170,7 @@ class Learner:
         )
 
 
-def or_known_before(answer: Answer, earlier: Identified, answered: Callable[[Identified], Answer]) -> Answer:
+def or_known_before(answer: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:
     """What was known before the last flights, where it explains all of them: it has not learnt the last.
 
     Args:
@@ -178,13 +178,11 @@ def or_known_before(answer: Answer, earlier: Identified, answered: Callable[[Ide
         earlier: what was known before the last of them.
         answered: holds what was identified against all flights.
     """
-    known = answered(as_known_before(earlier))
+    known = answered(as_known_before(earlier), number=1)
     return known if known.explained else answer
 
 
-def or_rough(
-    answer: Answer, identify: Callable[[], Identified], answered: Callable[[Identified], Answer]
-) -> Answer:
+def or_rough(answer: Answer, identify: Callable[[], Identified], answered: Callable[..., Answer]) -> Answer:
     """What a law of linear terms makes of the flights, where it follows them, and better than the answer does.
 
     What is too coarse for a simulator may still tell better gains from worse.
@@ -194,7 +192,7 @@ def or_rough(
         identify: such a law.
         answered: holds what was identified against all flights.
     """
-    rough = answered(with_remark(identify(), ROUGH))
+    rough = answered(with_remark(identify(), ROUGH), number=2)
     better = rough.follows and (not answer.follows or rough.worst < answer.worst)
     return rough if better else answer
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import LAGGING
+from twinloop.identification.evidence import strongest
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import climbed, from_both_sides
@@ -31,9 +31,8 @@ def apart(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         alike = tuple(other for other in hypothesis.alike if other != group) + tuple((i,) for i in group)
         split = replace(hypothesis, alike=tuple(sorted(alike)), fit=None)
         found = [fitted(context, each) for each in (split, *_undelayed(context, split, group))]
-        own = min(found, key=lambda each: each.fit.chi_squared if each.fit is not None else float("inf"))
-        assert own.fit is not None
-        if own.fit.stable and fit.chi_squared - own.fit.chi_squared > LAGGING * (len(group) - 1):
+        own = strongest(found)
+        if own.evidence.beats(hypothesis.evidence):
             again = replace(own, fit=None)
             yield fitted(context, climbed(context, from_both_sides(context, again, again.sums)))
 
