@@ -9,7 +9,7 @@ import twinloop as tl
 from committees import MOTORS, STEPS, TASK, TUNED, committee_of, member, planner_of, signals
 from oracles import rk4, same_bits
 from twinloop.planning.candidates import candidates
-from twinloop.planning.comparison import Comparison
+from twinloop.planning.comparison import Comparison, around
 from twinloop.planning.proposal import Flown, Wanted
 
 KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
@@ -222,3 +222,35 @@ def test_gains_that_have_not_flown_keep_the_envelope_with_more_delay_than_was_se
     possible = flies | (np.arange(len(bears)) < drawn.repeats)
     found = compared(delayed, flown, goal="both", drawn=drawn)
     assert found.keeps.tolist() == (keeping(usage) & bears & possible).tolist()
+
+
+def test_until_a_prediction_has_come_true_no_flight_leads_far_beyond_what_was_seen():
+    drawn = drafts()
+    still = np.zeros((1, STEPS + 1, 2))
+    runs = [
+        [flight(motor, genes, excitation, still[0])[0] for motor in MOTORS]
+        for genes, excitation in zip(drawn.genes, drawn.excitation, strict=True)
+    ]
+    # How fast each candidate turns at most, on the member on which it turns fastest.
+    fastest = np.array([max(np.abs(run[:, 1]).max() for run in members) for members in runs])
+    seen = np.array([[0.0, -0.15], [0.6, 0.15]])
+    reach = ((1.0 - 1e-9) * float(np.median(fastest)) - 0.15) / 0.3
+    comparison = compared(flown=replace(FLOWN, seen=seen, flies=False), drawn=drawn)
+    bounds = around(seen, reach, KNOWN)
+    np.testing.assert_allclose(bounds[:, 1], np.array([-1.0, 1.0]) * (0.15 + reach * 0.3), atol=1e-12)
+    comparison.options = replace(comparison.options, reach_seen=reach)
+    near = comparison._near_what_was_seen()
+    inside = [
+        all((run <= bounds[1]).all() and (run >= bounds[0]).all() for run in members) for members in runs
+    ]
+    assert near.tolist() == inside and 0 < near.sum() < len(near)
+    for anywhere in (replace(FLOWN, seen=None), replace(FLOWN, seen=1e-6 * seen)):
+        comparison.flown = anywhere
+        # Where every one leads further than that, it tells no flight from another.
+        assert comparison._near_what_was_seen().all()
+
+
+def test_what_has_hardly_moved_is_taken_to_have_moved_by_a_share_of_its_scale():
+    bounds = around(np.zeros((2, 2)), 2.0, KNOWN)
+    scales = np.array([state.scale for state in KNOWN.states])
+    np.testing.assert_allclose(bounds, 0.04 * np.stack([-scales, scales]))

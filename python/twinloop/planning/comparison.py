@@ -18,12 +18,15 @@ from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.reasons import Why, reason
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.worth import apart, gain, limit
+from twinloop.signals import Signals
 
 Flags = NDArray[np.bool_]
 TRIED = 128
 """Candidates at most that are flown under noise before the safest one is taken."""
 TOGETHER = 4
 """Of them at once."""
+HARDLY = 0.02
+"""Share of its scale by which a state is taken to have moved at least."""
 ANYWHERE = 64
 """Flights by which it is asked how much of the twin is unknown."""
 
@@ -64,7 +67,8 @@ class Comparison:
             workers=judge.workers,
         )
         self.possible = self._possible()
-        self.keeps = self.possible & (self.quiet.worst_usage <= self._reach()) & self._bears_delay()
+        within = self.quiet.worst_usage <= self._reach()
+        self.keeps = self.possible & within & self._bears_delay() & self._near_what_was_seen()
         self.promised = float(self.quiet.mean[0])
 
     def proposal(self) -> Proposal:
@@ -148,6 +152,20 @@ class Comparison:
             bears[drafts.repeats :] |= self.flown.flies
         return bears if bears[: drafts.repeats].any() else np.ones_like(bears)
 
+    def _near_what_was_seen(self) -> Flags:
+        """Candidates that lead no member far beyond the states seen so far; all of them where every one does.
+
+        Until a prediction has come true a law is known where the flights were, and nobody knows how far beyond.
+        """
+        drafts, seen, reach = self.drafts, self.flown.seen, self.options.reach_seen
+        if seen is None or reach <= 0.0:
+            return np.ones_like(self.possible)
+        genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
+        bounds = around(seen, reach, self.judge.signals)
+        near = ~outside(self.judge.usages_within(bounds, self.members, genes, excitation, ends).max(axis=0))
+        near[drafts.repeats :] |= self.flown.flies
+        return near if near[: drafts.repeats].any() else np.ones_like(near)
+
     def _reach(self) -> float:
         """Usage of the envelope that a proposal may have, where that of each flight so far is known."""
         options, used = self.options, self.flown.usages
@@ -215,6 +233,18 @@ class Comparison:
             state=state,
             members=(high, low),
         )
+
+
+def around(seen: Floats, reach: float, signals: Signals) -> Floats:
+    """Bounds of states (2, n_x) that are wider than those seen by some times as far as each has moved.
+
+    Args:
+        seen: smallest and largest reading of each state (2, n_x).
+        reach: how many times; what has hardly moved is taken to have moved by a share of its scale.
+        signals: of the system.
+    """
+    moved = np.maximum(seen[1] - seen[0], HARDLY * np.array([state.scale for state in signals.states]))
+    return np.stack([seen[0] - reach * moved, seen[1] + reach * moved])
 
 
 def _in_order(those: Flags, cost: Floats) -> list[int]:

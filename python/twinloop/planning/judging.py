@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -162,6 +162,24 @@ class Judge:
             noise=noise, offsets=offsets, measured=measured, workers=self.workers,
         )  # fmt: skip
         return Judged(values, usages)
+
+    def usages_within(
+        self,
+        bounds: Floats,
+        members: Sequence[_core.Model],
+        genes: Floats,
+        excitation: Floats | None = None,
+        ends: Ends | None = None,
+    ) -> Floats:
+        """Usage of bounds of the states (2, n_x) in quiet flights of candidates (members, K), 1 at a bound."""
+        states = [
+            replace(state, envelope=(float(low), float(high)))
+            for state, low, high in zip(self.signals.states, *bounds, strict=True)
+        ]
+        bounded = replace(self.signals, states=states)
+        flights = self.flights(genes, excitation, ends)
+        _, usages = qualities(members, flights, self.quality.engine, bounded, workers=self.workers)
+        return usages[:, 0]
 
     def stable_members(
         self,

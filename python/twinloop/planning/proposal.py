@@ -20,6 +20,7 @@ class Flown:
             worse.
         failed: genes of tests that failed on the system, or were cut.
         times: how often the best gains have flown.
+        seen: smallest and largest reading of each state so far (2, n_x), where no prediction has come true yet.
     """
 
     best: Floats
@@ -28,6 +29,7 @@ class Flown:
     good: float
     failed: Sequence[Floats] = ()
     times: int = 1
+    seen: Floats | None = None
 
 
 @dataclass(frozen=True)

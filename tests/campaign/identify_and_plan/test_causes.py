@@ -137,7 +137,8 @@ def causes_of_gusts(flights, size, options):
     chain = Chain((0,), 0, "acceleration", np.full(1, 1e-8), np.full(1, 1e-8), Motion(0.0, size**2, 0.1))
     told = [
         SimpleNamespace(
-            test=SimpleNamespace(target_state=np.zeros(1)), trajectory=SimpleNamespace(states=free)
+            test=SimpleNamespace(target_state=np.zeros(1)),
+            trajectory=SimpleNamespace(states=free, commands=np.zeros((STEPS, 0))),
         )
         for free in (np.linspace(0.0, 1.0, STEPS + 1)[:, np.newaxis] for _ in range(flights))
     ]
@@ -145,7 +146,8 @@ def causes_of_gusts(flights, size, options):
     def alone(model, run, *_):
         return run.trajectory.states + 0.1, np.zeros((STEPS, 0))
 
-    seen = [(None, None, size * gusts(seed, 3.0, STEPS + 1)[:, np.newaxis]) for seed in range(flights)]
+    white = np.random.default_rng(0).normal(size=(flights, STEPS + 1, 1))
+    seen = [(white[seed], None, size * gusts(seed, 3.0, STEPS + 1)[:, np.newaxis]) for seed in range(flights)]
     with mock.patch.multiple(
         causes, observed=lambda *_: seen, runs_of=lambda *_: [], driven=lambda *_: np.ones(1),
         distinct=lambda runs: runs, alone=alone,

@@ -40,6 +40,8 @@ class Answer:
         causes: of the correlated disturbances, by the state that each drives.
         unmoved: states that move, and nothing moves them by the law.
         missed: whether the best one misses a flight by more than noise and whatever may disturb explains.
+        rough: a model of linear terms that follows the flights where the best one does not explain them; it sits in
+            the committee, too.
     """
 
     identified: Identified
@@ -48,6 +50,7 @@ class Answer:
     causes: Mapping[int, Cause]
     unmoved: Sequence[int]
     missed: bool
+    rough: _core.Model | None = None
 
     @property
     def worst(self) -> float:
@@ -119,7 +122,9 @@ class Answer:
         # Where hardly any can, the ones that go wrong least still show where more must be known.
         others = [i for i in self.followed.order() if i not in believed]
         kept = sorted(believed | set(others[: max(0, FEWEST - len(believed))]))
-        return [self.identified.members[i] for i in kept]
+        members = [self.identified.members[i] for i in kept]
+        # Gains are tuned on the first few members.
+        return members if self.rough is None else [members[0], self.rough, *members[1:]]
 
 
 def _lost(

@@ -6,6 +6,9 @@ flights, time by time. The sum of the products is compared with the scatter that
 do with each other, however slowly each of them changes (Bartlett 1935). One flight tells nothing, and neither do two in
 which a disturbance changes so slowly that its sign alone decides.
 
+What the past of a flight says is no surprise: where the observer is right, nothing that was read or sent before tells
+an error of its next prediction (`foretold.py`), and no gust is told by a free run of the twin.
+
 Nor does a gust know when a system moves, as play and friction do, which are other ones under other gains. So its
 size is multiplied in the same way with the speed of the twin's free run, which no gust has touched. And what is small
 may be the inaccuracy of the law (`exactness.py`).
@@ -131,12 +134,16 @@ def causes_of(
     missed = [(read, free) for read, _, free, _ in known]
     speeds = [speed(free, limits) for _, free in missed]
     features = [features_of(free, sent, signals) for _, _, free, sent in known]
+    past = [features_of(run.trajectory.states, run.trajectory.commands, signals) for run in flights]
     causes: dict[int, Cause] = {}
     for state, place in disturbed.items():
         chain = identified.chains[place]
         causes[state] = cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
         felt = [gusts[:, place] for _, gusts, _, _ in known]
-        if len(known) > 1 and foretold(list(zip(features, felt, strict=True))).certain(SURE):
+        surprises = [errors[1:, state] for errors, _, _ in found]
+        if foretold(list(zip(past, surprises, strict=True))).beyond_luck(SURE) or (
+            len(known) > 1 and foretold(list(zip(features, felt, strict=True))).certain(SURE)
+        ):
             causes[state] = "law"
         moving = [(np.abs(gusts), fast) for gusts, fast in zip(felt, speeds, strict=True)]
         unsure = acts_in_motion(moving)

@@ -1,9 +1,12 @@
-"""Foretold: whether what a twin does when it is flown by itself foretells what disturbs it in a flight left out.
+"""Foretold: whether a function of what a system does foretells what disturbs it in a flight that was left out.
 
-A gust knows nothing of a twin's free run, and the free run nothing of the gust. What a law is wrong about is a function
-of what the system does, now and shortly before, which the free run shows as well. So such a function is learnt from all
-flights but one and held against the one left out, each in turn. It is a sum of single features, added one at a time
-by how much they explain (componentwise L2 boosting; Bühlmann and Yu 2003).
+A gust knows nothing of what a system does; what a law is wrong about is a function of that, now and shortly before. So
+such a function is learnt from all flights but one and held against the one left out, each in turn. It is a sum of
+single features, added one at a time by how much they explain (componentwise L2 boosting; Bühlmann and Yu 2003).
+
+A gust moves the system, so that readings tell of it afterwards. There are two ways around that. A free run of the twin
+has felt no gust: what it does is held against the gusts that the observer has estimated. And an observer that is right
+has used what it has read: its next error of prediction is held against what was read and sent before.
 """
 
 from __future__ import annotations
@@ -28,11 +31,13 @@ def foretold(flights: Sequence[tuple[Floats, Floats]]) -> Likeness:
     """How alike disturbances are to what the other flights say of them.
 
     Args:
-        flights: of each the features of its free run (n, p) and what disturbed it at the same times (n,).
+        flights: of each the features (n, p) and what disturbed it (n,), with the same rows.
 
     Returns:
-        The likeness, over all flights.
+        The likeness, over all flights; nothing of less than two.
     """
+    if len(flights) < 2:
+        return Likeness.of([])
     pieces = [(in_pieces(features), in_pieces(disturbed)) for features, disturbed in flights]
     scale = np.sqrt(np.mean([np.square(features).mean(axis=0) for features, _ in pieces], axis=0))
     scaled = [(features / np.where(scale > 0.0, scale, 1.0), disturbed) for features, disturbed in pieces]
@@ -55,7 +60,7 @@ def features_of(states: Floats, commands: Floats, signals: Signals) -> Floats:
     """What an error of a law may be a function of: states, commands, their products, and what is remembered of them.
 
     Args:
-        states: of a free run (n + 1, n_x).
+        states: of a free run or a flight (n + 1, n_x).
         commands: of the same (n, n_u).
         signals: of the system.
 

@@ -183,9 +183,10 @@ def or_known_before(answer: Answer, earlier: Identified, answered: Callable[...,
 
 
 def or_rough(answer: Answer, identify: Callable[[], Identified], answered: Callable[..., Answer]) -> Answer:
-    """What a law of linear terms makes of the flights, where it follows them, and better than the answer does.
+    """What a law of linear terms makes of the flights, where it follows them better than the answer does.
 
-    What is too coarse for a simulator may still tell better gains from worse.
+    What is too coarse for a simulator may still tell better gains from worse. Where it follows less well it sits beside
+    the answer: gains have to be good on both.
 
     Args:
         answer: that does not explain all flights.
@@ -193,8 +194,9 @@ def or_rough(answer: Answer, identify: Callable[[], Identified], answered: Calla
         answered: holds what was identified against all flights.
     """
     rough = answered(with_remark(identify(), ROUGH), number=2)
-    better = rough.follows and (not answer.follows or rough.worst < answer.worst)
-    return rough if better else answer
+    if rough.follows and (not answer.follows or rough.worst < answer.worst):
+        return rough
+    return replace(answer, rough=rough.identified.model) if rough.follows else answer
 
 
 def as_known_before(identified: Identified) -> Identified:

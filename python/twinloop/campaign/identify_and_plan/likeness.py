@@ -49,7 +49,11 @@ class Likeness:
 
     def certain(self, deviations: float) -> bool:
         """Whether they are more than a trace alike, and by this many standard deviations more than by luck."""
-        return self.product > SHARE * self.size and self.product > deviations * self.by_luck
+        return self.product > SHARE * self.size and self.beyond_luck(deviations)
+
+    def beyond_luck(self, deviations: float) -> bool:
+        """Whether they are alike by this many standard deviations more than by luck, be it a trace."""
+        return self.product > deviations * self.by_luck
 
 
 def in_pieces(series: Floats) -> Floats:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from twinloop import _core
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
@@ -173,7 +175,16 @@ class IdentifyAndPlan:
             float("inf") if good is None else good,
             standing.unfit(book),
             1 if best is None else standing.times_flown(book, best.genes),
+            None if nearly_confirmed(book.experiments) else self._seen(book),
         )
+
+    def _seen(self, book: Logbook) -> Floats:
+        """Smallest and largest value of each state in the flights so far and in the task (2, n_x)."""
+        setup = self.setup
+        continued = partial(setup.signals.continued, start=setup.initial_state)
+        read = [continued(run.trajectory.states) for run in book.experiments]
+        states = np.concatenate([*read, setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
+        return np.stack([states.min(axis=0), states.max(axis=0)])
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
