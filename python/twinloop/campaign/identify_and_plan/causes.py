@@ -17,6 +17,7 @@ may be the inaccuracy of the law (`exactness.py`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -120,38 +121,78 @@ def causes_of(
     )
     if found is None:
         return dict.fromkeys(disturbed, "undecided")
-    tasks: dict[bytes, list[Floats]] = {}
-    for run, (_, _, gusts) in zip(flights, found, strict=True):
-        assert run.test is not None
-        tasks.setdefault(run.test.target_state.tobytes(), []).append(gusts)
-    drives = driven(identified.model, runs_of(identified, flights, signals), signals)
-    frees = [alone(identified.members[0], run, limits, workers) for run in flights]
-    known = [
-        (run.trajectory.states, gusts[1:], *free)
-        for run, (_, _, gusts), free in zip(flights, found, frees, strict=True)
-        if free is not None
+    seen = [
+        _Seen(run, errors, gusts, alone(identified.members[0], run, limits, workers))
+        for run, (errors, _, gusts) in zip(flights, found, strict=True)
     ]
-    missed = [(read, free) for read, _, free, _ in known]
-    speeds = [speed(free, limits) for _, free in missed]
-    features = [features_of(free, sent, signals) for _, _, free, sent in known]
-    past = [features_of(run.trajectory.states, run.trajectory.commands, signals) for run in flights]
+    drives = driven(identified.model, runs_of(identified, flights, signals), signals)
     causes: dict[int, Cause] = {}
     for state, place in disturbed.items():
         chain = identified.chains[place]
-        causes[state] = cause([[gusts[:, place] for gusts in flown] for flown in tasks.values()])
-        felt = [gusts[:, place] for _, gusts, _, _ in known]
-        surprises = [errors[1:, state] for errors, _, _ in found]
-        if foretold(list(zip(past, surprises, strict=True))).beyond_luck(SURE) or (
-            len(known) > 1 and foretold(list(zip(features, felt, strict=True))).certain(SURE)
-        ):
+        causes[state] = cause(_by_task(seen, place))
+        if _is_foretold(seen, state, place, signals):
             causes[state] = "law"
-        moving = [(np.abs(gusts), fast) for gusts, fast in zip(felt, speeds, strict=True)]
-        unsure = acts_in_motion(moving)
+        unsure = acts_in_motion(_sizes_and_speeds(seen, place, limits))
         if options.exactness:
+            missed = [(flight.run.trajectory.states, flight.free[0]) for flight in seen if flight.free]
             unsure = unsure or may_be_inexactness(chain, drives) or not shows(missed, chain, limits)
         if causes[state] == "disturbance" and unsure:
             causes[state] = "undecided"
     return causes
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """A flight as the twin's observer has seen it, and as the twin flies it by itself.
+
+    Args:
+        run: the flight.
+        errors: whitened errors of predictions (n + 1, n_x).
+        gusts: correlated disturbances (n + 1, chains).
+        free: states (n + 1, n_x) and commands (n, n_u) of the free run; None where it does not last.
+    """
+
+    run: Experiment
+    errors: Floats
+    gusts: Floats
+    free: tuple[Floats, Floats] | None
+
+
+def _by_task(seen: Sequence[_Seen], place: int) -> list[list[Floats]]:
+    """Of each task, what disturbs one chain in each of its flights."""
+    tasks: dict[bytes, list[Floats]] = {}
+    for flight in seen:
+        assert flight.run.test is not None
+        tasks.setdefault(flight.run.test.target_state.tobytes(), []).append(flight.gusts[:, place])
+    return list(tasks.values())
+
+
+def _is_foretold(seen: Sequence[_Seen], state: int, place: int, signals: Signals) -> bool:
+    """Whether a function of what was read and sent foretells errors of predictions, or one of free runs the gusts."""
+    past = [
+        (
+            features_of(flight.run.trajectory.states, flight.run.trajectory.commands, signals),
+            flight.errors[1:, state],
+        )
+        for flight in seen
+    ]
+    if foretold(past).beyond_luck(SURE):
+        return True
+    frees = [
+        (features_of(*flight.free, signals), flight.gusts[1:, place])
+        for flight in seen
+        if flight.free is not None
+    ]
+    return foretold(frees).certain(SURE)
+
+
+def _sizes_and_speeds(seen: Sequence[_Seen], place: int, limits: Limits) -> list[tuple[Floats, Floats]]:
+    """Of each flight how large what disturbs one chain is, and how fast the twin moves by itself."""
+    return [
+        (np.abs(flight.gusts[1:, place]), speed(flight.free[0], limits))
+        for flight in seen
+        if flight.free is not None
+    ]
 
 
 def cause(tasks: Sequence[Sequence[Floats]]) -> Cause:
