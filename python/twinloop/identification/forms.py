@@ -38,6 +38,8 @@ MEANINGS = {
     "semi-implicit-euler": "derivatives in one semi-implicit Euler step a period",
 }
 """Forms in words."""
+CALMER = 20.0
+"""What terms must gain, in units of χ², that take the place of what disturbs."""
 LEAST = 1e-6
 """The least share of a reading that is left in a residual."""
 LATE = 18.0
@@ -142,7 +144,10 @@ def brief_look(
         first = replace(first, actuation=known.actuation)
         if known.actuation.hidden:
             first = replace(first, candidates=with_hidden(brief, first.candidates))
-    return undisturbed(brief, climbed(brief, from_both_sides(brief, first)))
+    found = climbed(brief, from_both_sides(brief, first))
+    for calmer in undisturbed(brief, found, CALMER):
+        found = calmer
+    return found
 
 
 def _described(context: Context, look: Hypothesis) -> float:

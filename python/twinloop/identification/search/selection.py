@@ -5,7 +5,7 @@ Each function takes a hypothesis and gives another one; the searches of a hypoth
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.identification.context import Context
@@ -20,9 +20,6 @@ from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import calm, first_noise, unexplained
 from twinloop.identification.terms.directions import directions
 from twinloop.identification.terms.evolution import evolve
-
-CALMER = 20.0
-"""What terms must gain, in units of χ², that take the place of what disturbs."""
 
 
 def posed(context: Context, hypothesis: Hypothesis, inputs: Stages | None = None) -> Problem:
@@ -161,25 +158,33 @@ def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages
     return grown.searched(sums) if changed else hypothesis
 
 
-def undisturbed(context: Context, hypothesis: Hypothesis) -> Hypothesis:
-    """The hypothesis with what disturbs explained by terms as well, where noise that is estimated behind them pays.
+def undisturbed(context: Context, hypothesis: Hypothesis, least: float) -> Iterator[Hypothesis]:
+    """The hypothesis with sums searched as if nothing disturbed: of its own terms, then of those of all rungs.
 
-    Under a disturbance that explains all that is left no further term gains anything. So terms are searched as if
-    nothing disturbed, too: first those that are known, for it may be that only their noise was mistaken.
+    Under a disturbance that explains all that is left no further term gains anything. Its own terms come first, for it
+    may be that only their noise was mistaken. Noise is estimated behind what is found.
+
+    Args:
+        context: of the identification.
+        hypothesis: with sums.
+        least: what a sum must gain to take the place of another, in units of χ².
+
+    Returns:
+        One after the other, each made of the one before; none once hardly anything disturbs.
     """
-    problem, moves = posed(context, hypothesis), context.options.moves // 2
+    options, latest = context.options, hypothesis
     own = list(dict.fromkeys(node for found in hypothesis.sums for node in found.weights))
-    calmer = hypothesis
-    for terms, tried in ((own, moves // 10), (hypothesis.candidates.ladder[-1], moves)):
-        driven = [calm(problem, found.chain) for found in calmer.sums]
-        if all(quiet is found.chain for quiet, found in zip(driven, calmer.sums, strict=True)):
-            break
-        walks = context.walks(calmer.next_unit(context.unit), tried)
-        found = search(problem, driven, terms, calmer.sums, walks)
-        calmer = calmer.searched(
+    for terms, moves in ((own, options.moves // 20), (hypothesis.candidates.ladder[-1], options.moves // 2)):
+        problem = posed(context, latest)
+        driven = [calm(problem, found.chain) for found in latest.sums]
+        if all(quiet is found.chain for quiet, found in zip(driven, latest.sums, strict=True)):
+            return
+        walks = context.walks(latest.next_unit(context.unit), moves)
+        found = search(problem, driven, terms, latest.sums, walks)
+        latest = latest.searched(
             [
-                new if shorter(new.description_length + CALMER, old.description_length) else old
-                for old, new in zip(calmer.sums, found, strict=True)
+                new if shorter(new.description_length + least, old.description_length) else old
+                for old, new in zip(latest.sums, found, strict=True)
             ]
         )
-    return calmer
+        yield latest
