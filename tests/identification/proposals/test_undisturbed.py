@@ -1,4 +1,4 @@
-"""Terms are searched as if nothing disturbed, too: a disturbance that explains all that is left hides what is missing."""
+"""Terms are searched as if nothing disturbed, too: what explains all that is left would hide what is missing."""
 
 from dataclasses import replace
 
