@@ -15,7 +15,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import guessed_noise
 from twinloop.identification.search.moderation import with_moved
-from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
@@ -60,21 +60,20 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
     signals, options, runs = context.signals, context.options, tuple(context.runs)
     every = chains(signals, form, guessed_noise(runs, np.array([state.scale for state in signals.states])))
     seen = [node for node in context.known_terms if not pool.is_hidden(node)]
-    first = Hypothesis(
+    driven = (declared_noise(chain, signals) for chain in every if chain.output is not None)
+    if options.moderation:
+        driven = (with_moved(chain, runs, signals.dt) for chain in driven)
+    return Hypothesis(
         form=form,
         offsets=np.zeros(signals.n_x),
         runs=runs,
         actuation=Actuation.direct(signals),
         alike=alike_commands(signals),
         candidates=Candidates.of(pool, signals, options, form, seen),
-        driven=tuple(declared_noise(chain, signals) for chain in every if chain.output is not None),
+        driven=tuple(driven),
         given=tuple(given_noise(chain, signals) for chain in every if chain.output is None),
         start=start,
     )
-    if not options.moderation:
-        return first
-    problem = posed(context, first)
-    return replace(first, driven=tuple(with_moved(problem, chain) for chain in first.driven))
 
 
 def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.identification.records import Run
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.sensors.noise import unexplained
 
 TIMES = 3.0
 """Standard deviation of what a term moves, in units of all that moves its chain."""
@@ -34,7 +34,18 @@ def precisions(problem: Problem, chain: Chain, terms: Sequence[int]) -> Floats:
     return np.asarray(varied / (TIMES * TIMES * chain.moved))
 
 
-def with_moved(problem: Problem, chain: Chain) -> Chain:
-    """The chain with the variance of all that moves it: what would have to disturb it if there were no term."""
-    motion, period = unexplained(problem, chain).motion, problem.dt if chain.integrated else 1.0
-    return replace(chain, moved=motion.correlated + motion.white / period)
+def with_moved(chain: Chain, runs: Sequence[Run], dt: float) -> Chain:
+    """The chain with the variance of all that moves it, as its readings change from period to period.
+
+    Their noise is in it, so that large terms are priced less where that is large. What a likelihood tells from noise would
+    be too small where commands are switched to and fro.
+
+    Args:
+        chain: of states.
+        runs: recorded.
+        dt: period, s.
+    """
+    changes = np.concatenate([np.diff(run.states[:, chain.states[0]]) for run in runs])
+    period = dt if chain.integrated else 1.0
+    varied = float(changes.var()) / (period * period) if len(changes) else 0.0
+    return replace(chain, moved=varied) if varied > 0.0 else chain
