@@ -2,8 +2,8 @@
 
 import moocore
 import numpy as np
-from measure import Disagreement, Line, Section, interleaved, ratio
 
+from measure import Disagreement, Line, Section, interleaved, ratio
 from twinloop import _core
 
 COLUMNS, BATCH = 8, 250

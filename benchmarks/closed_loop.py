@@ -1,10 +1,10 @@
 """Closed loop: PID, learnt accelerations under RK4, and the error against recorded flights, beside numba."""
 
-import loop
 import numpy as np
+
+import loop
 from measure import Line, Section, check_agreement, fastest, interleaved, optional, ratio
 from programs import REGISTERS, Code, Renamed, native, random_program
-
 from twinloop import _core
 
 INPUTS, OUTPUTS = 10, 3

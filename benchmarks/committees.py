@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-import loop
 import numpy as np
-from measure import Line, Section, check_agreement, interleaved, ratio
 
+import loop
+from measure import Line, Section, check_agreement, interleaved, ratio
 from twinloop import _core
 
 CANDIDATES, MEMBERS, DRAWS = 96, 8, 4

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from measure import Line, Section, check_agreement, interleaved, ratio
 
+from measure import Line, Section, check_agreement, interleaved, ratio
 from twinloop import _core
 
 DT, STEPS, FEATURES = 0.02, 400, 40

@@ -1,9 +1,9 @@
 """Tuning: a model's constants moved until its predictions leave least, beside SciPy's Levenberg and Marquardt."""
 
 import numpy as np
-from measure import Disagreement, Line, Section, check_agreement, interleaved, ratio
 from scipy.optimize import least_squares
 
+from measure import Disagreement, Line, Section, check_agreement, interleaved, ratio
 from twinloop import _core
 
 DT, STEPS, RUNS = 0.02, 250, 2

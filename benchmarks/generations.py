@@ -2,10 +2,10 @@
 
 import time
 
-import loop
 import numpy as np
-from measure import Line, Section
 
+import loop
+from measure import Line, Section
 from twinloop import _core
 
 POPULATION = 250

@@ -1,9 +1,9 @@
 """What the guard costs in each period: a controller alone, and with a guard that looks ahead over several horizons."""
 
 import numpy as np
-from measure import Disagreement, Line, Section, interleaved, ratio
 
 import twinloop as tl
+from measure import Disagreement, Line, Section, interleaved, ratio
 from twinloop.guard import Guard
 
 QUICK = {"moves": 600, "starts": 1, "generations": 0, "evaluations": 256, "candidates": 32, "tuning_steps": 4}

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from rational import RATIONAL, RATIONAL_REPORTED, RATIONAL_TUNED
 from scipy.integrate import solve_ivp
-from textbook import REPORTED, TEXTBOOK, TUNED
 
 import twinloop as tl
+from rational import RATIONAL, RATIONAL_REPORTED, RATIONAL_TUNED
+from textbook import REPORTED, TEXTBOOK, TUNED
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs

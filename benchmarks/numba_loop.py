@@ -8,6 +8,7 @@ from math import sqrt
 
 import numpy as np
 from numba import njit
+
 from programs import DIVISION, REGISTERS, SMALLEST_DIVISOR
 
 AHEAD = (0.5, 0.5, 1.0, 0.0)

@@ -5,6 +5,7 @@ No fast mathematics: the numbers must be ours.
 
 import numpy as np
 from numba import njit
+
 from programs import DIVISION, REGISTERS, SMALLEST_DIVISOR
 
 LANES = 64

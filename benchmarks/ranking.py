@@ -2,8 +2,8 @@
 
 import moocore
 import numpy as np
-from measure import Disagreement, Line, Section, check_agreement, interleaved, optional, ratio
 
+from measure import Disagreement, Line, Section, check_agreement, interleaved, optional, ratio
 from twinloop import _core
 
 POPULATION, SELECTED = 500, 250

@@ -1,10 +1,10 @@
 """Rows: one-step error of random programs over many transitions, beside numba and NumPy."""
 
-import loop
 import numpy as np
+
+import loop
 from measure import Line, Section, Spread, check_agreement, interleaved, optional, ratio
 from programs import INSTRUCTIONS, REGISTERS, SMALLEST_DIVISOR, Code, Renamed, native, random_program
-
 from twinloop import _core
 
 INPUTS, OUTPUTS = 10, 6

@@ -14,20 +14,20 @@ os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["NUMBA_NUM_THREADS"] = "1"
 
+from rich.console import Console
+from rich.table import Table
+
 import archive
 import closed_loop
 import committees
 import filters
 import fitting
 import generations
+import guard
 import ranking
 import rows
 import subsets
 from measure import Disagreement, Section
-from rich.console import Console
-from rich.table import Table
-
-import guard
 
 SECTIONS = {
     "rows": rows.report,

@@ -1,8 +1,8 @@
 """Search over subsets: annealing by inner products and updated inverses, beside NumPy that solves each subset anew."""
 
 import numpy as np
-from measure import Disagreement, Line, Section, check_agreement, interleaved, ratio
 
+from measure import Disagreement, Line, Section, check_agreement, interleaved, ratio
 from twinloop import _core
 from twinloop._ground.streams import Unit
 

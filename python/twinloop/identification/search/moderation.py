@@ -37,8 +37,8 @@ def precisions(problem: Problem, chain: Chain, terms: Sequence[int]) -> Floats:
 def with_moved(chain: Chain, runs: Sequence[Run], dt: float) -> Chain:
     """The chain with the variance of all that moves it, as its readings change from period to period.
 
-    Their noise is in it: where that is large, large terms are priced less. What a likelihood tells from noise would be too
-    small where commands are switched to and fro.
+    Their noise is in it: where that is large, large terms are priced less. What a likelihood tells from noise would
+    be too small where commands are switched to and fro.
 
     Args:
         chain: of states.
