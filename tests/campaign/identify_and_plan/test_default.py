@@ -507,7 +507,7 @@ BRIEF = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3])
+@pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_test_that_was_flown_again_and_again_teaches_the_plant_and_not_its_controller(seed):
     plant = tl.systems.Quadrotor(noise=1e-2, seed=seed)
     campaign = default_campaign(

@@ -19,6 +19,10 @@ from twinloop.identification.sensors.chains import Chain
 TIMES = 3.0
 """Standard deviation of what a term moves, in units of all that moves its chain."""
 
+OF_ALL = 0.95
+BEYOND = 3.0
+"""A change more than so many times as large as such a share of all changes is a reading that jumped."""
+
 
 def precisions(problem: Problem, chain: Chain, terms: Sequence[int]) -> Floats:
     """Inverse variances of coefficients (terms,), by which what each term moves varies `TIMES` as much as all of it.
@@ -46,6 +50,9 @@ def with_moved(chain: Chain, runs: Sequence[Run], dt: float) -> Chain:
         dt: period, s.
     """
     changes = np.concatenate([np.diff(run.states[:, chain.states[0]]) for run in runs])
+    if not len(changes):
+        return chain
+    most = BEYOND * float(np.quantile(np.abs(changes), OF_ALL))
     period = dt if chain.integrated else 1.0
-    varied = float(changes.var()) / (period * period) if len(changes) else 0.0
+    varied = float((np.clip(changes, -most, most) if most > 0.0 else changes).var()) / (period * period)
     return replace(chain, moved=varied) if varied > 0.0 else chain
