@@ -68,6 +68,14 @@ def test_no_term_is_many_times_what_moves_the_chain(seed):
     assert (parts.std(axis=0) < 5.0 * together).all()
 
 
+def test_a_reading_that_jumps_does_not_widen_the_prior():
+    run = swinging(3, 1e-3)
+    spoilt = run.states.copy()
+    spoilt[40, 1] += 40.0
+    chains = [hypothesis([Run.of(states, run.commands)])[1].driven[0] for states in (run.states, spoilt)]
+    assert chains[1].moved == pytest.approx(chains[0].moved, rel=0.5)
+
+
 def test_a_large_term_that_is_right_is_found():
     # 30 g held by a thrust of 30 g: each is a thousand times what is left of both, and they do not cancel by chance.
     stream = np.random.default_rng(3)
