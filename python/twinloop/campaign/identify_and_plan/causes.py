@@ -6,12 +6,16 @@ flights, time by time. The sum of the products is compared with the scatter that
 do with each other, however slowly each of them changes (Bartlett 1935). One flight tells nothing, and neither do two in
 which a disturbance changes so slowly that its sign alone decides.
 
+What a law is wrong about is also the same wherever two flights do the same (`neighbours.py`). So may be what commands
+have come to withstand; then, and where flights pass nowhere near each other, nobody can tell.
+
 What the past of a flight says is no surprise: where the observer is right, nothing that was read or sent before tells
 an error of its next prediction (`foretold.py`), and no gust is told by a free run of the twin.
 
 Nor does a gust know when a system moves, as play and friction do, which are other ones under other gains. So its
-size is multiplied in the same way with the speed of the twin's free run, which no gust has touched. And what is small
-may be the inaccuracy of the law (`exactness.py`).
+size is multiplied in the same way with the speed of the twin's free run, which no gust has touched. What comes at
+single moments, far larger than it is otherwise, is rather an impact. And what is small may be the inaccuracy of the law
+(`exactness.py`).
 """
 
 from __future__ import annotations
@@ -28,8 +32,9 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.exactness import driven, may_be_inexactness, shows
 from twinloop.campaign.identify_and_plan.following import cut, start_of
-from twinloop.campaign.identify_and_plan.foretold import features_of, foretold
-from twinloop.campaign.identify_and_plan.likeness import Likeness
+from twinloop.campaign.identify_and_plan.foretold import features_of, foretold, in_scales
+from twinloop.campaign.identify_and_plan.likeness import Likeness, in_pieces
+from twinloop.campaign.identify_and_plan.neighbours import alike_nearby
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.errors import engine_input
 from twinloop.identification.identified import Identified
@@ -47,6 +52,8 @@ AT_MOST = 0.5
 """Correlation between flights that something from outside must not have, even if the products are too small by luck."""
 BY_LUCK = 2.0
 """Standard deviations of unrelated series by which products may be too small by luck, or too large."""
+PEAKED = 4.5
+"""Kurtosis from which a disturbance comes at single moments; 3 is that of a normal one."""
 LATEST = 12
 """Flights that are compared, the last ones."""
 
@@ -129,15 +136,11 @@ def causes_of(
     causes: dict[int, Cause] = {}
     for state, place in disturbed.items():
         chain = identified.chains[place]
-        causes[state] = cause(_by_task(seen, place))
-        if _is_foretold(seen, state, place, signals):
-            causes[state] = "law"
-        unsure = acts_in_motion(_sizes_and_speeds(seen, place, limits))
-        if options.exactness:
+        causes[state] = _cause(seen, state, place, limits)
+        if options.exactness and causes[state] == "disturbance":
             missed = [(flight.run.trajectory.states, flight.free[0]) for flight in seen if flight.free]
-            unsure = unsure or may_be_inexactness(chain, drives) or not shows(missed, chain, limits)
-        if causes[state] == "disturbance" and unsure:
-            causes[state] = "undecided"
+            if may_be_inexactness(chain, drives) or not shows(missed, chain, limits):
+                causes[state] = "undecided"
     return causes
 
 
@@ -156,6 +159,25 @@ class _Seen:
     errors: Floats
     gusts: Floats
     free: tuple[Floats, Floats] | None
+
+
+def _cause(seen: Sequence[_Seen], state: int, place: int, limits: Limits) -> Cause:
+    """The cause of what disturbs one chain, as flights tell it: from outside, where nothing speaks against that."""
+    signals = limits.signals
+    nearby = alike_nearby(
+        [
+            (
+                in_scales(flight.run.trajectory.states, flight.run.trajectory.commands, signals),
+                flight.gusts[1:, place],
+            )
+            for flight in seen
+        ]
+    )
+    by_time = cause(_by_task(seen, place))
+    if by_time == "law" or _is_foretold(seen, state, place, signals):
+        return "law"
+    unsure = not foreign(nearby) or comes_at_moments([flight.gusts[1:, place] for flight in seen])
+    return "undecided" if unsure or acts_in_motion(_sizes_and_speeds(seen, place, limits)) else by_time
 
 
 def _by_task(seen: Sequence[_Seen], place: int) -> list[list[Floats]]:
@@ -204,8 +226,27 @@ def cause(tasks: Sequence[Sequence[Floats]]) -> Cause:
     alike = Likeness.of(pair for series in tasks for pair in combinations(series, 2))
     if alike.certain(SURE):
         return "law"
-    foreign = alike.product + BY_LUCK * alike.by_luck < AT_MOST * alike.size
-    return "disturbance" if foreign else "undecided"
+    return "disturbance" if foreign(alike) else "undecided"
+
+
+def foreign(alike: Likeness) -> bool:
+    """Whether series are certainly not what they would be if a law were wrong about them.
+
+    Args:
+        alike: how alike they are.
+    """
+    return alike.product + BY_LUCK * alike.by_luck < AT_MOST * alike.size
+
+
+def comes_at_moments(flights: Sequence[Floats]) -> bool:
+    """Whether a disturbance is far larger at single moments than it is otherwise, as an impact is.
+
+    Args:
+        flights: of each what disturbs it (n,).
+    """
+    series = np.concatenate([in_pieces(disturbed) for disturbed in flights])
+    about = np.square(series - series.mean())
+    return bool(np.square(about).mean() > PEAKED * float(about.mean()) ** 2)
 
 
 def acts_in_motion(flights: Sequence[tuple[Floats, Floats]]) -> bool:

@@ -67,6 +67,24 @@ def features_of(states: Floats, commands: Floats, signals: Signals) -> Floats:
     Returns:
         Features (n, p), states in units of their scales; of states that wrap the sine and the cosine.
     """
+    plain = in_scales(states, commands, signals)
+    products = [plain[:, i] * plain[:, j] for i, j in combinations_with_replacement(range(plain.shape[1]), 2)]
+    remembered = [_remembered(plain, share * len(plain)) for share in MEMORIES]
+    one = np.ones((len(plain), 1))
+    return np.hstack([one, plain, plain * np.abs(plain), np.stack(products, axis=1), *remembered])
+
+
+def in_scales(states: Floats, commands: Floats, signals: Signals) -> Floats:
+    """States at the start of each period and the commands in it, in units of their scales.
+
+    Args:
+        states: of a free run or a flight (n + 1, n_x).
+        commands: of the same (n, n_u).
+        signals: of the system.
+
+    Returns:
+        Features (n, p); of states that wrap the sine and the cosine.
+    """
     columns = []
     for state, values in zip(signals.states, states[:-1].T, strict=True):
         if state.period is None:
@@ -75,11 +93,7 @@ def features_of(states: Floats, commands: Floats, signals: Signals) -> Floats:
             turned = 2.0 * np.pi / state.period * values
             columns += [sin(turned), cos(turned)]
     columns += [values / command.size for command, values in zip(signals.commands, commands.T, strict=True)]
-    plain = np.stack(columns, axis=1)
-    products = [plain[:, i] * plain[:, j] for i, j in combinations_with_replacement(range(plain.shape[1]), 2)]
-    remembered = [_remembered(plain, share * len(plain)) for share in MEMORIES]
-    one = np.ones((len(plain), 1))
-    return np.hstack([one, plain, plain * np.abs(plain), np.stack(products, axis=1), *remembered])
+    return np.stack(columns, axis=1)
 
 
 def _remembered(series: Floats, periods: float) -> Floats:
