@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twinloop.errors import InvalidInput
 from twinloop.law.actuation import Actuator
-from twinloop.law.expansion import Expansion, Polynomial, ordered, written
+from twinloop.law.expansion import Expansion, Monomial, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
-from twinloop.law.spread import Spread, spreads
+from twinloop.law.spread import Spread, spreads, varying_in
 from twinloop.law.writing import EXACT, TEXT, Term, Writer
 from twinloop.signals import Signals
 
@@ -81,7 +81,11 @@ class _Page:
                 self.expressions.input(place)
             self.polynomials = expanded(law)
             self.outputs = [written(self.expressions, polynomial) for polynomial in self.polynomials]
-        self.of_members = [expanded(member) for member in self.members]
+        of_members = [expanded(member) for member in self.members]
+        self.spreads: list[dict[Monomial, Spread]] = [
+            spreads(self.expressions, polynomial, [polynomials[output] for polynomials in of_members])
+            for output, polynomial in enumerate(self.polynomials if self.members else ())
+        ]
         prefix = _unused("t", law.symbols)
         self.writer = Writer(self.expressions, self.outputs, law.symbols, digits, prefix, self.exact)
 
@@ -175,7 +179,7 @@ class _Page:
     def body(self) -> list[str]:
         """Parts that have a name, then an equation for each state, then one for each hidden state."""
         law, names = self.law, self.signals.state_names
-        lines = _named(self.writer)
+        lines = _named(self.writer, self._note_inside)
         pieces = [self._pieces(output) for output in range(len(self.outputs))]
         if law.form in DERIVATIVES:
             driven, slopes = self.signals.driven, dict(enumerate(law.derivatives()))
@@ -202,17 +206,18 @@ class _Page:
         """An output, in pieces that share a constant where a committee stands behind it."""
         if not self.members or not self.polynomials[output]:
             return [_Piece(self.writer.terms(self.outputs[output]))]
-        found = spreads(
-            self.expressions,
-            self.polynomials[output],
-            [polynomials[output] for polynomials in self.of_members],
-        )
+        found = self.spreads[output]
         pieces: dict[tuple[str, str], list[Term]] = {}
         terms = self.writer.terms(self.outputs[output])
         for (monomial, coefficient), term in zip(ordered(self.polynomials[output]), terms, strict=True):
-            key = self.writer.number(abs(coefficient)), _note(found[monomial])
+            key = self.writer.number(abs(coefficient)), _note(found[monomial], self.writer.names)
             pieces.setdefault(key, []).append(term)
         return [_Piece(terms, note) for (_, note), terms in pieces.items()]
+
+    def _note_inside(self, node: int) -> str:
+        """± of the constants of a part of an equation."""
+        every = (spread for of_output in self.spreads for spread in of_output.values())
+        return ", ".join(f"± {sd:.2g}" for sd in varying_in(every, node, self.writer.names))
 
     def _filling(self, name: str, number: int) -> list[str]:
         """The equation of a hidden state that commands fill."""
@@ -237,21 +242,23 @@ class _Page:
         return len(member.actuation.hidden) == len(self.law.actuation.hidden)
 
 
-def _note(spread: Spread) -> str:
+def _note(spread: Spread, named: Collection[int]) -> str:
     """± of the constants of a term, and how many members have it if not all do."""
     having = "" if spread.having == spread.members else f" ({spread.having} of {spread.members})"
-    if spread.sds is None:
+    if spread.sd is None:
         return having.strip()
-    coefficient, *inside = (f"± {sd:.2g}" for sd in spread.sds)
-    return coefficient + (f", inside {', '.join(inside)}" if inside else "") + having
+    inside = ", ".join(f"± {sd:.2g}" for sd in spread.varying(named))
+    return f"± {spread.sd:.2g}" + (f", inside {inside}" if inside else "") + having
 
 
-def _named(writer: Writer) -> list[str]:
+def _named(writer: Writer, note: Callable[[int], str] = lambda node: "") -> list[str]:
     """An equation for each part that has a name."""
     return [
         line
         for node, name in writer.names.items()
-        for line in _equation(name, [_Piece(writer.terms(node, define=True))])
+        for line in _equation(
+            name, [_Piece([term], note(part)) for term, part in writer.summands(node, define=True)]
+        )
     ]
 
 

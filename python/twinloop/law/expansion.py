@@ -26,6 +26,8 @@ ROUNDING = 1e-14
 """Share of two coefficients of which their sum is taken for rounding: 0."""
 MOST_TERMS = 40
 """Terms above which a product stays a product: nobody reads more."""
+MOST_OVER = 3
+"""Terms above which a sum is divided as a whole: written term by term, each of them would repeat the divisor."""
 HIGHEST = 24
 """Degree above which a product stays a product."""
 
@@ -95,13 +97,18 @@ class Expansion:
 
     def _product(self, a: Polynomial, b: Polynomial) -> Polynomial:
         long = len(a) * len(b) > MOST_TERMS and min(len(a), len(b)) > 1
-        if long or _degree(a) + _degree(b) > HIGHEST:
+        divided = (len(a) > MOST_OVER and self._divides(b)) or (len(b) > MOST_OVER and self._divides(a))
+        if long or divided or _degree(a) + _degree(b) > HIGHEST:
             a, b = self._factor(a), self._factor(b)
         found: dict[Monomial, float] = {}
         for first, weight in a.items():
             for second, other in b.items():
                 _enter(found, _times(first, second), weight * other)
         return found
+
+    def _divides(self, polynomial: Polynomial) -> bool:
+        """Whether there is a quotient among its factors."""
+        return any(_is_quotient(self.target, factor) for monomial in polynomial for factor, _ in monomial)
 
     def _factor(self, polynomial: Polynomial) -> Polynomial:
         """The same as one monomial."""

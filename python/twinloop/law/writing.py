@@ -112,14 +112,18 @@ class Writer:
         Returns:
             The terms; the first one has a sign, too.
         """
-        found: list[Term] = []
+        return [term for term, _ in self.summands(number, define)]
+
+    def summands(self, number: int, define: bool = False) -> list[tuple[Term, int]]:
+        """What a node is the sum of, as `terms`, each with its node."""
+        found: list[tuple[Term, int]] = []
         while self._is_plain_sum(number) or (define and self._is_sum(number)):
             operation, operands, _ = self.expressions[number]
             number, second = self._in_order(operation, operands)
             sign, text = _signed(self._operand(second, PRODUCT))
-            found.append((sign if operation == "+" else _opposite(sign), text))
+            found.append(((sign if operation == "+" else _opposite(sign), text), second))
             define = False
-        found.append(_signed(self._texts[number][0] if define else self.text(number)))
+        found.append((_signed(self._texts[number][0] if define else self.text(number)), number))
         return found[::-1]
 
     def _chosen(self, roots: Sequence[int], every: bool) -> set[int]:

@@ -11,6 +11,8 @@ from scipy.integrate import solve_ivp
 import twinloop as tl
 from twinloop import _core
 from twinloop._ground.streams import Unit
+from twinloop.campaign.presets import options_of
+from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise, stages
 from twinloop.identification.search.joints import with_joints
 from twinloop.identification.search.problem import Problem
@@ -138,3 +140,61 @@ def test_terms_of_joints_are_entered_once():
     for terms in (forces(problem.pool, signals), masses(problem.pool, signals)):
         assert len(terms) == len(set(terms))
         assert problem.usable(terms) == terms
+
+
+# An arm that moves little
+
+
+def arm(state, torques, rubs):
+    """Accelerations of two links in a horizontal plane, solved by somebody else, with dry friction or without."""
+    _, elbow, p, q = state
+    inertia = np.array([[1.4 + 0.84 * np.cos(elbow), 0.35 + 0.42 * np.cos(elbow)], [0.0, 0.35]])
+    inertia[1, 0] = inertia[0, 1]
+    swirl = 0.42 * np.sin(elbow)
+    dry = rubs * np.array([0.8 * np.tanh(p / 0.05), 0.3 * np.tanh(q / 0.05)])
+    force = np.array([torques[0] - 1.2 * p + swirl * q * (2.0 * p + q), torques[1] - 0.5 * q - swirl * p * p])
+    return np.linalg.solve(inertia, force - dry)
+
+
+ARM = tl.Signals(
+    states=[
+        tl.State("shoulder", "rad", 1.0),
+        tl.State("elbow", "rad", 1.0),
+        tl.State("shoulder_rate", "rad/s", 4.0, derivative_of="shoulder"),
+        tl.State("elbow_rate", "rad/s", 4.0, derivative_of="elbow"),
+    ],
+    commands=[tl.Command("first", "N m", (-20.0, 20.0)), tl.Command("second", "N m at it", (-8.0, 8.0))],
+    dt=0.01,
+)
+
+
+BRIEF = {"generations": 0, "committee_size": 2, "lags": False, "moves": 8000, "contacts": False}
+
+
+def moved(seed, rubs, steps=120):
+    """A flight in which the elbow stays within half a radian: there many functions of it are nearly the same."""
+    stream = np.random.default_rng(seed)
+    wanted = np.repeat(stream.uniform([-0.5, 0.2], [0.5, 0.9], (4, 2)), steps // 4, axis=0)
+    state, states, commands = np.array([0.0, 0.5, 0.0, 0.0]), [], []
+    for target in wanted:
+        command = np.clip([60.0, 25.0] * (target - state[:2]) - [10.0, 3.0] * state[2:], [-20, -8], [20, 8])
+        states.append(state)
+        commands.append(command)
+        for _ in range(10):
+            middle = state + 0.0005 * np.array([*state[2:], *arm(state, command, rubs)])
+            state = state + 0.001 * np.array([*middle[2:], *arm(middle, command, rubs)])
+    readings = np.array([*states, state]) + stream.normal(size=(steps + 1, 4)) * [5e-4, 5e-4, 5e-3, 5e-3]
+    return Run.of(readings, np.array(commands))
+
+
+@pytest.mark.parametrize("rubs", [False, True], ids=["smooth", "with dry friction"])
+def test_the_masses_of_an_arm_that_moves_little_are_found(rubs):
+    runs = [moved(seed, rubs) for seed in range(4)]
+    found = identify_runs(runs, ARM, options_of("default", BRIEF), workers=_core.Workers())
+    stream = np.random.default_rng(9)
+    states = stream.uniform([-1.0, -0.2, -3.0, -3.0], [1.0, 1.3, 3.0, 3.0], (200, 4))
+    torques = stream.uniform([-20.0, -8.0], [20.0, 8.0], (200, 2))
+    truth = np.array([arm(state, torque, rubs) for state, torque in zip(states, torques, strict=True)])
+    said = found.model.program.run(np.column_stack([states, torques / [20.0, 8.0]]))
+    # Rates, torques and poses that no flight has come near.
+    assert np.all(np.sqrt(np.square(said - truth).mean(axis=0)) < 0.05 * truth.std(axis=0))

@@ -22,7 +22,7 @@ from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import climbed, posed
 from twinloop.identification.search.structure import Sum, priced
 from twinloop.identification.sensors.noise import RIDGE, calm
-from twinloop.identification.terms.friction import entered, frictions, is_friction
+from twinloop.identification.terms.friction import entered, frictions, frictions_in
 
 WORTH = 20.0
 """What friction must gain, in units of χ², beside its price: as much as a rung of the ladder."""
@@ -74,8 +74,8 @@ def _with_friction(context: Context, hypothesis: Hypothesis) -> Hypothesis:
 
 
 def _rubs(hypothesis: Hypothesis) -> bool:
-    """Whether there is friction among its terms."""
-    return any(is_friction(hypothesis.pool, term) for found in hypothesis.sums for term in found.weights)
+    """Whether there is friction among its terms, or inside one of them, as where joints share their masses."""
+    return any(frictions_in(hypothesis.pool, found.weights) for found in hypothesis.sums)
 
 
 def _reselected(context: Context, hypothesis: Hypothesis) -> Hypothesis:
@@ -112,7 +112,7 @@ def _offered(context: Context, problem: Problem, known: Sum) -> list[int]:
     every = list(frictions(context.signals, problem.stages.start))
     readings = problem.readings(known.chain)
     nodes = [entered(problem.pool, each, len(every), readings) for each in every]
-    if any(is_friction(problem.pool, term) for term in known.weights):
+    if frictions_in(problem.pool, known.weights):
         nodes += sorted({place for each in every for place in each.inputs})
     return problem.usable([node for node in dict.fromkeys(nodes) if node not in known.weights])
 

@@ -80,7 +80,7 @@ def implicit(problem: Problem, signals: Signals, known: Sequence[Sum], walks: Wa
         np.concatenate([over_line, -driving(problem, sum_)[:, :, np.newaxis] * under], axis=2)
         for sum_ in sums
     ]
-    grams = whitened(problem, sums, columns, costs, walks)
+    grams, _ = whitened(problem, sums, columns, costs, walks)
     short = walks.with_moves(walks.moves // 2)
     every: list[list[tuple[list[int], float]]] = [[] for _ in sums]
     for number, mask in enumerate(_masks(pool, signals, lower), NOISE_ROUNDS):
@@ -163,8 +163,8 @@ def whitened(
     columns: Sequence[Columns],
     costs: Sequence[Floats],
     walks: Walks,
-) -> list[_core.Gram]:
-    """Inner products of each chain's columns, under the noise that is left behind what a search finds among them.
+) -> tuple[list[_core.Gram], list[Chain]]:
+    """Inner products of each chain's columns, and the chains with the noise that a search among them has left.
 
     Args:
         problem: of the chains.
@@ -198,7 +198,7 @@ def whitened(
             chain.with_noise(sensors, motion)
             for chain, (sensors, motion, _) in zip(chains, noises, strict=True)
         ]
-    return grams
+    return grams, chains
 
 
 def _quotients(

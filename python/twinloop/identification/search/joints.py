@@ -18,7 +18,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
-from twinloop.identification.search.description import shorter
+from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.implicit import (
     NEAREST,
     NOISE_ROUNDS,
@@ -29,6 +29,8 @@ from twinloop.identification.search.implicit import (
 from twinloop.identification.search.problem import Columns, Problem
 from twinloop.identification.search.structure import Sum, prices, search, total
 from twinloop.identification.search.walks import Walks
+from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.terms.friction import frictions_in
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.libraries import angles
 from twinloop.signals import Signals
@@ -37,8 +39,8 @@ FIRST = 2000
 """Number of the first unit of work within a search's own, of which others have lower ones."""
 FEWEST, MOST = 2, 4
 """Joints that may share their masses."""
-TURNS = 2
-"""How often equations are searched, the second time with the accelerations that the first ones give."""
+TURNS = 4
+"""How often equations are searched at most, each time with the accelerations that the last ones give."""
 LIKELY = 5
 """Subsets of a short walk, the best ones, that tell whether joints may share a mass."""
 STARTS = 3
@@ -52,8 +54,34 @@ WORTH = 20.0
 RIDGE = 1e-12
 """Added to the columns' unit lengths."""
 
+OWN = 3
+"""Terms at most that the mass of a joint itself depends on."""
+
 _Pairs = Sequence[tuple[int, int]]
 """Joints with the terms that stand before their accelerations."""
+
+
+_Part = tuple[list[int], list[float]]
+"""Columns of an equation, and their weights."""
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """What equations are chosen from, of each joint.
+
+    Args:
+        grams: inner products of its columns.
+        chains: with the noise that a search among them has left.
+        columns: forces, then terms times accelerations (3, rows, p).
+        costs: of the columns (p,).
+        pairs: joint and term of each column behind the forces.
+    """
+
+    grams: Sequence[_core.Gram]
+    chains: Sequence[Chain]
+    columns: Sequence[Columns]
+    costs: Sequence[Floats]
+    pairs: Sequence[_Pairs]
 
 
 @dataclass(frozen=True)
@@ -97,8 +125,9 @@ class _Joints:
 
     def __init__(self, problem: Problem, signals: Signals, known: Sequence[Sum], walks: Walks) -> None:
         self.problem, self.pool, self.known = problem, problem.pool, list(known)
-        self.walks, self.least = walks, walks.with_moves(LEAST)
-        self.forces = problem.usable(forces(self.pool, signals))
+        self.walks, self.least, self.states = walks, walks.with_moves(LEAST), signals.n_x
+        rubbing = frictions_in(self.pool, (node for sum_ in known for node in sum_.weights))
+        self.forces = problem.usable(list(dict.fromkeys([*forces(self.pool, signals), *rubbing])))
         self.masses = problem.usable(masses(self.pool, signals))
         self.over, self.under = problem.values(self.forces), problem.values(self.masses)
 
@@ -112,8 +141,9 @@ class _Joints:
             sums = self._turn(self.known if best is None else best, self.walks.part(FIRST + turn))
             if sums is None:
                 break
-            if best is None or shorter(total(sums), total(best)):
-                best = sums
+            if best is not None and not shorter(total(sums), total(best)):
+                break
+            best = sums
         return best
 
     def judged(self, found: Sequence[Sum]) -> float:
@@ -125,6 +155,23 @@ class _Joints:
         return length
 
     def _turn(self, known: Sequence[Sum], walks: Walks) -> list[Sum] | None:
+        posed = self._posed(known, walks)
+        if posed is None:
+            return None
+        parts = self._chosen(posed, posed.costs, walks, 0)
+        if not any(self._couples(i, subset, posed.pairs[i]) for i, (subset, _) in enumerate(parts)):
+            return None
+        found = self._together(posed, parts)
+        if found is not None and shorter(total(found), total(known)):
+            return found
+        # Every joint may have come upon the equation of the same one, for it tells all accelerations in it.
+        beside = (self._beside(posed, parts, keeper, walks) for keeper in range(len(parts)))
+        tried = (found, *(self._together(posed, each) for each in beside))
+        several = [sums for sums in tried if sums is not None]
+        return shortest(several, total) if several else None
+
+    def _posed(self, known: Sequence[Sum], walks: Walks) -> _Posed | None:
+        """What equations are chosen from; None where a short walk comes upon no shared mass."""
         accelerations = [driving(self.problem, sum_) for sum_ in known]
         pairs = [
             [
@@ -137,21 +184,87 @@ class _Joints:
         ]
         costs = [self._costs(sum_, of_joint) for sum_, of_joint in zip(self.known, pairs, strict=True)]
         columns = [self._columns(of_joint, accelerations) for of_joint in pairs]
-        if not self._looks(known, columns, costs, pairs, walks.part(NOISE_ROUNDS + 1)):
+        shared = [self._restricted(i, own, pairs[i], ()) for i, own in enumerate(costs)]
+        if not self._looks(known, columns, shared, pairs, walks.part(NOISE_ROUNDS + 1)):
             return None
-        grams = whitened(self.problem, known, columns, costs, walks)
-        several = replace(walks.part(NOISE_ROUNDS), starts=STARTS)
-        subsets = [list(walked[0][0]) for walked in several.among(grams, costs, self.problem.workers)]
-        parts = [
-            _thinned(gram, subset, cost) for gram, subset, cost in zip(grams, subsets, costs, strict=True)
-        ]
+        grams, chains = whitened(self.problem, known, columns, shared, walks)
+        return _Posed(grams, chains, columns, costs, pairs)
+
+    def _together(self, posed: _Posed, parts: Sequence[_Part]) -> list[Sum] | None:
+        """Sums of equations that are solved together; None where they have no solution."""
         subsets, weights = [subset for subset, _ in parts], [np.array(own) for _, own in parts]
-        if not any(self._couples(i, subset, pairs[i]) for i, subset in enumerate(subsets)):
-            return None
-        equations = self._descended(subsets, weights, pairs)
+        equations = self._descended(subsets, weights, posed.pairs)
         if equations is None:
             return None
-        return self._sums(equations, [float(c[s].sum()) for c, s in zip(costs, subsets, strict=True)])
+        return self._sums(equations, [float(c[s].sum()) for c, s in zip(posed.costs, subsets, strict=True)])
+
+    def _beside(self, posed: _Posed, parts: Sequence[_Part], keeper: int, walks: Walks) -> list[_Part]:
+        """The equation of one joint with those of the others chosen again, without the commands that move that one."""
+        moving = self._commands([self.forces[j] for j in parts[keeper][0] if j < len(self.forces)])
+        out = [bool(self._commands([force]) & moving) for force in self.forces]
+        costs = []
+        for joint, own in enumerate(posed.costs):
+            limited = own.copy()
+            if joint != keeper:
+                limited[: len(self.forces)][out] = np.inf
+            costs.append(limited)
+        chosen = self._chosen(posed, costs, walks, keeper + 1)
+        return [parts[joint] if joint == keeper else part for joint, part in enumerate(chosen)]
+
+    def _commands(self, nodes: Sequence[int]) -> set[int]:
+        """The commands that some nodes are computed from."""
+        return set(range(self.states, self.pool.inputs)) & set(self.pool.needed(nodes))
+
+    def _chosen(self, posed: _Posed, costs: Sequence[Floats], walks: Walks, number: int) -> list[_Part]:
+        """The columns of each joint's equation and their weights, by what the equation leaves of its acceleration.
+
+        What its own mass depends on enters one term at a time: several of them together are next to nothing on flights
+        in which poses vary little, and such a mass times the acceleration is explained by no force at all.
+        """
+        several, joints = replace(walks, starts=STARTS), range(len(costs))
+        own: list[tuple[int, ...]] = [()] * len(costs)
+        best: list[tuple[float, _Part]] = [(np.inf, ([], []))] * len(costs)
+        part = NOISE_ROUNDS + 2 + number * (OWN + 1) * len(self.masses)
+        for round_ in range(OWN + 1):
+            before = list(own)
+            for term in self.masses if round_ else [self.pool.one]:
+                allowed = [(*terms, term) if round_ else () for terms in before]
+                limited = [self._restricted(i, costs[i], posed.pairs[i], allowed[i]) for i in joints]
+                walked = several.part(part).among(posed.grams, limited, self.problem.workers)
+                part += 1
+                for i, subsets in enumerate(walked):
+                    found = _thinned(posed.grams[i], list(subsets[0][0]), costs[i])
+                    length = self._left(posed, i, *found) + float(costs[i][found[0]].sum())
+                    if shorter(length, best[i][0]):
+                        best[i], own[i] = (length, found), allowed[i]
+            if round_ and own == before:
+                break
+        return [found for _, found in best]
+
+    def _restricted(self, joint: int, costs: Floats, pairs: _Pairs, allowed: Sequence[int]) -> Floats:
+        """Prices under which a joint's own mass depends on some terms only."""
+        count, out = len(self.forces), costs.copy()
+        for place, (j, term) in enumerate(pairs, count):
+            if j == joint and term not in allowed:
+                out[place] = np.inf
+        return out
+
+    def _left(self, posed: _Posed, joint: int, subset: Sequence[int], weights: Sequence[float]) -> float:
+        """What is left of readings by an acceleration that its equation is solved for, others as they are known."""
+        columns, chain, pairs = posed.columns[joint], posed.chains[joint], posed.pairs[joint]
+        place = {term: i for i, term in enumerate(self.masses)}
+        over, mass = np.zeros(columns.shape[:2]), np.ones(columns.shape[:2])
+        for j, weight in zip(subset, weights, strict=True):
+            of, term = pairs[j - len(self.forces)] if j >= len(self.forces) else (-1, 0)
+            if of == joint:
+                mass = mass + weight * self.under[:, :, place[term]]
+            else:
+                over = over + weight * columns[:, :, j]
+        if not mass.min() > NEAREST * mass.max():
+            return float("inf")
+        explained = (over / mass)[:, :, np.newaxis]
+        regression = self.problem.regression(chain, explained, explained)
+        return regression.gram(chain.sensors, chain.motion, self.problem.workers).total
 
     def _looks(
         self,

@@ -57,7 +57,7 @@ def saturations(
             problem.pool, below, problem.readings(sum_.chain), len(problem.runs)
         )
         costs.append(cost)
-    grams = whitened(problem, sums, [features] * len(sums), costs, walks)
+    grams, _ = whitened(problem, sums, [features] * len(sums), costs, walks)
     short = walks.with_moves(walks.moves // 2).part(NOISE_ROUNDS)
     for i, walked in zip(posed, short.among(grams, costs, problem.workers), strict=True):
         seen: dict[int, Quotient] = {}

@@ -6,7 +6,7 @@ Two of them with widths of their own fall once the motion has set in, as Stribec
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -77,6 +77,11 @@ def entered(pool: Pool, friction: Friction, tried: int, readings: int) -> int:
 def is_friction(pool: Pool, number: int) -> bool:
     """Whether an expression is dry friction of something."""
     return pool[number].operation == "tanh"
+
+
+def frictions_in(pool: Pool, terms: Iterable[int]) -> list[int]:
+    """The nodes of dry friction that terms are, or are made of."""
+    return [number for number in pool.needed(list(terms)) if is_friction(pool, number)]
 
 
 def upright(pool: Pool, number: int) -> tuple[int, int]:
