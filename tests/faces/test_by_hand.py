@@ -73,7 +73,7 @@ def test_a_campaign_is_flown_by_hand_as_from_python(folder):
 def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     first = run("ask", "rig.db").stdout
     assert "angle.kp" in first and "N m/rad" in first and "twinloop tell rig.db 0 FLIGHT.csv" in first
-    assert "The controller that you trust already, with a gentle excitation" in first
+    assert "The controller that you already trust, with a gentle excitation" in first
     assert "nothing is known of the system before it" in first
     said = json.loads(run("ask", "rig.db", "--json").stdout)
     assert said["risk"] is None and f"Risk of leaving the envelope: {said['risk_unknown']}\n" in first
@@ -168,7 +168,7 @@ def test_after_old_logs_the_first_test_is_still_the_controller_that_is_trusted(f
     trusted = read_file("rig.toml").first
     other = read_file("rig.toml").campaign(threads=1)
     flown(other.test({"angle.kp": 1.0, "angle.ki": 0.5, "angle.kd": 0.2}), "old.csv")
-    assert run("attach", "rig.db", "old.csv").stdout == "Kept: old.csv; 1 experiment in rig.db.\n"
+    assert run("attach", "rig.db", "old.csv").stdout == "Saved: old.csv; 1 experiment in rig.db.\n"
     again = run("attach", "rig.db", "old.csv")
     assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == 1
     asked = json.loads(run("ask", "rig.db", "--json").stdout)

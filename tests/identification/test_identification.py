@@ -489,7 +489,7 @@ def test_a_hidden_state_that_commands_fill_is_found():
     assert (list(commands), squared, rest) == ([0, 1], True, 1.0)
     assert time == pytest.approx(0.8, rel=0.1)
     assert found.description_length < blind.description_length - 100.0 and found.terms < 8
-    # What is left is noise alone; without the state it is several times as much, or a disturbance.
+    # The residuals are noise alone; without the state it is several times as much, or a disturbance.
     assert found.misfit == pytest.approx(1.0, abs=0.2)
     assert found.chains[0].motion.correlated < 0.1 * blind.chains[0].motion.correlated
     text = tl.Twin(found.model, signals).equations(3)

@@ -67,14 +67,14 @@ class Parameter:
         value = self.scale * given + self.offset
         if not math.isfinite(value):
             raise InvalidInput(
-                f"Parameter {self.name!r}: expected a finite number, found {value!r}; mend its scale."
+                f"Parameter {self.name!r}: expected a finite number, found {value!r}; correct its scale."
             )
         found: Value = round(value) if self.whole else value
         low, high = (-math.inf, math.inf) if self.limits is None else self.limits
         if not low <= found <= high:
             raise InvalidInput(
                 f"Parameter {self.name!r}: expected {low:g} to {high:g}, found {found:g} for the gain {gain!r} ="
-                f" {given:g}; nothing is written. Mend its scale, or the bounds of the gain."
+                f" {given:g}; nothing is written. Correct its scale, or the bounds of the gain."
             )
         return found
 

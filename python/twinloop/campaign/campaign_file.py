@@ -283,7 +283,7 @@ def _toml_of(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as reason:
         if isinstance(reason, InvalidInput):
             raise
-        raise InvalidInput(f"File {path}: expected TOML, found: {reason}; mend that line.") from reason
+        raise InvalidInput(f"File {path}: expected TOML, found: {reason}; correct that line.") from reason
 
 
 def _members(found: Mapping[str, Any], name: str, kind: type[State] | type[Channel]) -> list[Any]:

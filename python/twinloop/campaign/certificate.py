@@ -138,20 +138,20 @@ def _not_tested(
     signals = best.family.signals
     said = []
     if not any(run.number == best.number for run in experiments):
-        said.append("These gains have not flown: all that is said of them is predicted.")
+        said.append("These gains have not flown: everything stated about them is a prediction.")
     said.append(
         f"Other starts and targets than the task's, and flights longer than {best.steps * signals.dt:g} s."
     )
     said += [
         f"{use.name} is predicted between {use.predicted[0]:.3g} and {use.predicted[1]:.3g} {use.unit}, and was flown"
-        f" between {use.flown[0]:.3g} and {use.flown[1]:.3g}: the twin goes on from its equations there."
+        f" between {use.flown[0]:.3g} and {use.flown[1]:.3g}: outside the flown range the twin extrapolates."
         for use in uses
         if use.beyond_flown
     ]
     bare = [use.name for use in uses if use.envelope is None]
     if bare:
         said.append(
-            f"No envelope is declared for {', '.join(bare)}: nobody looked whether the flight stays safe there."
+            f"No envelope is declared for {', '.join(bare)}: whether the flight stays safe there was not checked."
         )
     if no_margins:
         said.append(f"Margins of stability: {no_margins}.")

@@ -17,7 +17,7 @@ from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 Cause = Literal["disturbance", "law", "undecided"]
-"""Of what disturbs for long: something from outside; an error of the law; or what flights so far do not tell apart."""
+"""Of what disturbs for long: something from outside; a model error; or what flights so far do not tell apart."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class Lesson(Recorded, kind="lesson"):
         remarks: diagnostics.
         recurring: states whose correlated disturbance comes again at the same times in flight after flight: the law is
             wrong there, and nothing disturbs.
-        undecided: states whose correlated disturbance may as well be an error of the law: flights so far do not tell.
+        undecided: states whose correlated disturbance may as well be a model error: flights so far do not tell.
         asked: the tests planned after it.
     """
 

@@ -45,13 +45,13 @@ def new(file: Path, as_json: bool) -> None:
 
 @click.command()
 @click.argument("store")
-@click.option("--last", is_flag=True, help="No other test will follow: fly the best gains that are known.")
-@click.option("--again", is_flag=True, help="Another test, though one is waiting.")
+@click.option("--last", is_flag=True, help="The last test of the campaign: fly the best gains found so far.")
+@click.option("--again", is_flag=True, help="Plan another test although one is still to be flown.")
 @click.option(
-    "--batch", type=int, metavar="N", help="N alternatives, to be flown in any order; the best first."
+    "--batch", type=int, metavar="N", help="Plan N alternative tests, the best first; fly them in any order."
 )
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | None, as_json: bool) -> None:
     """Say what to fly next: a test sheet, and a file with the excitation and the predicted run.
 
@@ -86,8 +86,8 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
             click.echo(to_json({"tests": [described for _, described in shown]}), nl=False)
             return
         click.echo(
-            f"{len(shown)} alternatives, the one most worth flying first. Fly them in any order, tell each; a test"
-            f" that will not be flown: twinloop abandon {shown_name(store)} TEST\n"
+            f"{len(shown)} alternatives, the best first. Fly them in any order and record each with tell;"
+            f" for a test that you will not fly: twinloop abandon {shown_name(store)} TEST\n"
         )
         click.echo("\n".join(text for text, _ in shown), nl=False)
 
@@ -136,10 +136,10 @@ def tell(
                 test,
                 log,
                 aborted="" if aborted is None else STOPPED if reason is None else reason,
-                otherwise=f"tell that it was stopped: {_aborted(store, test, log, 'why')}",
+                otherwise=f"record a test that was stopped early: {_aborted(store, test, log, 'why')}",
             )
         text = (
-            f"Kept: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
+            f"Saved: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
             f" {shown_name(store)}."
         )
         runs = [run.quality for run in campaign.experiments if run.number == asked.number]
@@ -194,7 +194,7 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
     """Attach a FLIGHT without a test, as CSV or .npz: it is learnt, too."""
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
-        text = f"Kept: {flight}; {_count(campaign)} in {shown_name(store)}."
+        text = f"Saved: {flight}; {_count(campaign)} in {shown_name(store)}."
         answer({"file": str(flight), "experiments": len(campaign.experiments)}, text, as_json)
 
 
@@ -207,7 +207,7 @@ def abandon(store: str, test: int, as_json: bool) -> None:
     with closing(_campaign(store)) as campaign:
         asked = numbered(campaign, test)
         campaign.abandon(asked)
-        text = f"Kept: test {test} abandoned in {shown_name(store)}."
+        text = f"Saved: test {test} abandoned in {shown_name(store)}."
         answer(_standing(campaign, asked), text, as_json)
 
 

@@ -24,7 +24,7 @@ WHAT = ("twin", "controller")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="File to write; without it, standard output."
 )
-@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
 @click.option("--precision", default="double", show_default=True, help=f"Of C: {' or '.join(PRECISIONS)}.")
 @click.option(
     "--force", is_flag=True, help="Also a twin that fails its checks, and without comparing what is made."

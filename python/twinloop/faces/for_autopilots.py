@@ -28,7 +28,7 @@ def for_an_autopilot(command: Command) -> Command:
         command: of click.
     """
     for option in (
-        click.option("--name", help="Of the campaign, where the store holds several."),
+        click.option("--name", help="Name of the campaign, if the store holds several."),
         click.option(
             "--mapping",
             type=Path,

@@ -26,9 +26,9 @@ from twinloop.systems import BUILT_IN, Quadrotor
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Of the campaign, where the store holds several.")
-@click.option("--experiments", type=int, help="Runs in all; by default as many as were asked for.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
+@click.option("--experiments", type=int, help="Total number of runs; by default as first requested.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @patient
 @answers
 @click.pass_context
@@ -69,9 +69,9 @@ def resume(
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Of the campaign, where the store holds several.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
     """Learn from all that was told to a campaign of STORE, as the next ask would, and ask for nothing."""
     with closing(Campaign.load(store, name, threads=threads)) as campaign:
@@ -85,8 +85,8 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Of the campaign, where the store holds several.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(store: str, name: str | None, as_json: bool) -> None:
     """Show what STORE holds, as it was written last; nothing is learnt or changed, and a writer is not held up."""
     campaigns = _campaigns(store)
@@ -174,7 +174,7 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
     lines = [
         f"{shown_name(store)}: campaign {facts['name']!r}, begun {facts['created']}.",
         f"Preset {facts['preset']}, seed {facts['seed']}.",
-        f"Experiments told: {facts['told']}{of}. Tests made: {facts['tests']}.",
+        f"Experiments recorded: {facts['told']}{of}. Tests made: {facts['tests']}.",
     ]
     missing = facts["told"] - facts["learnt"]
     if missing:

@@ -95,8 +95,8 @@ def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> li
         note(
             "sensor-offset",
             f"Readings of {', '.join(names[offsets == offset])} come {1e3 * abs(offset):.3g} ms"
-            f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is learnt with that taken"
-            " out.",
+            f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is corrected"
+            " for it.",
         )
         for offset in dict.fromkeys(offsets[offsets != 0.0].tolist())
     ]
@@ -162,14 +162,15 @@ def remarks(
         said.append(
             serious(
                 "misfit",
-                f"What is left is {chi_squared / readings:.3g} times the noise: something acts that no term describes.",
+                f"The residuals are {chi_squared / readings:.3g} times the noise: there is an effect that no term"
+                " describes.",
             )
         )
     elif exact(chi_squared / max(1, readings)):
         said.append(
             note(
                 "exact",
-                "The readings are as good as exact: their noise is taken to be what the model leaves.",
+                "The readings are almost exact: their noise is taken from the model's residuals.",
             )
         )
     still = [

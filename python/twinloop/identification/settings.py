@@ -78,7 +78,7 @@ class IdentificationOptions:
         earlier_twin: whether the twin of before the last flights is kept where it follows them all and the new one does
             not.
         rough: whether a law with linear terms only is learnt, too, where no other follows the flights.
-        causes: whether what disturbs for long is told from an error of the law; otherwise all of it is taken to come
+        causes: whether what disturbs for long is told from a model error; otherwise all of it is taken to come
             from outside.
         exactness: whether what is no more than the inaccuracy of the law may be an error of it.
         divergence_factor: multiple of a state's scale beyond which a run counts as diverged.

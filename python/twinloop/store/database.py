@@ -176,8 +176,8 @@ def said(name: str, failure: Exception) -> TwinloopError:
                 f"Store {name}: expected {what}, found none ({reason}); nothing is lost: {advice}."
             )
     return StoreFailure(
-        f"Store {name}: expected an answer of the database, found: {reason}; nothing that was kept is lost: mend that,"
-        " then do the same again."
+        f"Store {name}: expected an answer of the database, found: {reason}; no stored data is lost: correct that, then"
+        " repeat the command."
     )
 
 

@@ -34,7 +34,7 @@ from twinloop.sweep.workers import HERE
 @click.option(
     "--store", default="sweep.db", show_default=True, metavar="FILE.db|URL", help="Where all is kept."
 )
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
 def sweep(
     context: click.Context,

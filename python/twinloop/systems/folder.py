@@ -146,7 +146,7 @@ class Folder(System):
         try:
             run = load(log, self._signals, ended=ended, reason=reason or "the rig stopped it")
         except TwinloopError as refusal:
-            raise NoAnswer(f"{refusal} The test still waits; mend {log.name}, and go on.") from refusal
+            raise NoAnswer(f"{refusal} The test still waits; correct {log.name}, and go on.") from refusal
         if run.steps > test.steps or (ended == "completed" and run.steps < test.steps):
             advice = "cut it" if run.steps > test.steps else f"write why it was stopped into {why.name}"
             raise NoAnswer(

@@ -74,7 +74,7 @@ def test_copies_of_a_record_count_once_and_are_told():
     first, second = flown(), flown(1)
     assert distinct([first, second, flown(), second]) == [first, second]
     (sentence,) = said(first, second, flown(), second)
-    assert sentence.startswith("2 of 4 records equal an earlier one")
+    assert sentence.startswith("2 of 4 records are exact copies of an earlier one")
 
 
 def test_runs_that_were_all_cut_and_a_twin_that_does_not_follow_are_told():
@@ -107,14 +107,15 @@ def test_the_states_that_a_free_run_misses_are_named():
     angle, rate = Miss(1, 1, 0.25, 4.5, False), Miss(2, 2, 0.04, 9.0, True)
     (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, True, STEPS, misses=[angle, rate])
     assert (
-        "over the 2 runs" in remark.sentence and "Something acts that no term describes." in remark.sentence
+        "over the 2 runs" in remark.sentence
+        and "There is an effect that no term describes." in remark.sentence
     )
     assert (
-        "rate on 2 (up to 4 % of how far it goes, 9 times what is explained), angle on 1 (up to 25 %"
+        "rate on 2 (up to 4 % of its range, 9 times what noise and disturbances explain), angle on 1 (up to 25 %"
         in remark.sentence
     )
     (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[rate])
-    assert "may come from outside or be an error of the law" in remark.sentence
+    assert "may be an external disturbance or a model error" in remark.sentence
     (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(0, 1, np.inf, np.inf, False)])
     assert "the twin diverges on 1." in remark.sentence
 

@@ -30,7 +30,7 @@ SHORTEST = 16
     help="Address to listen on; others than loopback ask for a token.",
 )
 @click.option("--token", help=f"Of at least {SHORTEST} characters; by default one is made and printed.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @json_option
 def dashboard(
     store: str, port: int, host: str, token: str | None, threads: int | None, as_json: bool

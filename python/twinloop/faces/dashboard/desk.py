@@ -112,7 +112,7 @@ class Desk:
         """
         with self._writing(name) as campaign:
             tell(campaign, number, log, aborted=aborted, name=called)
-            return f"Test {number} told: {len(campaign.experiments)} experiments are kept."
+            return f"Test {number} recorded: {len(campaign.experiments)} experiments are stored."
 
     def attach(self, name: str, log: Path, called: str) -> str:
         """Attaches a flight without a test.
@@ -128,7 +128,7 @@ class Desk:
         """
         with self._writing(name) as campaign:
             attach(campaign, log, name=called)
-            return f"Attached: {len(campaign.experiments)} experiments are kept."
+            return f"Attached: {len(campaign.experiments)} experiments are stored."
 
     def fail(self, name: str, number: int, reason: str) -> str:
         """Tells that a test failed.
@@ -234,9 +234,9 @@ def in_words(seen: Doing) -> str:
     else:
         names = {"models": "evolving models", "tests": "evolving tests"}
         what, turn = (USUAL[phase][0], "step") if phase in USUAL else (names.get(phase, phase), "generation")
-        said = f"{what}, {turn} {step} of {steps}; experiments told: {done} of {experiments}"
+        said = f"{what}, {turn} {step} of {steps}; experiments recorded: {done} of {experiments}"
     if remaining is not None:
         said += f"; about {duration(remaining)} left"
     if seen.silent > LOST:
-        said += f"; nothing was heard of it for {duration(seen.silent)}, it may have ended without a word"
+        said += f"; no progress for {duration(seen.silent)}, it may have stopped"
     return f"Working: {said}."

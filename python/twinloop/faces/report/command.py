@@ -19,7 +19,7 @@ from twinloop.faces.text import table
 
 @click.command()
 @click.argument("campaign")
-@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
 @click.option(
     "-o", "--output", type=Path, metavar="FILE.html|FOLDER", help="Where to; by default report.html."
 )
@@ -65,7 +65,10 @@ def _figures(campaign: str, name: str | None, folder: Path, form: str) -> list[s
 @click.argument("first")
 @click.argument("second")
 @click.option(
-    "--name", "names", multiple=True, help="Of the campaign in each store, where they hold several; twice."
+    "--name",
+    "names",
+    multiple=True,
+    help="Name of the campaign in each store, if they hold several; give it twice.",
 )
 @click.option("-o", "--output", type=Path, metavar="FILE.html", help="Also as a page.")
 @json_option
