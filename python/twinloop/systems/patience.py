@@ -41,8 +41,8 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
     before = _hanging.get(id(system))
     if before is not None and before.is_alive():
         raise NoAnswer(
-            "The system has not come back from the test before, which it did not answer in time; correct it, and continue"
-            " in a new process."
+            "The system has not come back from the test before, which it did not answer in time; correct it, and"
+            " continue in a new process."
         )
     answer: list[Trajectory] = []
     failure: list[BaseException] = []
