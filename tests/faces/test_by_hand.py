@@ -82,7 +82,10 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
         most = max(abs(float(row["excitation_torque"] or 0.0)) for row in csv.DictReader(file))
     (torque,) = SIGNALS.commands
     share = f"{100 * most / (torque.bounds[1] - torque.bounds[0]):.2g} %"
-    assert f"at most {share} of a command's range; the nearer angle or rate comes" in said["risk_unknown"]
+    assert (
+        f"at most {share} of a command's range; it fades out as angle or rate approaches"
+        in said["risk_unknown"]
+    )
     flown(look().tests[0])
     run("tell", "rig.db", "0", "flight.csv")
     sheet = run("ask", "rig.db").stdout

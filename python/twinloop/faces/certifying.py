@@ -58,7 +58,7 @@ def certify(
     sheet = output / "certificate.html"
     text = f"Granted: {'; '.join([str(sheet), *([', '.join(files)] if files else [])])}."
     if not found.granted:
-        text = f"Refused. {' '.join(found.refusals)} In full: {sheet}"
+        text = f"Refused. {' '.join(found.refusals)} Details: {sheet}"
     written = [str(sheet), str(output / "certificate.json"), *files]
     answer({"granted": found.granted, "refusals": found.refusals, "files": written}, text, as_json)
     if not found.granted:

@@ -161,7 +161,7 @@ def frozen(x, i=1, row=STEPS // 2):
 def test_a_sensor_that_freezes_half_way_is_a_serious_remark(noise):
     found = diagnostics_of([flown(noise=noise, change=frozen)], SIGNALS, True, STEPS)
     assert ("frozen", True) in [(remark.code, remark.serious) for remark in found]
-    assert "angle gives one number" in " ".join(remark.sentence for remark in found)
+    assert "angle is constant over" in " ".join(remark.sentence for remark in found)
     back = flown(noise=noise, change=lambda x: np.concatenate([frozen(x, row=60)[:100], x[100:]]))
     assert "frozen" in codes(back)
 

@@ -91,21 +91,21 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
     yield Check(
         "unseen-flight", "twin", last.error, LEFT, good, True,
         f"Before learning it, the twin {'predicted' if good else 'did not predict'} {which}:"
-        f" {f'error {last.error:.2g}' if math.isfinite(last.error) else 'it diverged'}, at most {LEFT:g} is asked for.",
+        f" {f'error {last.error:.2g}' if math.isfinite(last.error) else 'it diverged'}; at most {LEFT:g} is allowed.",
     )  # fmt: skip
     if last.inside is not None:
         wide = last.inside >= INSIDE
         yield Check(
             "band", "twin", last.inside, INSIDE, wide, True,
             f"{100.0 * last.inside:.0f} % of the readings of {which} were inside the band predicted for 90 % of"
-            f" them; at least {100.0 * INSIDE:.0f} % are asked for.",
+            f" them; at least {100.0 * INSIDE:.0f} % are required.",
         )  # fmt: skip
     miss = found.last_miss
     if miss is not None:
         near = abs(miss) <= MISSES
         missed = (
-            f"The last quality that was predicted missed what was flown by {abs(miss):.2g} of its standard deviations;"
-            f" at most {MISSES:g} are asked for."
+            f"The last quality that was predicted differs from what was flown by {abs(miss):.2g} of its standard"
+            f" deviations; at most {MISSES:g} are allowed."
         )
         diverged = "No quality was predicted for the last flight: the twin diverged under its gains."
         yield Check(
@@ -178,8 +178,8 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         safe = best.risk <= RISK
         yield Check(
             "envelope", "controller", best.risk, RISK, safe, True,
-            f"The probability that it leaves the envelope is {best.risk:.2g} by the committee; at most {RISK:g} is"
-            " asked for.",
+            f"The probability that it leaves the envelope is {best.risk:.2g} by the committee; at most"
+            " {RISK:g} is allowed.",
         )  # fmt: skip
     flown = any(run.number == best.number and run.kept_envelope for run in found.experiments)
     yield Check(
