@@ -467,7 +467,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return checks(self.examine())
 
     def certificate(self) -> Certificate:
-        """The controller to fly with the evidence for it and what nobody tested, or why it is refused.
+        """The controller to fly with the evidence for it and what was not tested, or why it is refused.
 
         Raises:
             NotAvailable: there is no run.

@@ -1,4 +1,4 @@
-"""The certificate of a controller to fly: what speaks for it, with numbers, and what nobody tested; or a refusal."""
+"""The certificate of a controller to fly: what speaks for it, with numbers, and what was not tested; or a refusal."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Use:
 
     @property
     def beyond_flown(self) -> bool:
-        """Whether it leads where nobody has flown."""
+        """Whether it leaves the flown range."""
         return self.predicted[0] < self.flown[0] or self.predicted[1] > self.flown[1]
 
 
@@ -55,7 +55,7 @@ class Certificate:
         margins: of its loops; None if they cannot be computed, or if the twin does not follow its flights.
         step: the predicted flight of its task, with a band; None without a controller.
         uses: of the range of each state.
-        not_tested: what nobody has tested, in sentences.
+        not_tested: what was not tested, in sentences.
     """
 
     checks: Checks

@@ -101,7 +101,7 @@ class Persistent(Recorded):
         threads: int | None = None,
         progress: Callable[[Progress], None] | bool | None = True,
     ) -> Self:
-        """The campaign that a record was written of; it goes on with the same bits.
+        """The campaign of a record; it continues with the same bits.
 
         Args:
             record: such as `to_record` gives, or JSON gives back.
@@ -180,7 +180,7 @@ class Persistent(Recorded):
         threads: int | None = None,
         progress: Callable[[Progress], None] | bool | None = True,
     ) -> Self:
-        """A campaign from a store, where it is kept from now on too; it goes on with the same bits.
+        """A campaign from a store; it is stored there from now on, too, and continues with the same bits.
 
         Args:
             where: a file of SQLite, or the address of a database.

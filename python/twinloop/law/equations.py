@@ -215,7 +215,7 @@ class _Page:
         return [_Piece(terms, note) for (_, note), terms in pieces.items()]
 
     def _filling(self, name: str, number: int) -> list[str]:
-        """The equation of a hidden state that commands fill."""
+        """The equation of a hidden state that commands drive."""
         hidden = self.law.actuation.hidden[number]
         symbols = [self.law.command_symbols[place] + "**2" * hidden.squared for place in hidden.commands]
         share = len(symbols)

@@ -34,7 +34,7 @@ class Folder(System):
     Args:
         path: of the folder; made if it does not exist.
         signals: its states, commands and period.
-        timeout: seconds to wait for a log; None: for ever.
+        timeout: seconds to wait for a log; None: no limit.
         settled: seconds for which a log must not have changed.
         default_gains: a safe first controller, by name.
 
