@@ -627,7 +627,7 @@ def test_exact_readings_leave_the_noise_of_rounding_and_members_as_far_apart():
     # Rounded to hundredths they are noisy again, and no less noisy than that.
     coarse = identified([Run.of(np.round(run.states, 2), run.commands) for run in runs], signals)
     assert (coarse.sensors(2) > 0.5 * 0.01 / np.sqrt(12.0)).all()
-    assert [any("as good as exact" in str(said) for said in one.remarks) for one in (found, coarse)] == [
+    assert [any("almost exact" in str(said) for said in one.remarks) for one in (found, coarse)] == [
         True,
         False,
     ]
