@@ -48,5 +48,5 @@ def test_the_report_says_it_with_units():
     said = {row[0]: row[1] for row in table.rows}
     assert said["recorded flight time"] == "1 s" and said["of these cut, failed"] == "0, 0"
     assert said["cumulative regret"].startswith("0 rad s over a best of ")
-    assert said["from its beginning to the last flight told"] == "1 min 15 s"
+    assert said["elapsed time to the last recorded flight"] == "1 min 15 s"
     assert math.isfinite(float(said["largest use of the envelope"].split()[0]))

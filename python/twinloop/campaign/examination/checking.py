@@ -61,7 +61,7 @@ def _of_twin(found: Examination) -> Iterator[Check]:
         yield Check(
             "movement", "twin", most, MOVED, most >= MOVED, False,
             f"The state that moved least in all flights, {state}, moved by {most:.3g} standard deviations"
-            f" of its sensor's noise; below {MOVED:g} little can be learnt of it.",
+            f" of its sensor's noise; below {MOVED:g} little can be learnt about it.",
         )  # fmt: skip
     yield from _of_unseen(found)
     yield from _of_innovations(found)
@@ -118,8 +118,8 @@ def _of_innovations(found: Examination) -> Iterator[Check]:
     if own is None or causes is None:
         return
     for name, these, words in (
-        ("whiteness", own, "of the innovations with themselves"),
-        ("commands", causes, "of the innovations with the commands before them"),
+        ("whiteness", own, "of the innovations with their own past"),
+        ("commands", causes, "of the innovations with earlier commands"),
     ):
         white = these.outside <= COLOURED
         shows = "would show" if white else "shows"
@@ -178,8 +178,8 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         safe = best.risk <= RISK
         yield Check(
             "envelope", "controller", best.risk, RISK, safe, True,
-            f"The probability that it leaves the envelope is {best.risk:.2g} by the committee; at most"
-            " {RISK:g} is allowed.",
+            f"The probability that it leaves the envelope is {best.risk:.2g} according to the"
+            f" committee; at most {RISK:g} is allowed.",
         )  # fmt: skip
     flown = any(run.number == best.number and run.kept_envelope for run in found.experiments)
     yield Check(

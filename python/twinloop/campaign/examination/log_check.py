@@ -230,8 +230,8 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
     elif column.moved is not None and column.moved < MOVED:
         yield note(
             "little-moved",
-            f"{name} moved only {column.moved:.2g} times its noise: below {MOVED:g} little can be learnt of it; excite"
-            " it more.",
+            f"{name} moved only {column.moved:.2g} times its noise: below {MOVED:g} little can be learnt about"
+            " it; excite it more.",
         )
     if column.beyond:
         yield note(

@@ -51,7 +51,7 @@ def unseen(found: Examination) -> Figure | None:
     how = "its recorded commands" if last.number is None else "the test's own controller"
     return Figure(
         "unseen",
-        f"The twin against {said(last.number)}, which it had not learnt",
+        f"The twin against {said(last.number)}, which it had not learnt from",
         panels,
         f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under"
         f" {how}; no reading after the first was used.{band}{others}",

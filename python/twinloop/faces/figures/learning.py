@@ -156,7 +156,7 @@ def complexity(found: Examination) -> Figure | None:
         "complexity",
         "Complexity against error",
         panels,
-        "Each dot is a sum of terms that annealing considered, by how much longer a description of the readings it"
-        " makes; error and number of terms both count. Dots below the line are rivals that the flights hardly"
+        "Each dot is a sum of terms that annealing considered, against the increase in description length,"
+        " which counts the error and the number of terms. Dots below the line are rivals that the flights hardly"
         " distinguish.",
     )

@@ -37,7 +37,7 @@ def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
             ["cumulative regret", f"{given} over a best of {shown_value(cost['best'])} {unit}".rstrip()]
         )
     if elapsed is not None:
-        rows.append(["from its beginning to the last flight told", duration(elapsed)])
+        rows.append(["elapsed time to the last recorded flight", duration(elapsed)])
     note = (
         "Regret: how much worse than the best run the other complete runs of the task were, summed."
         if (cost["given_away"] is not None)

@@ -101,7 +101,7 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
         text += " Its residuals are noise: they are correlated neither in time nor with the commands."
     return Sentence(
         "Twin", "Trust it within the flown range", True, f"{text} {_scope(found)}".strip(),
-        (("unseen", "unseen flight"), ("ranges", "the range"), ("crosscorrelation", "what is left"),
+        (("unseen", "unseen flight"), ("ranges", "flown range"), ("crosscorrelation", "residuals"),
          ("checks", "all checks")),
     )  # fmt: skip
 

@@ -156,7 +156,7 @@ def envelope(found: Examination) -> Table | None:
     risk = (
         ""
         if found.best is None or found.best.risk is None
-        else (f" Probability that the flight leaves it, by the committee: {found.best.risk:.2g}.")
+        else (f" Probability that the flight leaves it, according to the committee: {found.best.risk:.2g}.")
     )
     head = ["state", "predicted (%)", "flown (%)", "largest of all flights (%)"]
     return table_of("envelope", "Use of the envelope", head, rows, f"100 % is a bound.{risk}")
