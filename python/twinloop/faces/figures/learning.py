@@ -156,7 +156,6 @@ def complexity(found: Examination) -> Figure | None:
         "complexity",
         "Complexity against error",
         panels,
-        "Each dot is a sum of terms that annealing considered, against the increase in description length,"
-        " which counts the error and the number of terms. Dots below the line are rivals that the flights hardly"
-        " distinguish.",
+        "Each dot is a sum of terms that annealing considered, with the increase in description length, which counts"
+        " the error and the number of terms. Dots below the line are rivals that the flights hardly distinguish.",
     )

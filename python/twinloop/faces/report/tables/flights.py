@@ -52,7 +52,7 @@ def data(found: Examination) -> Table:
     ]
     note = (
         "Least moved: the state that moved least, in standard deviations of its sensor; below about 10 little can"
-        " be learnt about it. Beyond 3 σ: innovations; 0.3 % are expected of noise. The last column begins the SHA-256 of"
-        " times, states and commands as little-endian doubles."
+        " be learnt about it. Beyond 3 σ: innovations; 0.3 % are expected of noise. The last column begins the SHA-256"
+        " of times, states and commands as little-endian doubles."
     )
     return table_of("data", "Data, flight by flight", head, rows, note)
