@@ -94,7 +94,7 @@ def unknown_risk(test: Test) -> str:
         for size, command in zip(most, signals.commands, strict=True)
     ]
     text = (
-        "not estimated before the first flight. To the controller's own risk comes the excitation, at most"
+        "not estimated before the first flight. It is the risk of the controller with an excitation of at most"
         f" {max(shares):.2g} % of a command's range"
     )
     ranges = {} if test.hold_back is None else test.hold_back.ranges(signals)

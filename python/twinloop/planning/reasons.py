@@ -79,7 +79,7 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     if why.disagreement > 0.0 and high != low:
         return (
             f"Models {high} and {low} disagree most on {signals.state_names[why.state]},"
-            f" {why.step * signals.dt:.2g} s after the start; information: "
+            f" {why.step * signals.dt:.2g} s after the start; information:"
             f" {why.disagreement / float(log(2.0)):.3g} bits."
         )
     return "The models agree on it: the flight tests what they have in common."
