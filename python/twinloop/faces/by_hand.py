@@ -53,9 +53,9 @@ def new(file: Path, as_json: bool) -> None:
 @click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | None, as_json: bool) -> None:
-    """Say what to fly next: a test sheet, and a file with the excitation and the predicted run.
+    """Plan the next test: a test sheet, and a file with the excitation and the predicted run.
 
-    A campaign that is not in STORE.db yet is begun from STORE.toml beside it. A test that is waiting is shown again.
+    If STORE.db has no campaign yet, it is begun from STORE.toml beside it. A waiting test is shown again.
     """
     if batch is not None:
         _ask_batch(store, batch, last or again, threads, as_json)
@@ -108,11 +108,9 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
 @click.argument("test", type=int)
 @click.argument("flight", type=Path, required=False)
 @click.option(
-    "--failed", metavar="REASON", help="The test failed; FLIGHT is what was recorded, if anything was."
+    "--failed", metavar="REASON", help="Why the test failed; FLIGHT is its partial log, if there is one."
 )
-@click.option(
-    "--aborted", type=Path, metavar="FLIGHT", help="The test was stopped before its end; what was recorded."
-)
+@click.option("--aborted", type=Path, metavar="FLIGHT", help="Log of a test that was stopped before its end.")
 @click.option("--reason", metavar="REASON", help="With --aborted: why it was stopped.")
 @json_option
 def tell(
@@ -124,7 +122,7 @@ def tell(
     reason: str | None,
     as_json: bool,
 ) -> None:
-    """Tell what happened to a TEST: a FLIGHT as CSV or .npz, whole or aborted, or why there is none."""
+    """Record the result of a TEST: a FLIGHT as CSV or .npz, complete or aborted, or why there is none."""
     log = _told(store, test, flight, failed, aborted, reason)
     with closing(_campaign(store)) as campaign:
         if failed is not None:
@@ -191,7 +189,7 @@ def _aborted(store: str, test: int, log: Path, why: str) -> str:
 @click.argument("flight", type=Path)
 @json_option
 def attach(store: str, flight: Path, as_json: bool) -> None:
-    """Attach a FLIGHT without a test, as CSV or .npz: it is learnt, too."""
+    """Add a recorded FLIGHT without a test, as CSV or .npz."""
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
         text = f"Saved: {flight}; {_count(campaign)} in {shown_name(store)}."
@@ -203,7 +201,7 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
 @click.argument("test", type=int)
 @json_option
 def abandon(store: str, test: int, as_json: bool) -> None:
-    """Say that a TEST will not be flown."""
+    """Mark a TEST as not to be flown."""
     with closing(_campaign(store)) as campaign:
         asked = numbered(campaign, test)
         campaign.abandon(asked)

@@ -33,7 +33,7 @@ def for_an_autopilot(command: Command) -> Command:
             "--mapping",
             type=Path,
             metavar="FILE.toml",
-            help="What it calls the gains, and its sweep; by default STORE.toml, [autopilot].",
+            help="File with its names of the gains, and its sweep; by default STORE.toml, [autopilot].",
         ),
         click.option("--autopilot", "kind", help=f"Write parameter files for {', '.join(FORMATS)}."),
         click.option(
@@ -42,7 +42,7 @@ def for_an_autopilot(command: Command) -> Command:
             type=Path,
             required=True,
             metavar="FOLDER",
-            help="Where to write; made if need be.",
+            help="Folder to write into; made if it does not exist.",
         ),
     ):
         command = option(command)

@@ -56,7 +56,7 @@ def identify(
 ) -> None:
     """Learn a twin from LOGs alone, as CSV, .npz or .ulg: no flight is planned, and no controller is tuned.
 
-    FILE.toml says dt, states and commands, as for a campaign; [options] counts, and other sections need not be there.
+    FILE.toml has dt, states and commands, as for a campaign, and may have [options]; other sections are not needed.
     """
     if not logs:
         raise InvalidInput("identify: expected at least one log, found none; name CSV, .npz or .ulg files.")

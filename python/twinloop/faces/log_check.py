@@ -21,17 +21,19 @@ from twinloop.logs import TIME, Window, read_log, write_columns
 @click.command()
 @click.argument("log", type=Path)
 @click.argument("config", type=Path, metavar="FILE.toml")
-@click.option("--from", "start", type=float, metavar="S", help="Of a .ulg: s after its beginning.")
-@click.option("--to", "stop", type=float, metavar="S", help="Of a .ulg: s after its beginning.")
+@click.option(
+    "--from", "start", type=float, metavar="S", help="For a .ulg: first time, s after its beginning."
+)
+@click.option("--to", "stop", type=float, metavar="S", help="For a .ulg: last time, s after its beginning.")
 @click.option("-o", "--output", type=Path, metavar="FILE.csv", help="Also write the log as CSV, for tell.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def check(
     log: Path, config: Path, start: float | None, stop: float | None, output: Path | None, as_json: bool
 ) -> int:
-    """Look at a LOG, as CSV, .npz or .ulg, before it is told: its clock, gaps, sensors, commands and units.
+    """Check a LOG, as CSV, .npz or .ulg, before it is used: clock, gaps, sensors, commands and units.
 
-    FILE.toml says dt, states and commands, as for a campaign; of a .ulg its section [log] says which field each of them
-    is. Exits with 1 where something has to be mended first.
+    FILE.toml has dt, states and commands, as for a campaign; for a .ulg its section [log] names the field of
+    each. Exits with 1 if something has to be corrected first.
     """
     if output is not None:
         check_writable(output, [".csv"])

@@ -43,7 +43,7 @@ def resume(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Go on with a campaign of STORE on its system, with the same bits.
+    """Continue a campaign of STORE on its system, with the same bits.
 
     The system is a built-in one, or the one that the campaign file beside the store names.
     """
@@ -73,7 +73,7 @@ def resume(
 @click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
-    """Learn from all that was told to a campaign of STORE, as the next ask would, and ask for nothing."""
+    """Learn from all recorded flights of a campaign of STORE, as the next ask would, without planning a test."""
     with closing(Campaign.load(store, name, threads=threads)) as campaign:
         _ = campaign.twin
         with suppress(NotAvailable):  # there may be no controller to fly yet
@@ -88,7 +88,7 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
 @click.option("--name", help="Name of the campaign, if the store holds several.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(store: str, name: str | None, as_json: bool) -> None:
-    """Show what STORE holds, as it was written last; nothing is learnt or changed, and a writer is not held up."""
+    """Show the contents of STORE; nothing is learnt or changed, and a writer is not delayed."""
     campaigns = _campaigns(store)
     if name is None and len(campaigns) != 1:
         rows = [[row["name"], row["created"], row["tests"], row["experiments"]] for row in campaigns]

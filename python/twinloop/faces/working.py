@@ -53,7 +53,7 @@ def patient(command: Command) -> Command:
         callback=lambda context, option, value: (
             None if value is None else number("--timeout (s)", value, above=0.0)
         ),
-        help="Seconds that the system may take for a test; then it is given up and nothing is lost.",
+        help="Longest time that the system may take for a test, s; then the command stops, and nothing is lost.",
     )(command)
 
 

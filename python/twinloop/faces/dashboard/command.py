@@ -35,7 +35,7 @@ SHORTEST = 16
 def dashboard(
     store: str, port: int, host: str, token: str | None, threads: int | None, as_json: bool
 ) -> None:
-    """Show STORE in the browser: the report, live, the next test, and forms to approve and to tell."""
+    """Show STORE in the browser: a live report, the next test, and forms to approve it and to record its flight."""
     server, address = prepared(store, port, host, token, threads)
     answer({"address": address}, f"Dashboard: {address}  (Ctrl-C ends it)", as_json)
     with suppress(KeyboardInterrupt):  # the way to end it: there is nothing to say of that
