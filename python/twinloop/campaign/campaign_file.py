@@ -80,7 +80,7 @@ duration = 1.0                   # of a test, s
 # [autopilot.parameters]         # parameter = scale * gain + offset
 # "angle.kp" = {{ name = "MC_ROLLRATE_P", scale = 0.1, limits = [0.01, 0.5] }}
 # "angle.ki" = false             # it has no parameter for this gain
-# [autopilot.sweep]              # a sweep that it generates: command, axis, amplitude, first and last (Hz), duration (s)
+# [autopilot.sweep]              # a sweep that it generates: command, axis, amplitude, first, last (Hz), duration (s)
 
 [campaign]
 preset = "default"               # or "paper"
@@ -94,7 +94,7 @@ seed = 0
 # rate = "vehicle_angular_velocity.xyz[1]"
 # torque = "vehicle_torque_setpoint.xyz[1]"
 
-# [system]                       # a system that flies without a person: twinloop run {file}; leave it out if a person flies
+# [system]                       # a system that flies by program: twinloop run {file}; leave it out if a person flies
 # use = "rig:Rig"                # a class in rig.py beside this file, which is run; or a name: {names}
 # timeout = 60.0                 # s that a run may take
 # [system.arguments]             # its arguments
