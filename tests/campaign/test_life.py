@@ -187,7 +187,7 @@ def test_an_abandoned_test_is_not_flown():
     assert (campaign.status(one), campaign.status(two)) == ("abandoned", "asked")
     campaign.run(PLANT, 2)
     assert campaign.experiments[1].test.number == two.number
-    with pytest.raises(tl.InvalidInput, match="nothing is left to abandon"):
+    with pytest.raises(tl.InvalidInput, match="there is nothing to abandon"):
         campaign.abandon(two)
     # Flown after all.
     campaign.tell(one, PLANT.run(one))

@@ -86,10 +86,7 @@ def test_a_log_that_was_told_is_not_told_twice(store, tmp_path):
     told = flight(tmp_path / "flight.csv", look(store).tests[0])
     with served(store) as address:
         status, _, said = call(address, "POST", "/c/1/tests/1/log?file=flight.csv", told)
-    assert (
-        status == 422
-        and "Log flight.csv: expected a flight that was not told yet" in json.loads(said)["failed"]
-    )
+    assert status == 422 and "Log flight.csv: expected a new flight" in json.loads(said)["failed"]
     assert len(look(store).experiments) == 1
 
 

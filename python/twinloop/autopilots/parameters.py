@@ -110,7 +110,7 @@ def translated(
             found[parameter.name] = parameter.value(gain, given), parameter.whole
         elif given != 0.0:
             raise InvalidInput(
-                f"Gain {gain!r}: expected 0, for the autopilot is declared to have no parameter for it, found"
+                f"Gain {gain!r}: expected 0, because the autopilot is declared to have no parameter for it, found"
                 f" {given!r}; declare one."
             )
     return found

@@ -163,8 +163,8 @@ class Persistent(Recorded):
                 mine[key][: len(known[key])] != known[key] for key in lists
             ):
                 raise InvalidInput(
-                    f"Campaign.save: expected {keeping.name} to be this one as it was, found another one, or one that"
-                    " has gone on by itself; choose another name."
+                    f"Campaign.save: expected {keeping.name} to be an earlier state of this one, found another"
+                    " one, or one that has continued separately; choose another name."
                 )
             keeping.keep(self._book, self._method)
         finally:

@@ -78,7 +78,7 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
     with closing(_campaign(store, threads)) as campaign:
         if not campaign.experiments:
             raise InvalidInput(
-                "twinloop ask --batch: expected a flight that was told, found none; fly the first test:"
+                "twinloop ask --batch: expected a recorded flight, found none; fly the first test:"
                 f" twinloop ask {shown_name(store)}."
             )
         shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]

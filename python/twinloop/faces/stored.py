@@ -55,7 +55,7 @@ def resume(
         if wanted is None:
             raise InvalidInput(
                 "resume: expected --experiments N for a campaign that was flown by hand so far, found none;"
-                " say how many runs there shall be in all."
+                " state the total number of runs."
             )
         context.exit(run_file(file, store, held.name, wanted, threads, output, plot, as_json, timeout))
     rig = _system(held)
@@ -139,7 +139,7 @@ def _system(held: Stored) -> Quadrotor:
         raise NotAvailable(
             "resume: expected a campaign that flies a built-in system, or a campaign"
             " file beside the store that names one, found neither; write [system] into that file, fly"
-            " yourself with twinloop ask, or go on from Python with the same arguments and store=."
+            " yourself with twinloop ask, or continue from Python with the same arguments and store=."
         )
     return BUILT_IN[kind].from_record(held.system)
 

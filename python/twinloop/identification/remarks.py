@@ -39,7 +39,8 @@ def identities(found: Sum, pool: Pool, signals: Signals) -> list[Remark]:
             )
             return [
                 note(
-                    "identity", f"On these runs {driven} is described as well with {come} in place of {gone}."
+                    "identity",
+                    f"On these runs {driven} is described equally well with {come} in place of {gone}.",
                 )
             ]
     return []
@@ -184,7 +185,5 @@ def remarks(
         )
     said += [remark for found in sums for remark in identities(found, pool, signals)]
     if ignored:
-        said.append(
-            note("outliers", f"{ignored} reading{'s' if ignored > 1 else ''} taken for outliers and ignored.")
-        )
+        said.append(note("outliers", f"{ignored} reading{'s' if ignored > 1 else ''} ignored as outliers."))
     return said

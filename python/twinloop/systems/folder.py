@@ -133,7 +133,7 @@ class Folder(System):
             elif self.timeout is not None and now - begun > self.timeout:
                 raise NoAnswer(
                     f"Folder {self.path}: expected flight-{digits}.csv or .npz within {self.timeout:g} s, found none;"
-                    " the test still waits: look after the rig, and go on once the log is there."
+                    " the test still waits: check the rig, and continue once the log is there."
                 )
             time.sleep(min(LOOK, self.settled))
 

@@ -62,7 +62,7 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
         _hanging[id(system)] = thread
         raise NoAnswer(
             f"The system did not answer test {test.number} within {limit:g} s; the test still waits and nothing is"
-            " lost: look after the system, then go on, or abandon the test."
+            " lost: check the system, then continue, or abandon the test."
         )
     if failure:
         raise failure[0]

@@ -212,8 +212,8 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
             yield serious(
                 "beyond-bounds",
                 f"{name} is beyond its bounds in {100.0 * column.beyond:.3g} % of the rows ({column.least:g} to"
-                f" {column.greatest:g} {column.unit}): check its unit, and that what was sent was logged, not what was"
-                " asked for.",
+                f" {column.greatest:g} {column.unit}): check its unit, and that the sent command was logged,"
+                " not the requested one.",
             )
         elif (column.at_bound or 0.0) > SATURATED and column.least != column.greatest:
             yield note(

@@ -27,7 +27,7 @@ SHORTEST = 16
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Address to listen on; others than loopback ask for a token.",
+    help="Address to listen on; others than loopback require a token.",
 )
 @click.option("--token", help=f"Of at least {SHORTEST} characters; by default one is made and printed.")
 @click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")

@@ -176,14 +176,12 @@ class Desk:
             with self._campaign(name) as campaign:
                 if not campaign.experiments:
                     raise NotAvailable(
-                        "Ask: expected a flight that was told, found none; tell the first test, or attach a flight."
+                        "Ask: expected a recorded flight, found none; record the first test, or attach a flight."
                     )
                 campaign.ask(last=last)
 
         if not self._turn.acquire(blocking=False):
-            raise InvalidInput(
-                "Ask: expected nothing else under way, found something; wait until it is done."
-            )
+            raise InvalidInput("Ask: expected no other task to be running, found one; wait until it is done.")
         try:
             self._failed.pop(name, None)
             self._busy.add(name)
@@ -209,7 +207,7 @@ class Desk:
     def _writing(self, name: str) -> Iterator[Campaign]:
         """The campaign, with this process as its only writer, one thing at a time."""
         if not self._turn.acquire(blocking=False):
-            raise InvalidInput("Expected nothing else under way, found something; wait until it is done.")
+            raise InvalidInput("Expected no other task to be running, found one; wait until it is done.")
         try:
             with self._campaign(name) as campaign:
                 yield campaign
