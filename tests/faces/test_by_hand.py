@@ -173,7 +173,7 @@ def test_after_old_logs_the_first_test_is_still_the_controller_that_is_trusted(f
     flown(other.test({"angle.kp": 1.0, "angle.ki": 0.5, "angle.kd": 0.2}), "old.csv")
     assert run("attach", "rig.db", "old.csv").stdout == "Saved: old.csv; 1 experiment in rig.db.\n"
     again = run("attach", "rig.db", "old.csv")
-    assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == 1
+    assert again.exit_code == 2 and "recorded already" in again.stderr and len(look().experiments) == 1
     asked = json.loads(run("ask", "rig.db", "--json").stdout)
     assert asked["gains"] == dict(trusted) and asked["excited"]
     # With the twin of the old log, the sheet says what to expect of it all the same.
@@ -186,7 +186,11 @@ def test_a_log_that_was_told_is_not_told_twice_and_what_was_expected_stands_besi
         flown(look().tests[number])
         told = run("tell", "rig.db", str(number), "flight.csv").stdout
         again = run("tell", "rig.db", str(number), "flight.csv")
-        assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == number + 1
+        assert (
+            again.exit_code == 2
+            and "recorded already" in again.stderr
+            and len(look().experiments) == number + 1
+        )
     assert "add to torque, N m" in sheet and "rate, rad/s" in sheet
     test, flight = look().tests[1], look().experiments[1]
     assert f"quality {flight.quality:.4g}, predicted {test.predicted:.4g} ± {test.spread:.3g} rad s;" in told

@@ -90,7 +90,7 @@ NOTES = {
     "saturated": (changed("torque", lambda u: np.sign(u) * 2.0), "at a bound in 100 %"),
     "envelope": (changed("rate", lambda x: np.where(np.arange(len(x)) == 60, 13.0, x)), "outside its envelope"),
     "little-moved": (
-        changed("rate", lambda x: np.random.default_rng(4).normal(size=x.shape)), "little can be learnt of it"
+        changed("rate", lambda x: np.random.default_rng(4).normal(size=x.shape)), "little can be learnt about it"
     ),
 }  # fmt: skip
 
