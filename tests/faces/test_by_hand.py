@@ -104,7 +104,7 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
 def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_said(folder):
     run("ask", "rig.db")
     early = run("learn", "rig.db")
-    assert early.exit_code == 2 and "at least one experiment" in early.stderr
+    assert early.exit_code == 2 and "at least one recorded experiment" in early.stderr
     flown(look().tests[0])
     run("tell", "rig.db", "0", "flight.csv")
     shown = run("show", "rig.db")
