@@ -7,7 +7,7 @@ the controller knows nothing. Each plant is flown under the controller alone, wi
 whatever the controller is, with chirps that are sized by the controller, and with those of `campaign.test`, which are
 held back as well by what the states do. Shown are how much of the envelope the true states used, worst over flights,
 and the held-out error of the twin that a campaign learns from one such flight: mean squared error of free runs over
-that of a model that never moves, median over controllers that nobody flew, then over seeds.
+that of a model that never moves, median over controllers that have not flown, then over seeds.
 """
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def usage(states: Floats, signals: tl.Signals) -> float:
 
 
 def held_out(plant: Plant, campaign: tl.Campaign, count: int) -> float:
-    """Median error on controllers that nobody flew, with gains between half and twice the trusted ones."""
+    """Median error on controllers that have not flown, with gains between half and twice the trusted ones."""
     twin, random = campaign.twin, np.random.Generator(np.random.Philox([5]))
     scales = np.array([state.scale for state in plant.signals.states])
     first, errors = campaign.tests[0].quiet(), []

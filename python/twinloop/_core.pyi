@@ -504,7 +504,7 @@ class SelectedTests:
     ) -> SelectedTests:
         """These and one more: states (n + 1, n_x) as measured, commands (n, n_u), excitation (≥ n, n_u)."""
     def with_record(self, states: ArrayLike, commands: ArrayLike) -> SelectedTests:
-        """These and a run that nobody asked for, judged under its commands: states (n + 1, n_x), commands (n, n_u)."""
+        """These and an attached run, judged under its commands: states (n + 1, n_x), commands (n, n_u)."""
     def __len__(self) -> int: ...
 
 def open_loop(models: Sequence[Model], selected: SelectedTests, workers: Workers | None = None) -> _Floats:

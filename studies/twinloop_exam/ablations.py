@@ -45,13 +45,13 @@ ABLATIONS: dict[str, Ablation] = {
     "kinematics": Ablation("derivatives and rigid bodies, even if declared", {"form": "increment"}),
     "forms": Ablation("steps of Euler and increments beside derivatives", {"form": "acceleration"}),
     "cleaning": Ablation("single wrong readings ignored before anything is learnt", {"cleaning": False}),
-    "outliers": Ablation("readings ignored that predictions miss by far", {"outliers": False}),
+    "outliers": Ablation("readings ignored that are far from their predictions", {"outliers": False}),
     "offsets": Ablation("offsets of late or early sensors", {"offsets": False}),
     "noise-from-above": Ablation("the search of the noise from above as well", {"noise_from_above": False}),
     "gusts": Ablation("correlated disturbances, such as gusts", {"gusts": False}),
     "disturbance-price": Ablation("a price on correlated disturbances", {"price_disturbances": False}),
     "moderation": Ablation("a price on terms that are large and cancel", {"moderation": False}),
-    "undisturbed": Ablation("terms searched as if nothing disturbed, too", {"undisturbed": False}),
+    "undisturbed": Ablation("terms also searched as if there were no disturbance", {"undisturbed": False}),
     "annealing": Ablation(
         "long walks over subsets of terms, and several of them", {"moves": 100, "starts": 1}
     ),
@@ -64,12 +64,12 @@ ABLATIONS: dict[str, Ablation] = {
     "implicit": Ablation(
         "quotients with a denominator of their own, joints that share masses", {"implicit": False}
     ),
-    "contacts": Ablation("stops, play and what else begins at a place", {"contacts": False}),
+    "contacts": Ablation("stops, backlash and other terms that begin at a place", {"contacts": False}),
     "friction": Ablation("dry friction", {"friction": False}),
     "lags": Ablation("lags and delays", {"lags": False}),
-    "apart": Ablation("lags of their own for alike commands", {"apart": False}),
-    "at-once": Ablation("lags dropped that tuning has shown to be nothing", {"at_once": False}),
-    "hidden": Ablation("a hidden state that commands fill", {"hidden": False}),
+    "apart": Ablation("separate lags of alike commands", {"apart": False}),
+    "at-once": Ablation("lags dropped that are tuned to nearly 0", {"at_once": False}),
+    "hidden": Ablation("a hidden state that commands drive", {"hidden": False}),
     "tuning": Ablation("constants tuned on predictions", {"tuning": False}),
     "pruning": Ablation("terms dropped whose constants are too uncertain to pay", {"pruning": False}),
     "support": Ablation("terms dropped that share too few readings", {"support": False}),
@@ -79,9 +79,9 @@ ABLATIONS: dict[str, Ablation] = {
     "earlier-twin": Ablation(
         "the earlier twin kept where the new one explains less", {"earlier_twin": False}
     ),
-    "rough": Ablation("a law of linear terms where no other follows the flights", {"rough": False}),
-    "causes": Ablation("disturbances told from errors of the law", {"causes": False}),
-    "exactness": Ablation("the inaccuracy of a law told from disturbances", {"exactness": False}),
+    "rough": Ablation("a linear law if no other follows the flights", {"rough": False}),
+    "causes": Ablation("disturbances separated from model errors", {"causes": False}),
+    "exactness": Ablation("the inaccuracy of a law separated from disturbances", {"exactness": False}),
     # How tests are chosen and gains tuned
     "excitation": Ablation(
         "excitation of the first flight and of all others", {"excitation": 0.0, "excitation_most": 0.0}
@@ -91,7 +91,7 @@ ABLATIONS: dict[str, Ablation] = {
         f"{kind}-tests": Ablation(f"a committee that chooses the flights: {what} instead", {"tests": kind})
         for kind, what in zip(TEST_KINDS, ("random gains", "chirps", "binary sequences"), strict=True)
     },
-    "worth": Ablation("a price on what a flight tells, up to its worth", {"worth": False}),
+    "worth": Ablation("a limit on the cost of information", {"worth": False}),
     "backtracking": Ablation("candidates on the way to the tuned gains", {"backtracking": False}),
     "noise-draws": Ablation("sensor noise while gains are tuned", {"draws": 1}),
     "members": Ablation("gains tuned on several members", {"tuning_members": 1}),

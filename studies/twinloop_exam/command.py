@@ -39,7 +39,7 @@ SMOKE_LEFT_OUT = ("ours-*", "without-*")
 
 @click.group()
 def bench() -> None:
-    """Compare Twinloop with others, and with what it should reach."""
+    """Compare Twinloop with others, and with its targets."""
 
 
 bench.add_command(zoo)

@@ -95,7 +95,7 @@ def test_a_run_of_fewer_experiments_than_were_told_is_refused(new_campaign, pend
     system = Counting(pendulum)
     campaign = begun(new_campaign(), system).run(system, 2)
     with pytest.raises(
-        tl.InvalidInput, match=r"at least the 2 runs that were told already, found 1;.* say 3"
+        tl.InvalidInput, match=r"at least the 2 runs that are recorded already, found 1;.* say 3"
     ):
         campaign.run(system, experiments=1)
     assert len(system.flown) == 2

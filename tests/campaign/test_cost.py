@@ -46,7 +46,7 @@ def test_the_envelope_that_was_used_and_left_is_said():
 def test_the_report_says_it_with_units():
     table = cost_table(summary(begun(), {}, {}), 75.0)
     said = {row[0]: row[1] for row in table.rows}
-    assert said["flight that was recorded"] == "1 s" and said["of these cut, failed"] == "0, 0"
-    assert said["quality given away"].startswith("0 rad s over a best of ")
-    assert said["from its beginning to the last flight told"] == "1 min 15 s"
-    assert math.isfinite(float(said["most of the envelope that any used"].split()[0]))
+    assert said["recorded flight time"] == "1 s" and said["of these cut, failed"] == "0, 0"
+    assert said["cumulative regret"].startswith("0 rad s over a best of ")
+    assert said["elapsed time to the last recorded flight"] == "1 min 15 s"
+    assert math.isfinite(float(said["largest use of the envelope"].split()[0]))

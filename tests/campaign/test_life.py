@@ -77,14 +77,14 @@ def test_logs_alone_are_enough_to_ask_and_to_name_a_controller():
     for seed in range(2):
         campaign.attach(by_hand(60, seed))
     best = campaign.best_test
-    assert best.measured is None and "none is known to fly" in best.reason
+    assert best.measured is None and "no gains have completed a flight" in best.reason
     assert PLANT.run(best).ended == "completed"
     test = campaign.ask()
     campaign.tell(test, PLANT.run(test))
     assert campaign.experiments[-1].quality is not None
     result = json.loads(to_json(summary(campaign, {"name": "pendulum"}, {})))
     assert result["experiments"][0]["test"] is None and result["first_controller"]["test"] == 0
-    assert "nobody asked for" in render(result)
+    assert "steps, attached." in render(result)
 
 
 def test_a_useless_record_is_not_attached_and_the_paper_attaches_none(new_campaign):
@@ -187,7 +187,7 @@ def test_an_abandoned_test_is_not_flown():
     assert (campaign.status(one), campaign.status(two)) == ("abandoned", "asked")
     campaign.run(PLANT, 2)
     assert campaign.experiments[1].test.number == two.number
-    with pytest.raises(tl.InvalidInput, match="nothing is left to abandon"):
+    with pytest.raises(tl.InvalidInput, match="there is nothing to abandon"):
         campaign.abandon(two)
     # Flown after all.
     campaign.tell(one, PLANT.run(one))
@@ -198,7 +198,7 @@ def test_an_untold_test_never_switches_off_exploiting():
     campaign = begun()
     waiting = campaign.ask()
     last = campaign.ask(last=True)
-    assert last.excitation is None and last.reason.startswith("The best gains that the twin knows")
+    assert last.excitation is None and last.reason.startswith("The best gains found on the twin")
     # Two tests are two tests: once more the same is no second question.
     again = campaign.ask(last=True)
     assert not again.same_as(replace(last, number=again.number))

@@ -169,9 +169,9 @@ def test_a_twin_on_which_nothing_was_tuned_yet_shows_the_gains_known_before(tmp_
     first = campaign.test(PENDULUM_GAINS)
     campaign.tell(first, PLANT.run(first))
     _ = campaign.twin
-    assert "Nothing was tuned on this twin yet." in looked(path, monkeypatch).reason
+    assert "No gains were tuned on this twin yet." in looked(path, monkeypatch).reason
     assert same(looked(path, monkeypatch).genes, first.genes)
     campaign.tell(campaign.ask(), PLANT.run(campaign.tests[1]))
     _ = campaign.twin
-    assert "Nothing was tuned on this twin yet." in looked(path, monkeypatch).reason
+    assert "No gains were tuned on this twin yet." in looked(path, monkeypatch).reason
     campaign.close()

@@ -139,7 +139,7 @@ def test_a_twin_that_is_not_to_be_believed_now_gives_no_advice():
     def lesson(*remarks, follows=True):
         return SimpleNamespace(asked=[plan], follows=follows, remarks=remarks)
 
-    said, grave = note("known-before", "The twin is the one of before."), serious("free-run", "It misses.")
+    said, grave = note("known-before", "The earlier twin is kept."), serious("free-run", "It misses.")
     assert trusted(lesson()) and trusted(lesson(grave), lesson(said))
     assert not trusted(lesson(), lesson(said, grave)) and not trusted(lesson(), lesson(follows=False))
 
@@ -178,7 +178,7 @@ def test_the_verdict_says_that_a_twin_is_not_to_be_believed_and_that_there_is_no
         wrong = 0.5 * stream.normal(size=run.commands.shape)
         campaign.tell(test, tl.Trajectory(run.t, run.states, wrong, ended="diverged", reason="ran away"))
     twin, controller, following = verdict(campaign)
-    assert "not to be believed" in twin and "none to fly" in controller and "another controller" in following
+    assert "not reliable yet" in twin and "none to fly" in controller and "another controller" in following
 
 
 def test_a_campaign_draws_itself(tmp_path):

@@ -31,7 +31,7 @@ def test_an_example_runs_and_shows_something(example, tmp_path):
     if example.stem in COMPILED and shutil.which("cc") is None:
         pytest.skip("needs a C compiler")
     # What a twin of few flights misses is said as it goes, and is no fault of the example.
-    expected = "ignore:Flown by itself over the "
+    expected = "ignore:In free run over the "
     done = subprocess.run(
         [sys.executable, "-W", "error", "-W", expected, str(example)],
         cwd=tmp_path,

@@ -73,7 +73,7 @@ def test_a_campaign_is_flown_by_hand_as_from_python(folder):
 def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     first = run("ask", "rig.db").stdout
     assert "angle.kp" in first and "N m/rad" in first and "twinloop tell rig.db 0 FLIGHT.csv" in first
-    assert "The controller that you trust already, with a gentle excitation" in first
+    assert "The controller that you already trust, with a gentle excitation" in first
     assert "nothing is known of the system before it" in first
     said = json.loads(run("ask", "rig.db", "--json").stdout)
     assert said["risk"] is None and f"Risk of leaving the envelope: {said['risk_unknown']}\n" in first
@@ -82,7 +82,10 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
         most = max(abs(float(row["excitation_torque"] or 0.0)) for row in csv.DictReader(file))
     (torque,) = SIGNALS.commands
     share = f"{100 * most / (torque.bounds[1] - torque.bounds[0]):.2g} %"
-    assert f"at most {share} of a command's range; the nearer angle or rate comes" in said["risk_unknown"]
+    assert (
+        f"at most {share} of a command's range; it fades out as angle or rate approaches"
+        in said["risk_unknown"]
+    )
     flown(look().tests[0])
     run("tell", "rig.db", "0", "flight.csv")
     sheet = run("ask", "rig.db").stdout
@@ -101,7 +104,7 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
 def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_said(folder):
     run("ask", "rig.db")
     early = run("learn", "rig.db")
-    assert early.exit_code == 2 and "at least one experiment" in early.stderr
+    assert early.exit_code == 2 and "at least one recorded experiment" in early.stderr
     flown(look().tests[0])
     run("tell", "rig.db", "0", "flight.csv")
     shown = run("show", "rig.db")
@@ -168,9 +171,9 @@ def test_after_old_logs_the_first_test_is_still_the_controller_that_is_trusted(f
     trusted = read_file("rig.toml").first
     other = read_file("rig.toml").campaign(threads=1)
     flown(other.test({"angle.kp": 1.0, "angle.ki": 0.5, "angle.kd": 0.2}), "old.csv")
-    assert run("attach", "rig.db", "old.csv").stdout == "Kept: old.csv; 1 experiment in rig.db.\n"
+    assert run("attach", "rig.db", "old.csv").stdout == "Saved: old.csv; 1 experiment in rig.db.\n"
     again = run("attach", "rig.db", "old.csv")
-    assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == 1
+    assert again.exit_code == 2 and "recorded already" in again.stderr and len(look().experiments) == 1
     asked = json.loads(run("ask", "rig.db", "--json").stdout)
     assert asked["gains"] == dict(trusted) and asked["excited"]
     # With the twin of the old log, the sheet says what to expect of it all the same.
@@ -183,7 +186,11 @@ def test_a_log_that_was_told_is_not_told_twice_and_what_was_expected_stands_besi
         flown(look().tests[number])
         told = run("tell", "rig.db", str(number), "flight.csv").stdout
         again = run("tell", "rig.db", str(number), "flight.csv")
-        assert again.exit_code == 2 and "told yet" in again.stderr and len(look().experiments) == number + 1
+        assert (
+            again.exit_code == 2
+            and "recorded already" in again.stderr
+            and len(look().experiments) == number + 1
+        )
     assert "add to torque, N m" in sheet and "rate, rad/s" in sheet
     test, flight = look().tests[1], look().experiments[1]
     assert f"quality {flight.quality:.4g}, predicted {test.predicted:.4g} ± {test.spread:.3g} rad s;" in told

@@ -81,8 +81,8 @@ def test_a_log_is_dropped_and_the_page_follows(chromium, tmp_path, size):
         page.get_by_role("alert").get_by_text("column").wait_for()
         flight(tmp_path / "flight.csv", look(store).tests[1])
         dropped(page, ".test .drop", tmp_path / "flight.csv")
-        page.get_by_text("2 experiments are kept").wait_for()
-        page.get_by_text("None waits to be flown").wait_for(timeout=30_000)
+        page.get_by_text("2 experiments are stored").wait_for()
+        page.get_by_text("No test is waiting").wait_for(timeout=30_000)
         page.get_by_role("button", name="Plan the next test").click()
         page.get_by_role("heading", name="Test 2").wait_for(timeout=60_000)
         wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
@@ -97,7 +97,7 @@ def test_a_log_that_is_chosen_is_told_too(chromium, tmp_path):
     flight(tmp_path / "flight.csv", look(store).tests[1])
     with served(store) as address, shown(chromium, address) as (page, said):
         page.locator(".test input[type=file]").set_input_files(tmp_path / "flight.csv")
-        page.get_by_text("2 experiments are kept").wait_for()
+        page.get_by_text("2 experiments are stored").wait_for()
         assert said == []
 
 

@@ -31,7 +31,7 @@ def checked(tmp_path):
 
 def test_nothing_is_said_against_a_good_log(checked):
     said = checked()
-    assert said.exit_code == 0 and "It can be learnt from." in said.stdout
+    assert said.exit_code == 0 and "The log can be used for learning." in said.stdout
     assert "121 rows over 6 s, one in 50 ms (20 Hz)" in said.stdout and "✗" not in said.stdout
     found = json.loads(checked(lambda log: None, "--json").stdout)
     assert found["fit"] and found["gaps"] == 0 and found["period"] == pytest.approx(0.05)
@@ -81,7 +81,7 @@ FAULTS = {
 def test_a_fault_is_called_by_its_name_and_ends_with_one(checked, fault):
     change, words = FAULTS[fault]
     said = checked(change)
-    assert said.exit_code == 1 and words in said.stdout and "Mend what is marked" in said.stdout
+    assert said.exit_code == 1 and words in said.stdout and "Correct what is marked" in said.stdout
     assert fault in {each["code"] for each in json.loads(checked(change, "--json").stdout)["remarks"]}
 
 
@@ -90,7 +90,7 @@ NOTES = {
     "saturated": (changed("torque", lambda u: np.sign(u) * 2.0), "at a bound in 100 %"),
     "envelope": (changed("rate", lambda x: np.where(np.arange(len(x)) == 60, 13.0, x)), "outside its envelope"),
     "little-moved": (
-        changed("rate", lambda x: np.random.default_rng(4).normal(size=x.shape)), "little can be learnt of it"
+        changed("rate", lambda x: np.random.default_rng(4).normal(size=x.shape)), "little can be learnt about it"
     ),
 }  # fmt: skip
 

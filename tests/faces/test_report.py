@@ -72,7 +72,8 @@ def test_the_verdict_comes_first_with_numbers(good, bad, page):
     assert "Trust it" in words and "Do not trust it" not in words
     last = good.examine().unseen[-1]
     assert (
-        f"FIT of {np.min(last.fit):.3g} %" in words and f"{100 * last.inside:.0f} % of the readings" in words
+        f"FIT of its free run is {np.min(last.fit):.3g} %" in words
+        and f"{100 * last.inside:.0f} % of the readings" in words
     )
     of_bad = first_words(report_page(bad, "stop", {"name": "a pendulum"}, {}))
     assert "Do not trust it" in of_bad and "Fly it" not in of_bad
@@ -102,7 +103,7 @@ def test_a_controller_that_flew_has_one_prediction_the_one_before_its_flight():
         before.spread,
     )
     page = report_page(campaign, "p", {"name": "p"}, {})
-    assert f"less is better): {before.predicted:.4g} ± {before.spread:.2g} predicted, " in first_words(page)
+    assert f"lower is better): {before.predicted:.4g} ± {before.spread:.2g} predicted, " in first_words(page)
     (row,) = (row for row in table(page, "flights-table") if row[0] == f"test {best.number}")
     assert row[1:3] == [f"{before.predicted:.4g}", f"{before.spread:.2g}"]
     certified = facts(campaign, campaign.certificate(), "p.db", "p", None, {})["prediction"]
@@ -134,7 +135,7 @@ def test_a_loop_that_is_unstable_has_no_margins(good):
 
 def test_what_is_trusted_is_said_with_its_range(page, good):
     runs = [run.trajectory for run in good.experiments]
-    assert "within the range that was flown, for flights of up to 2 s" in first_words(page)
+    assert "within the flown range, for flights of up to 2 s" in first_words(page)
     angles = np.degrees(np.concatenate([run.states[:, 0] for run in runs]))
     row = next(row for row in table(page, "ranges") if row[0] == "angle")
     assert row[1] == "°" and [float(cell.replace("−", "-")) for cell in row[2:]] == pytest.approx(
@@ -247,10 +248,8 @@ def run(*arguments):
 
 def timeless(page):
     """A page without what only a store knows: who worked on the campaign, and how long that took on the clock."""
-    page = re.sub(r"<tr><th scope=\"row\">from its beginning.*</tr>\n", "", page[: page.index('id="again"')])
-    return page.replace(
-        " The time on the clock holds learning, planning, flying and all that lay between.", ""
-    )
+    page = re.sub(r"<tr><th scope=\"row\">elapsed time.*</tr>\n", "", page[: page.index('id="again"')])
+    return page.replace(" Elapsed time includes learning, planning, flying and pauses.", "")
 
 
 def test_a_store_and_a_record_give_the_same_report(good, tmp_path):
@@ -267,7 +266,7 @@ def test_a_store_and_a_record_give_the_same_report(good, tmp_path):
         pages.append(timeless(text))
     assert pages[0] == pages[1]
     own = good.report(tmp_path / "own.html", "pendulum")
-    assert "from its beginning" in (tmp_path / "db.html").read_text(encoding="utf-8")
+    assert "elapsed time" in (tmp_path / "db.html").read_text(encoding="utf-8")
     assert timeless(own) == pages[0].replace("a system of your own", "pendulum")
 
 
@@ -306,7 +305,7 @@ def test_every_flight_that_had_not_been_learnt_has_the_band_of_its_time(good):
     assert len(found.unseen) == 3 and all(0.75 < each.inside <= 1.0 for each in found.unseen)
     caption = FIGURES["unseen"](found).caption
     assert re.search(
-        r"Of those before it, each against the twin of its time: test 1 \d+ %, test 2 \d+ %\.", caption
+        r"Earlier unseen flights, each with the twin of that time: test 1 \d+ %, test 2 \d+ %\.", caption
     )
     # The band of the first planned flight is that of the twin that planned it.
     planned = tl.Campaign.from_record(good.to_record())
@@ -319,7 +318,7 @@ def test_bands_that_an_older_version_has_not_kept_are_said_to_be_unknown(good):
     for name in ("asked", "latest"):
         del record["memory"][name]["ensembles"]
     caption = FIGURES["unseen"](tl.Campaign.from_record(record).examine()).caption
-    assert "Of 2 earlier such flights the band is not known any more." in caption
+    assert "Of 2 earlier unseen flights the band is no longer known." in caption
 
 
 @pytest.mark.parametrize(("fails", "answer"), [(True, "Ask for a calmer controller"), (False, "Stop")])

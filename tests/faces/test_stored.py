@@ -38,7 +38,7 @@ def test_a_run_that_stopped_after_any_experiment_ends_as_one_that_did_not(store)
 def test_what_a_store_holds_is_shown(store):
     run(*SMALL, "--experiments", "2", "--store", store, "--name", "first")
     shown = run("show", store)
-    assert "campaign 'first'" in shown.stdout and "Experiments told: 2 of 2." in shown.stdout
+    assert "campaign 'first'" in shown.stdout and "Experiments recorded: 2 of 2." in shown.stdout
     assert "roll[k+1] = " in shown.stdout and "interrupted" not in shown.stdout
     answer = json.loads(run("show", store, "--json").stdout)
     assert answer["store"]["told"] == 2 and len(answer["result"]["experiments"]) == 2
@@ -79,7 +79,7 @@ def test_a_campaign_on_a_system_of_ones_own_is_resumed_from_python(store, new_ca
     campaign.save(store)
     refused = run("resume", store)
     assert refused.exit_code == 2 and "from Python" in refused.stderr
-    assert "Experiments told: 1." in run("show", store).stdout
+    assert "Experiments recorded: 1." in run("show", store).stdout
 
 
 def test_an_interruption_says_how_to_go_on(store, monkeypatch):

@@ -102,7 +102,7 @@ def result_of_default(**advice):
 def test_a_result_of_default_says_what_a_person_must_know():
     text = render(result_of_default())
     for words in (
-        "torque: lag 0.03 s, delay 1 period.", "squares of torque fill a state", "1/e in 0.8 s",
+        "torque: lag 0.03 s, delay 1 period.", "squares of torque drive a state", "1/e in 0.8 s",
         "rate 0.5 (rad/s)/s with a correlation time of 0.2 s", "It was cut: rate above 12.",
         "CONTROLLER TO FLY: NOT FLOWN YET", "rad², (rad/s)²", "Fly another test before you trust it.",
     ):  # fmt: skip
@@ -121,8 +121,8 @@ def test_a_result_of_default_says_what_a_person_must_know():
         ({"gain": 0.0, "stop": True}, "stop.\nThe scatter of one measurement is 0.1 rad s."),
         ({"gain": 0.0, "stop": True}, "Next: fly this controller, then stop; another flight"),
         ({"trusted": False}, "Next: look into the remarks, then fly another test"),
-        ({"trusted": False}, "it cannot say. Look into the remarks, and fly another."),
-        ({"gain": None}, "No committee was asked for a flight yet"),
+        ({"trusted": False}, "it cannot say. Look into the remarks, then fly another test."),
+        ({"gain": None}, "No flight was planned yet"),
     ],
 )
 def test_advice_to_stop_is_given_where_a_gain_could_not_be_measured(advice, words):

@@ -489,7 +489,7 @@ def test_a_hidden_state_that_commands_fill_is_found():
     assert (list(commands), squared, rest) == ([0, 1], True, 1.0)
     assert time == pytest.approx(0.8, rel=0.1)
     assert found.description_length < blind.description_length - 100.0 and found.terms < 8
-    # What is left is noise alone; without the state it is several times as much, or a disturbance.
+    # The residuals are noise alone; without the state it is several times as much, or a disturbance.
     assert found.misfit == pytest.approx(1.0, abs=0.2)
     assert found.chains[0].motion.correlated < 0.1 * blind.chains[0].motion.correlated
     text = tl.Twin(found.model, signals).equations(3)
@@ -627,7 +627,7 @@ def test_exact_readings_leave_the_noise_of_rounding_and_members_as_far_apart():
     # Rounded to hundredths they are noisy again, and no less noisy than that.
     coarse = identified([Run.of(np.round(run.states, 2), run.commands) for run in runs], signals)
     assert (coarse.sensors(2) > 0.5 * 0.01 / np.sqrt(12.0)).all()
-    assert [any("as good as exact" in str(said) for said in one.remarks) for one in (found, coarse)] == [
+    assert [any("almost exact" in str(said) for said in one.remarks) for one in (found, coarse)] == [
         True,
         False,
     ]

@@ -304,7 +304,7 @@ def test_a_committee_of_one_agrees_and_a_member_that_diverges_is_no_reason_to_cr
     known = signals()
     planner = planner_of(known)
     alone = proposed(planner, Committee([member(known, 1.0)], np.array([1e-3, 5e-3]), True))
-    assert alone.safe and "predict the same" in alone.reason and alone.disagreement == 0.0
+    assert alone.safe and "models agree on it" in alone.reason and alone.disagreement == 0.0
     # What is left of the spread is what the sensors' noise makes of a measurement.
     assert 0.0 < alone.spread < 0.1 * alone.predicted
     wild = member(known, 1.0, damping=-400.0)

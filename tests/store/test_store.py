@@ -274,7 +274,7 @@ def test_a_campaign_without_a_store_is_saved_and_loaded(path, new_campaign, pend
     loaded.tell(asked, trajectory)
     assert same(campaign.ask().genes, loaded.ask().genes)
     loaded.close()
-    with pytest.raises(tl.InvalidInput, match="gone on by itself"):
+    with pytest.raises(tl.InvalidInput, match="continued separately"):
         new_campaign().save(path)
 
 

@@ -171,7 +171,7 @@ def test_the_death_of_a_writer_lets_the_next_one_in(server):
 
 
 def test_a_server_that_is_not_there_is_said(tmp_path):
-    with pytest.raises(tl.StoreFailure, match="nothing that was kept is lost"):
+    with pytest.raises(tl.StoreFailure, match="no stored data is lost"):
         stored(f"postgresql+psycopg://hover:secret@/postgres?host={tmp_path}")
 
 

@@ -29,7 +29,7 @@ def test_a_twin_of_linear_terms_is_tuned_on_and_said_to_be_no_simulator(learnt):
     motor, campaign, best = learnt
     (lesson,) = campaign.history
     (said,) = (remark for remark in lesson.remarks if remark.code == "rough")
-    assert lesson.follows and said.serious and "no simulator" in said.sentence
+    assert lesson.follows and said.serious and "not a simulator" in said.sentence
     assert not campaign.checks().twin_passed
     assert motor.true_quality(best.genes) < 0.7 * motor.true_quality(motor.asked.first)
 

@@ -114,11 +114,11 @@ class Autopilot:
             if FORMATS[self.kind].names.fullmatch(name) is None:
                 raise InvalidInput(
                     f"Autopilot {self.kind}: expected the name of a parameter, found {name!r}, which it cannot have;"
-                    " mend it."
+                    " correct it."
                 )
             if names.count(name) > 1:
                 raise InvalidInput(
-                    f"Autopilot {self.kind}: expected one gain for each parameter, found {name!r} twice; mend it."
+                    f"Autopilot {self.kind}: expected one gain for each parameter, found {name!r} twice; correct it."
                 )
 
     @property
@@ -159,7 +159,7 @@ class Autopilot:
         for name, (value, whole) in values.items():
             if not abs(value) <= (2**31 - 1 if whole else float(np.finfo(np.float32).max)):
                 raise InvalidInput(
-                    f"Parameter {name!r}: expected a number of 32 bits, found {value:g}; mend its scale."
+                    f"Parameter {name!r}: expected a number of 32 bits, found {value:g}; correct its scale."
                 )
             held[name] = (value if whole else float(np.float32(value))), whole
         return held

@@ -67,14 +67,14 @@ class Parameter:
         value = self.scale * given + self.offset
         if not math.isfinite(value):
             raise InvalidInput(
-                f"Parameter {self.name!r}: expected a finite number, found {value!r}; mend its scale."
+                f"Parameter {self.name!r}: expected a finite number, found {value!r}; correct its scale."
             )
         found: Value = round(value) if self.whole else value
         low, high = (-math.inf, math.inf) if self.limits is None else self.limits
         if not low <= found <= high:
             raise InvalidInput(
                 f"Parameter {self.name!r}: expected {low:g} to {high:g}, found {found:g} for the gain {gain!r} ="
-                f" {given:g}; nothing is written. Mend its scale, or the bounds of the gain."
+                f" {given:g}; nothing is written. Correct its scale, or the bounds of the gain."
             )
         return found
 
@@ -110,7 +110,7 @@ def translated(
             found[parameter.name] = parameter.value(gain, given), parameter.whole
         elif given != 0.0:
             raise InvalidInput(
-                f"Gain {gain!r}: expected 0, for the autopilot is declared to have no parameter for it, found"
+                f"Gain {gain!r}: expected 0, because the autopilot is declared to have no parameter for it, found"
                 f" {given!r}; declare one."
             )
     return found

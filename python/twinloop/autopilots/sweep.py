@@ -206,7 +206,7 @@ class Sweep:
     def _of_betaflight(self) -> Set:
         if self.fade_in or self.fade_out:
             raise InvalidInput(
-                f"Sweep, fading: expected none, for Betaflight's chirp has none, found {self.fade_in:g} and"
+                f"Sweep, fading: expected none, because Betaflight's chirp has none, found {self.fade_in:g} and"
                 f" {self.fade_out:g} s; set them to 0."
             )
         rows = {

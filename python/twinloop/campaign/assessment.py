@@ -110,7 +110,7 @@ class Disturbance:
         white: what is added in a period, in its unit; 0: nothing that is felt.
         correlated: what is added in a second by one that is forgotten slowly, in its unit; 0: nothing that is felt.
         correlation_time: after which that is forgotten to 1/e, s.
-        cause: of the correlated one: "disturbance"; "law", an error of the law, which comes again at the same times in
+        cause: of the correlated one: "disturbance"; "law", a model error, which comes again at the same times in
             flight after flight; or "undecided", where flights so far do not tell. None where there is none.
     """
 

@@ -467,7 +467,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return checks(self.examine())
 
     def certificate(self) -> Certificate:
-        """The controller to fly with the evidence for it and what nobody tested, or why it is refused.
+        """The controller to fly with the evidence for it and what was not tested, or why it is refused.
 
         Raises:
             NotAvailable: there is no run.
@@ -647,7 +647,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
     def _learn(self) -> None:
         if not self._book.experiments:
             raise NotAvailable(
-                "Expected at least one experiment that was told, found none; first fly a controller you "
+                "Expected at least one recorded experiment, found none; first fly a controller you "
                 "trust: test = campaign.test(gains), then campaign.tell(test, system.run(test))."
             )
         before = self._method.memory

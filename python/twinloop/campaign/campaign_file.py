@@ -41,7 +41,7 @@ dt = 0.05                        # period of the commands, s
 
 [states.angle]                   # one section a state, in the order of the state vector
 unit = "rad"
-scale = 3.14                     # its usual size; ten times that counts as diverged
+scale = 3.14                     # its usual size; ten times this counts as diverged
 envelope = [-2.5, 2.5]           # where the system is safe; leave it out if it is everywhere
 
 [states.rate]
@@ -54,7 +54,7 @@ envelope = [-12.0, 12.0]
 
 [commands.torque]                # one section a command
 unit = "N m"
-bounds = [-2.0, 2.0]             # what is ever sent
+bounds = [-2.0, 2.0]             # limits of what is sent
 
 [controller]                     # one PID an axis: pairs of an angle and its rate, or an angle alone
 kind = "pid"
@@ -75,12 +75,12 @@ duration = 1.0                   # of a test, s
 "angle.ki" = 2.0
 "angle.kd" = 0.3
 
-# [autopilot]                    # to certify gains: what it calls them, in which unit, between which limits
+# [autopilot]                    # to certify gains: their parameters, with names, scales and limits
 # kind = "px4"                   # or "px4-shell", "ardupilot", "betaflight", "ros2", "json"
 # [autopilot.parameters]         # parameter = scale * gain + offset
 # "angle.kp" = {{ name = "MC_ROLLRATE_P", scale = 0.1, limits = [0.01, 0.5] }}
-# "angle.ki" = false             # a gain that it has not got
-# [autopilot.sweep]              # that it makes by itself: command, axis, amplitude, first and last (Hz), duration (s)
+# "angle.ki" = false             # it has no parameter for this gain
+# [autopilot.sweep]              # a sweep that it generates: command, axis, amplitude, first, last (Hz), duration (s)
 
 [campaign]
 preset = "default"               # or "paper"
@@ -94,10 +94,10 @@ seed = 0
 # rate = "vehicle_angular_velocity.xyz[1]"
 # torque = "vehicle_torque_setpoint.xyz[1]"
 
-# [system]                       # what flies by itself: twinloop run {file}; leave it out if a person flies
+# [system]                       # a system that flies by program: twinloop run {file}; leave it out if a person flies
 # use = "rig:Rig"                # a class in rig.py beside this file, which is run; or a name: {names}
 # timeout = 60.0                 # s that a run may take
-# [system.arguments]             # what it is made with
+# [system.arguments]             # its arguments
 # noise = 0.001
 
 [options]                        # every option of the preset, at its default
@@ -283,7 +283,7 @@ def _toml_of(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as reason:
         if isinstance(reason, InvalidInput):
             raise
-        raise InvalidInput(f"File {path}: expected TOML, found: {reason}; mend that line.") from reason
+        raise InvalidInput(f"File {path}: expected TOML, found: {reason}; correct that line.") from reason
 
 
 def _members(found: Mapping[str, Any], name: str, kind: type[State] | type[Channel]) -> list[Any]:

@@ -1,4 +1,4 @@
-"""The certificate of a controller to fly: what speaks for it, with numbers, and what nobody tested; or a refusal."""
+"""The certificate of a controller to fly: what speaks for it, with numbers, and what was not tested; or a refusal."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Use:
 
     @property
     def beyond_flown(self) -> bool:
-        """Whether it leads where nobody has flown."""
+        """Whether it leaves the flown range."""
         return self.predicted[0] < self.flown[0] or self.predicted[1] > self.flown[1]
 
 
@@ -55,7 +55,7 @@ class Certificate:
         margins: of its loops; None if they cannot be computed, or if the twin does not follow its flights.
         step: the predicted flight of its task, with a band; None without a controller.
         uses: of the range of each state.
-        not_tested: what nobody has tested, in sentences.
+        not_tested: what was not tested, in sentences.
     """
 
     checks: Checks
@@ -138,20 +138,20 @@ def _not_tested(
     signals = best.family.signals
     said = []
     if not any(run.number == best.number for run in experiments):
-        said.append("These gains have not flown: all that is said of them is predicted.")
+        said.append("These gains have not flown: everything stated about them is a prediction.")
     said.append(
         f"Other starts and targets than the task's, and flights longer than {best.steps * signals.dt:g} s."
     )
     said += [
         f"{use.name} is predicted between {use.predicted[0]:.3g} and {use.predicted[1]:.3g} {use.unit}, and was flown"
-        f" between {use.flown[0]:.3g} and {use.flown[1]:.3g}: the twin goes on from its equations there."
+        f" between {use.flown[0]:.3g} and {use.flown[1]:.3g}: outside the flown range the twin extrapolates."
         for use in uses
         if use.beyond_flown
     ]
     bare = [use.name for use in uses if use.envelope is None]
     if bare:
         said.append(
-            f"No envelope is declared for {', '.join(bare)}: nobody looked whether the flight stays safe there."
+            f"No envelope is declared for {', '.join(bare)}: whether the flight stays safe there was not checked."
         )
     if no_margins:
         said.append(f"Margins of stability: {no_margins}.")

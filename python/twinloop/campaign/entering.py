@@ -139,5 +139,5 @@ def check_first_reading(trajectory: Trajectory, test: Test) -> None:
         raise InvalidInput(
             f"Campaign.tell: expected {state.name} to begin near {test.initial_state[i]:g} {state.unit}, found"
             f" {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the sensor"
-            " was not ready: put into the first row what the state was, or run the test again."
+            " was not ready: write the true state into the first row, or run the test again."
         )

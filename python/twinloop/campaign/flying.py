@@ -37,7 +37,7 @@ def checked_budget(campaign: Campaign, system: object, experiments: int) -> int:
         )
     if budget < campaign.runs:
         raise InvalidInput(
-            f"Campaign.run, experiments: expected at least the {campaign.runs} runs that were told already, found"
+            f"Campaign.run, experiments: expected at least the {campaign.runs} runs that are recorded already, found"
             f" {budget}; every run counts, so for one more say {campaign.runs + 1}."
         )
     return budget
@@ -80,8 +80,8 @@ def fly(
         if test.risk is not None and test.risk > allowed:
             raise TooRisky(
                 f"Campaign.run: expected a test that leaves the envelope with a probability of at most"
-                f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; it waits and was not flown:"
-                " fly it by hand, abandon it, or raise max_risk."
+                f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; the test was not flown"
+                " and still waits: fly it by hand, abandon it, or raise max_risk."
             )
         announce()
         failed = _flown(campaign, system, test, timeout, failed)

@@ -17,7 +17,7 @@ from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 Cause = Literal["disturbance", "law", "undecided"]
-"""Of what disturbs for long: something from outside; an error of the law; or what flights so far do not tell apart."""
+"""Of what disturbs for long: something from outside; a model error; or what flights so far do not tell apart."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class Lesson(Recorded, kind="lesson"):
         sensors: standard deviation of each state's sensor, estimated, in its unit.
         lags: time constant of each command's actuator, s.
         delays: of each command's actuator, periods.
-        hidden: states that commands fill: which commands, whether squared, the mean at rest in units of their scale
+        hidden: states that commands drive: which commands, whether squared, the mean at rest in units of their scale
             (None: that of the first period), and the time constant in s.
         offsets: delay of each state's readings against those of the driven states, s.
         closed_loop: of the best model, one for each selected test, SI units squared; infinite where it diverges.
@@ -189,9 +189,9 @@ class Lesson(Recorded, kind="lesson"):
         follows: whether free runs of the best model follow at least half of the runs that it was learnt from; if not,
             no test is planned with it.
         remarks: diagnostics.
-        recurring: states whose correlated disturbance comes again at the same times in flight after flight: the law is
-            wrong there, and nothing disturbs.
-        undecided: states whose correlated disturbance may as well be an error of the law: flights so far do not tell.
+        recurring: states whose correlated disturbance recurs at the same times in each flight: a
+            model error, not a disturbance.
+        undecided: states whose correlated disturbance may also be a model error: the flights so far do not decide it.
         asked: the tests planned after it.
     """
 

@@ -223,8 +223,8 @@ class Logbook(Recorded, kind="logbook"):
         own = self.own(test)
         if own.number in self.flown:
             raise InvalidInput(
-                f"Campaign.abandon: expected a test that was not flown, found test {own.number}, of which"
-                " a run was told; nothing is left to abandon."
+                f"Campaign.abandon: expected a test that was not flown, found test {own.number}, which"
+                " has a recorded run; there is nothing to abandon."
             )
         self.abandoned.append(own.number)
 

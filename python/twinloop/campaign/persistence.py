@@ -101,7 +101,7 @@ class Persistent(Recorded):
         threads: int | None = None,
         progress: Callable[[Progress], None] | bool | None = True,
     ) -> Self:
-        """The campaign that a record was written of; it goes on with the same bits.
+        """The campaign of a record; it continues with the same bits.
 
         Args:
             record: such as `to_record` gives, or JSON gives back.
@@ -163,8 +163,8 @@ class Persistent(Recorded):
                 mine[key][: len(known[key])] != known[key] for key in lists
             ):
                 raise InvalidInput(
-                    f"Campaign.save: expected {keeping.name} to be this one as it was, found another one, or one that"
-                    " has gone on by itself; choose another name."
+                    f"Campaign.save: expected {keeping.name} to be an earlier state of this one, found another"
+                    " one, or one that has continued separately; choose another name."
                 )
             keeping.keep(self._book, self._method)
         finally:
@@ -180,7 +180,7 @@ class Persistent(Recorded):
         threads: int | None = None,
         progress: Callable[[Progress], None] | bool | None = True,
     ) -> Self:
-        """A campaign from a store, where it is kept from now on too; it goes on with the same bits.
+        """A campaign from a store; it is stored there from now on, too, and continues with the same bits.
 
         Args:
             where: a file of SQLite, or the address of a database.

@@ -10,10 +10,10 @@ from twinloop.campaign.history import Progress
 from twinloop.campaign.presets import AnyOptions, Options
 
 USUAL: dict[str, tuple[str, float]] = {
-    "form": ("deciding what outputs mean", 2.0),
+    "form": ("choosing the form of the law", 2.0),
     "noise": ("estimating the noise", 1.1),
-    "actuators": ("searching lags and delays", 3.5),
-    "hidden": ("searching a hidden state", 0.3),
+    "actuators": ("searching for lags and delays", 3.5),
+    "hidden": ("searching for a hidden state", 0.3),
     "terms": ("selecting terms", 1.2),
     "evolution": ("growing terms", 2.0),
     "smoothed": ("selecting again, on smoothed states", 0.8),

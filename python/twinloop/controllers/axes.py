@@ -38,7 +38,7 @@ def checked_axes(family: str, axes: object, second: str) -> tuple[Axis, ...]:
     angles = [angle for angle, _ in pairs]
     if not angles or len(set(angles)) != len(angles):
         raise InvalidInput(
-            f"{family}, axes: expected at least one axis and each angle once, found {angles}; mend them."
+            f"{family}, axes: expected at least one axis and each angle once, found {angles}; correct them."
         )
     return tuple(pairs)
 

@@ -69,7 +69,7 @@ class Custom:
         units = {} if self.units is None else self.units
         if not isinstance(units, Mapping) or not all(name in names for name in units):
             raise InvalidInput(
-                f"Custom, units: expected a dict of units by the names of gains, found {units!r}; mend it."
+                f"Custom, units: expected a dict of units by the names of gains, found {units!r}; correct it."
             )
         object.__setattr__(self, "units", dict(units))
 

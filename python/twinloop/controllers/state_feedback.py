@@ -144,6 +144,6 @@ def _names(what: str, names: object) -> tuple[str, ...]:
     found = tuple(names) if isinstance(names, Iterable) and not isinstance(names, str) else (None,)
     if not all(isinstance(name, str) for name in found) or len(set(found)) != len(found):
         raise InvalidInput(
-            f"StateFeedback, {what}: expected a list of names, each once, found {names!r}; mend it."
+            f"StateFeedback, {what}: expected a list of names, each once, found {names!r}; correct it."
         )
     return found

@@ -9,7 +9,7 @@ import click
 from twinloop.faces.result import to_json
 from twinloop.faces.terminal import is_utf_8
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
 def answer(facts: Mapping[str, object], sentence: str, as_json: bool, err: bool = False) -> None:

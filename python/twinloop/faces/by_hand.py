@@ -45,17 +45,17 @@ def new(file: Path, as_json: bool) -> None:
 
 @click.command()
 @click.argument("store")
-@click.option("--last", is_flag=True, help="No other test will follow: fly the best gains that are known.")
-@click.option("--again", is_flag=True, help="Another test, though one is waiting.")
+@click.option("--last", is_flag=True, help="The last test of the campaign: fly the best gains found so far.")
+@click.option("--again", is_flag=True, help="Plan another test although one is still to be flown.")
 @click.option(
-    "--batch", type=int, metavar="N", help="N alternatives, to be flown in any order; the best first."
+    "--batch", type=int, metavar="N", help="Plan N alternative tests, the best first; fly them in any order."
 )
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def ask(store: str, last: bool, again: bool, batch: int | None, threads: int | None, as_json: bool) -> None:
-    """Say what to fly next: a test sheet, and a file with the excitation and the predicted run.
+    """Plan the next test: a test sheet, and a file with the excitation and the predicted run.
 
-    A campaign that is not in STORE.db yet is begun from STORE.toml beside it. A test that is waiting is shown again.
+    If STORE.db has no campaign yet, it is begun from STORE.toml beside it. A waiting test is shown again.
     """
     if batch is not None:
         _ask_batch(store, batch, last or again, threads, as_json)
@@ -78,7 +78,7 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
     with closing(_campaign(store, threads)) as campaign:
         if not campaign.experiments:
             raise InvalidInput(
-                "twinloop ask --batch: expected a flight that was told, found none; fly the first test:"
+                "twinloop ask --batch: expected a recorded flight, found none; fly the first test:"
                 f" twinloop ask {shown_name(store)}."
             )
         shown = [_shown(store, campaign, test) for test in campaign.ask_batch(batch)]
@@ -86,8 +86,8 @@ def _ask_batch(store: str, batch: int, other: bool, threads: int | None, as_json
             click.echo(to_json({"tests": [described for _, described in shown]}), nl=False)
             return
         click.echo(
-            f"{len(shown)} alternatives, the one most worth flying first. Fly them in any order, tell each; a test"
-            f" that will not be flown: twinloop abandon {shown_name(store)} TEST\n"
+            f"{len(shown)} alternatives, the best first. Fly them in any order and record each with tell;"
+            f" for a test that you will not fly: twinloop abandon {shown_name(store)} TEST\n"
         )
         click.echo("\n".join(text for text, _ in shown), nl=False)
 
@@ -108,11 +108,9 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
 @click.argument("test", type=int)
 @click.argument("flight", type=Path, required=False)
 @click.option(
-    "--failed", metavar="REASON", help="The test failed; FLIGHT is what was recorded, if anything was."
+    "--failed", metavar="REASON", help="Why the test failed; FLIGHT is its partial log, if there is one."
 )
-@click.option(
-    "--aborted", type=Path, metavar="FLIGHT", help="The test was stopped before its end; what was recorded."
-)
+@click.option("--aborted", type=Path, metavar="FLIGHT", help="Log of a test that was stopped before its end.")
 @click.option("--reason", metavar="REASON", help="With --aborted: why it was stopped.")
 @json_option
 def tell(
@@ -124,7 +122,7 @@ def tell(
     reason: str | None,
     as_json: bool,
 ) -> None:
-    """Tell what happened to a TEST: a FLIGHT as CSV or .npz, whole or aborted, or why there is none."""
+    """Record the result of a TEST: a FLIGHT as CSV or .npz, complete or aborted, or why there is none."""
     log = _told(store, test, flight, failed, aborted, reason)
     with closing(_campaign(store)) as campaign:
         if failed is not None:
@@ -136,10 +134,10 @@ def tell(
                 test,
                 log,
                 aborted="" if aborted is None else STOPPED if reason is None else reason,
-                otherwise=f"tell that it was stopped: {_aborted(store, test, log, 'why')}",
+                otherwise=f"record a test that was stopped early: {_aborted(store, test, log, 'why')}",
             )
         text = (
-            f"Kept: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
+            f"Saved: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
             f" {shown_name(store)}."
         )
         runs = [run.quality for run in campaign.experiments if run.number == asked.number]
@@ -191,10 +189,10 @@ def _aborted(store: str, test: int, log: Path, why: str) -> str:
 @click.argument("flight", type=Path)
 @json_option
 def attach(store: str, flight: Path, as_json: bool) -> None:
-    """Attach a FLIGHT without a test, as CSV or .npz: it is learnt, too."""
+    """Add a recorded FLIGHT without a test, as CSV or .npz."""
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
-        text = f"Kept: {flight}; {_count(campaign)} in {shown_name(store)}."
+        text = f"Saved: {flight}; {_count(campaign)} in {shown_name(store)}."
         answer({"file": str(flight), "experiments": len(campaign.experiments)}, text, as_json)
 
 
@@ -203,11 +201,11 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
 @click.argument("test", type=int)
 @json_option
 def abandon(store: str, test: int, as_json: bool) -> None:
-    """Say that a TEST will not be flown."""
+    """Mark a TEST as not to be flown."""
     with closing(_campaign(store)) as campaign:
         asked = numbered(campaign, test)
         campaign.abandon(asked)
-        text = f"Kept: test {test} abandoned in {shown_name(store)}."
+        text = f"Saved: test {test} abandoned in {shown_name(store)}."
         answer(_standing(campaign, asked), text, as_json)
 
 

@@ -32,11 +32,11 @@ def certify(
     name: str | None,
     as_json: bool,
 ) -> None:
-    """Certify the controller to fly of STORE, or say why not.
+    """Certify the controller to fly of STORE, or give the reasons against it.
 
     Writes certificate.html and certificate.json into FOLDER and, with --autopilot, first restore.* with the old gains
-    and then gains.* with the new ones. Exits with 1 where the certificate is refused; then no parameter file is
-    written, and gains.* of an earlier time are removed.
+    and then gains.* with the new ones. If the certificate is refused, it exits with 1, writes no
+    parameter file, and removes earlier gains.*.
     """
     given = prepared(store, name, kind, mapping)
     campaign, autopilot = given.campaign, given.autopilot
@@ -58,7 +58,7 @@ def certify(
     sheet = output / "certificate.html"
     text = f"Granted: {'; '.join([str(sheet), *([', '.join(files)] if files else [])])}."
     if not found.granted:
-        text = f"Refused. {' '.join(found.refusals)} In full: {sheet}"
+        text = f"Refused. {' '.join(found.refusals)} Details: {sheet}"
     written = [str(sheet), str(output / "certificate.json"), *files]
     answer({"granted": found.granted, "refusals": found.refusals, "files": written}, text, as_json)
     if not found.granted:

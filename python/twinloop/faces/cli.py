@@ -108,10 +108,14 @@ def main(context: click.Context) -> None:
 @main.command()
 @click.argument("system")
 @click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @click.option("--preset", default="default", show_default=True, help=f"Set of options: {', '.join(PRESETS)}.")
 @click.option(
-    "--experiments", type=int, default=4, show_default=True, help="Runs on the system, the first included."
+    "--experiments",
+    type=int,
+    default=4,
+    show_default=True,
+    help="Number of runs on the system, including the first.",
 )
 @click.option("--goal", help=f"What flights are for: {', '.join(GOALS)}; by default both.")
 @click.option("--quality", help=f"What is minimised: {', '.join(KINDS)}; by default the preset's.")
@@ -120,25 +124,33 @@ def main(context: click.Context) -> None:
     "weights",
     multiple=True,
     metavar="STATE=NUMBER",
-    help="Of a state in the quality; again for others.",
+    help="Weight of a state in the quality; repeat for others.",
 )
-@click.option("--generations", type=int, help="Preset paper: of the model loop, in each iteration.")
+@click.option("--generations", type=int, help="Preset paper: generations of the model loop per iteration.")
 @click.option(
     "--test-generations",
     type=int,
-    help="Preset paper: of the test loop; by default a share of --generations.",
+    help="Preset paper: generations of the test loop; by default a share of --generations.",
 )
-@click.option("--noise", type=float, help="Of the sensors, rad; five times in rad/s.  [default: 0]")
+@click.option(
+    "--noise",
+    type=float,
+    help="Standard deviation of the sensors' noise in rad; in rad/s five times as large.  [default: 0]",
+)
 @click.option(
     "--gyroscopic", default="physical", show_default=True, help="Signs of the rotor terms: physical, print."
 )
 @click.option("--harsh", is_flag=True, help="The same vehicle with drag, slow motors, gusts and noise 0.001.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Any other option of the preset.")
 @click.option(
-    "--store", metavar="FILE.db|URL", help="Keep the campaign there; go on with the one that is there."
+    "--store",
+    metavar="FILE.db|URL",
+    help="Store the campaign in this file, or continue the one that it holds.",
 )
-@click.option("--name", default="campaign", show_default=True, help="Of the campaign in its store.")
-@click.option("--max-risk", type=float, help="Fly no test that leaves the envelope more probably.")
+@click.option("--name", default="campaign", show_default=True, help="Name of the campaign in the store.")
+@click.option(
+    "--max-risk", type=float, help="Highest probability of leaving the envelope that a test may have."
+)
 @patient
 @answers
 @click.pass_context

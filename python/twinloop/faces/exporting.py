@@ -24,10 +24,10 @@ WHAT = ("twin", "controller")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="File to write; without it, standard output."
 )
-@click.option("--name", help="Of the campaign, where the store holds several.")
-@click.option("--precision", default="double", show_default=True, help=f"Of C: {' or '.join(PRECISIONS)}.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
+@click.option("--precision", default="double", show_default=True, help=f"For C: {' or '.join(PRECISIONS)}.")
 @click.option(
-    "--force", is_flag=True, help="Also a twin that fails its checks, and without comparing what is made."
+    "--force", is_flag=True, help="Export also a twin that fails its checks, and skip the comparison."
 )
 @json_option
 def export(
@@ -40,7 +40,7 @@ def export(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Exports the TWIN (or the CONTROLLER) of SOURCE: a store with a campaign, or a twin as JSON.
+    """Export the TWIN (or the CONTROLLER) of SOURCE: a store with a campaign, or a twin as JSON.
 
     What is exported is run on the campaign's own flights and compared before it is written.
     """

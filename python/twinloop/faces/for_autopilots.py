@@ -28,12 +28,12 @@ def for_an_autopilot(command: Command) -> Command:
         command: of click.
     """
     for option in (
-        click.option("--name", help="Of the campaign, where the store holds several."),
+        click.option("--name", help="Name of the campaign, if the store holds several."),
         click.option(
             "--mapping",
             type=Path,
             metavar="FILE.toml",
-            help="What it calls the gains, and its sweep; by default STORE.toml, [autopilot].",
+            help="File with its names of the gains, and its sweep; by default STORE.toml, [autopilot].",
         ),
         click.option("--autopilot", "kind", help=f"Write parameter files for {', '.join(FORMATS)}."),
         click.option(
@@ -42,7 +42,7 @@ def for_an_autopilot(command: Command) -> Command:
             type=Path,
             required=True,
             metavar="FOLDER",
-            help="Where to write; made if need be.",
+            help="Folder to write into; made if it does not exist.",
         ),
     ):
         command = option(command)

@@ -35,16 +35,14 @@ from twinloop.trajectory import Trajectory, check_recorded
     type=Path,
     multiple=True,
     metavar="LOG",
-    help="Not learnt: the twin is judged on it; again for more.",
+    help="Log for validation, not used for learning; repeat for more.",
 )
-@click.option("-o", "--output", type=Path, metavar="FILE.json", help="Write the twin there.")
-@click.option(
-    "--report", type=Path, metavar="FILE.html", help="Write a page on it: what to believe, and why."
-)
+@click.option("-o", "--output", type=Path, metavar="FILE.json", help="Write the twin to this file.")
+@click.option("--report", type=Path, metavar="FILE.html", help="Write an HTML report with all checks.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
-@click.option("--force", is_flag=True, help="Write also a twin that does not follow its own logs.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--force", is_flag=True, help="Write the twin even if it does not follow its own logs.")
 def identify(
     logs: tuple[Path, ...],
     config: Path,
@@ -58,7 +56,7 @@ def identify(
 ) -> None:
     """Learn a twin from LOGs alone, as CSV, .npz or .ulg: no flight is planned, and no controller is tuned.
 
-    FILE.toml says dt, states and commands, as for a campaign; [options] counts, and other sections need not be there.
+    FILE.toml has dt, states and commands, as for a campaign, and may have [options]; other sections are not needed.
     """
     if not logs:
         raise InvalidInput("identify: expected at least one log, found none; name CSV, .npz or .ulg files.")

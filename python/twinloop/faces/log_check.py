@@ -21,19 +21,19 @@ from twinloop.logs import TIME, Window, read_log, write_columns
 @click.command()
 @click.argument("log", type=Path)
 @click.argument("config", type=Path, metavar="FILE.toml")
-@click.option("--from", "start", type=float, metavar="S", help="Of a .ulg: s after its beginning.")
-@click.option("--to", "stop", type=float, metavar="S", help="Of a .ulg: s after its beginning.")
 @click.option(
-    "-o", "--output", type=Path, metavar="FILE.csv", help="Also write what was read there, to tell it."
+    "--from", "start", type=float, metavar="S", help="For a .ulg: first time, s after its beginning."
 )
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--to", "stop", type=float, metavar="S", help="For a .ulg: last time, s after its beginning.")
+@click.option("-o", "--output", type=Path, metavar="FILE.csv", help="Also write the log as CSV, for tell.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def check(
     log: Path, config: Path, start: float | None, stop: float | None, output: Path | None, as_json: bool
 ) -> int:
-    """Look at a LOG, as CSV, .npz or .ulg, before it is told: its clock, gaps, sensors, commands and units.
+    """Check a LOG, as CSV, .npz or .ulg, before it is used: clock, gaps, sensors, commands and units.
 
-    FILE.toml says dt, states and commands, as for a campaign; of a .ulg its section [log] says which field each of them
-    is. Exits with 1 where something has to be mended first.
+    FILE.toml has dt, states and commands, as for a campaign; for a .ulg its section [log] names the field of
+    each. Exits with 1 if something has to be corrected first.
     """
     if output is not None:
         check_writable(output, [".csv"])
@@ -85,8 +85,12 @@ def _text(log: Path, found: LogCheck) -> str:
         ]
         for column in found.columns
     ]
-    head = ["", "unit", "least", "greatest", "moved, in noises", "at a bound (%)", "beyond (%)"]
+    head = ["", "unit", "least", "greatest", "moved (noise σ)", "at a bound (%)", "beyond (%)"]
     lines += ["", table(head, rows), ""]
     lines += [f"{'✗' if remark.serious else '○'} {remark.sentence}" for remark in found.remarks]
-    lines.append("It can be learnt from." if found.fit else "Mend what is marked ✗ before it is told.")
+    lines.append(
+        "The log can be used for learning."
+        if found.fit
+        else "Correct what is marked ✗ before you use the log."
+    )
     return "\n".join(lines) + "\n"

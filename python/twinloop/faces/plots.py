@@ -153,7 +153,7 @@ def _qualities(axes: Any, campaign: Campaign, label: str) -> None:
     axes.set_ylim(bottom=0.0)
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.margins(x=0.1)
-    axes.set_title("Quality of the flights (less is better)", loc="left")
+    axes.set_title("Quality of the flights (lower is better)", loc="left")
     axes.legend(loc="best", fontsize=8.0)
 
 

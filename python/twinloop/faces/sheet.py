@@ -73,7 +73,7 @@ def reason(test: Test, flown: bool) -> str:
         if not flown
         else "what is known comes from other flights."
     )
-    return f"The controller that you trust already{gentle}: {known}"
+    return f"The controller that you already trust{gentle}: {known}"
 
 
 def unknown_risk(test: Test) -> str:
@@ -83,7 +83,10 @@ def unknown_risk(test: Test) -> str:
         test: to be flown.
     """
     if test.excitation is None:
-        return "not judged before a test was flown. It is the controller's own, for nothing is added to its commands."
+        return (
+            "not estimated before the first flight. Nothing is added to the commands, so the risk is that of the"
+            " controller."
+        )
     signals = test.family.signals
     most = np.abs(test.excitation).max(axis=0)
     shares = [
@@ -91,17 +94,14 @@ def unknown_risk(test: Test) -> str:
         for size, command in zip(most, signals.commands, strict=True)
     ]
     text = (
-        "not judged before a test was flown. It is the controller's own; what is added to it is at most"
+        "not estimated before the first flight. It is the risk of the controller with an excitation of at most"
         f" {max(shares):.2g} % of a command's range"
     )
     ranges = {} if test.hold_back is None else test.hold_back.ranges(signals)
     if ranges:
-        text += (
-            f"; the nearer {_listed(list(ranges))} comes to the envelope the less of it is added, and beyond the outer"
-            " range nothing"
-        )
+        text += f"; it fades out as {_listed(list(ranges))} approaches the envelope, to nothing beyond the outer range"
     if unbounded := [name for name in signals.state_names if name not in ranges]:
-        text += f"; {_listed(unbounded)} {'holds' if len(unbounded) == 1 else 'hold'} none of it back"
+        text += f"; it does not depend on {_listed(unbounded)}"
     return f"{text}."
 
 
@@ -147,9 +147,9 @@ def _held_back(test: Test, file: str) -> list[str]:
     ]
     return [
         "",
-        f"Hold it back each period, by the reading: all of the row while every state is in its inner range, nothing"
-        f" once one has left its outer range, in between in proportion to what is left; the state with the least"
-        f" decides. {file} has the whole of it.",
+        f"Scale it each period by the readings: the full row while every state is in its inner"
+        f" range, nothing once one has left its outer range, linear in between; the state with the smallest"
+        f" factor decides. {file} has the whole of it.",
         "",
         table(["state", "inner range", "outer range", "unit"], rows),
     ]

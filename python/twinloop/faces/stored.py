@@ -26,9 +26,9 @@ from twinloop.systems import BUILT_IN, Quadrotor
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Of the campaign, where the store holds several.")
-@click.option("--experiments", type=int, help="Runs in all; by default as many as were asked for.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
+@click.option("--experiments", type=int, help="Total number of runs; by default as first requested.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @patient
 @answers
 @click.pass_context
@@ -43,7 +43,7 @@ def resume(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Go on with a campaign of STORE on its system, with the same bits.
+    """Continue a campaign of STORE on its system, with the same bits.
 
     The system is a built-in one, or the one that the campaign file beside the store names.
     """
@@ -55,7 +55,7 @@ def resume(
         if wanted is None:
             raise InvalidInput(
                 "resume: expected --experiments N for a campaign that was flown by hand so far, found none;"
-                " say how many runs there shall be in all."
+                " state the total number of runs."
             )
         context.exit(run_file(file, store, held.name, wanted, threads, output, plot, as_json, timeout))
     rig = _system(held)
@@ -69,11 +69,11 @@ def resume(
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Of the campaign, where the store holds several.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> None:
-    """Learn from all that was told to a campaign of STORE, as the next ask would, and ask for nothing."""
+    """Learn from all recorded flights of a campaign of STORE, as the next ask would, without planning a test."""
     with closing(Campaign.load(store, name, threads=threads)) as campaign:
         _ = campaign.twin
         with suppress(NotAvailable):  # there may be no controller to fly yet
@@ -85,10 +85,10 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
 
 @click.command()
 @click.argument("store")
-@click.option("--name", help="Of the campaign, where the store holds several.")
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(store: str, name: str | None, as_json: bool) -> None:
-    """Show what STORE holds, as it was written last; nothing is learnt or changed, and a writer is not held up."""
+    """Show the contents of STORE; nothing is learnt or changed, and a writer is not delayed."""
     campaigns = _campaigns(store)
     if name is None and len(campaigns) != 1:
         rows = [[row["name"], row["created"], row["tests"], row["experiments"]] for row in campaigns]
@@ -139,7 +139,7 @@ def _system(held: Stored) -> Quadrotor:
         raise NotAvailable(
             "resume: expected a campaign that flies a built-in system, or a campaign"
             " file beside the store that names one, found neither; write [system] into that file, fly"
-            " yourself with twinloop ask, or go on from Python with the same arguments and store=."
+            " yourself with twinloop ask, or continue from Python with the same arguments and store=."
         )
     return BUILT_IN[kind].from_record(held.system)
 
@@ -174,7 +174,7 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
     lines = [
         f"{shown_name(store)}: campaign {facts['name']!r}, begun {facts['created']}.",
         f"Preset {facts['preset']}, seed {facts['seed']}.",
-        f"Experiments told: {facts['told']}{of}. Tests made: {facts['tests']}.",
+        f"Experiments recorded: {facts['told']}{of}. Tests made: {facts['tests']}.",
     ]
     missing = facts["told"] - facts["learnt"]
     if missing:

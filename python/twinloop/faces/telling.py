@@ -117,8 +117,8 @@ def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | 
     for told in campaign.experiments:
         if _same(run, told.trajectory) and not (test is not None and _again(told.test, test)):
             raise InvalidInput(
-                f"Log {called}: expected a flight that was not told yet, found one that was, to the last digit; nothing"
-                " has changed. Name the log of this flight."
+                f"Log {called}: expected a new flight, found one that is recorded already, equal to the last"
+                " digit; nothing was changed. Name the log of this flight."
             )
 
 

@@ -31,7 +31,7 @@ def answers(command: Command) -> Command:
         command: of click.
     """
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object."),
+        click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
         click.option("--plot", type=Path, metavar="FILE.svg|png", help="Also draw the runs and the errors."),
         click.option(
             "--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON."
@@ -53,7 +53,7 @@ def patient(command: Command) -> Command:
         callback=lambda context, option, value: (
             None if value is None else number("--timeout (s)", value, above=0.0)
         ),
-        help="Seconds that the system may take for a test; then it is given up and nothing is lost.",
+        help="Longest time that the system may take for a test, s; then the command stops, and nothing is lost.",
     )(command)
 
 
@@ -122,7 +122,7 @@ def work(
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
         if (campaign.interrupted or stopped) and campaign.store is not None:
-            click.echo(f"Kept: twinloop resume {campaign.store} goes on from here.", err=True)
+            click.echo(f"Saved. Continue with: twinloop resume {campaign.store}", err=True)
         if stopped and not campaign.experiments:
             return 1
         if not campaign.experiments or knows_nothing(campaign):

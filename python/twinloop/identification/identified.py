@@ -110,7 +110,7 @@ class Identified(Recorded, kind="identified"):
 
     @property
     def exact(self) -> bool:
-        """Whether the readings are as good as exact."""
+        """Whether the readings are almost exact."""
         return exact(self.misfit)
 
     def noise(self, signals: Signals) -> Noise:

@@ -39,7 +39,8 @@ def identities(found: Sum, pool: Pool, signals: Signals) -> list[Remark]:
             )
             return [
                 note(
-                    "identity", f"On these runs {driven} is described as well with {come} in place of {gone}."
+                    "identity",
+                    f"On these runs {driven} is described equally well with {come} in place of {gone}.",
                 )
             ]
     return []
@@ -95,8 +96,8 @@ def late_sensors(offsets: Floats, driven: Sequence[int], signals: Signals) -> li
         note(
             "sensor-offset",
             f"Readings of {', '.join(names[offsets == offset])} come {1e3 * abs(offset):.3g} ms"
-            f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is learnt with that taken"
-            " out.",
+            f" {'later' if offset > 0.0 else 'earlier'} than those of {others}; the twin is corrected"
+            " for it.",
         )
         for offset in dict.fromkeys(offsets[offsets != 0.0].tolist())
     ]
@@ -162,14 +163,15 @@ def remarks(
         said.append(
             serious(
                 "misfit",
-                f"What is left is {chi_squared / readings:.3g} times the noise: something acts that no term describes.",
+                f"The residuals are {chi_squared / readings:.3g} times the noise: there is an effect that no term"
+                " describes.",
             )
         )
     elif exact(chi_squared / max(1, readings)):
         said.append(
             note(
                 "exact",
-                "The readings are as good as exact: their noise is taken to be what the model leaves.",
+                "The readings are almost exact: their noise is taken from the model's residuals.",
             )
         )
     still = [
@@ -183,7 +185,5 @@ def remarks(
         )
     said += [remark for found in sums for remark in identities(found, pool, signals)]
     if ignored:
-        said.append(
-            note("outliers", f"{ignored} reading{'s' if ignored > 1 else ''} taken for outliers and ignored.")
-        )
+        said.append(note("outliers", f"{ignored} reading{'s' if ignored > 1 else ''} ignored as outliers."))
     return said

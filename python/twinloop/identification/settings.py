@@ -20,8 +20,8 @@ class IdentificationOptions:
 
     Args:
         form: meaning of a program's outputs, "acceleration" (derivatives of the driven states, integrated finely),
-            "explicit-euler" or "semi-implicit-euler" (derivatives, in one step of Euler a period, in which a state goes
-            on by its derivative at the start or at the end of it), "increment" (change over a period) or "absolute"
+            "explicit-euler" or "semi-implicit-euler" (derivatives, in one step of Euler a period, in which a state
+            is advanced by its derivative at the start or at the end), "increment" (change over a period) or "absolute"
             (the next state); "auto": derivatives, unless a step describes the readings more briefly: one of Euler where
             they show that a state with a declared derivative takes one, increments where none is declared. With fixed
             or bounded terms, whose constants are meant for one of the two, derivatives are not compared with
@@ -52,35 +52,36 @@ class IdentificationOptions:
             first, and not only from the residuals of all terms.
         gusts: whether disturbances may be correlated, as gusts are, and not only white.
         price_disturbances: whether correlated disturbances that explain less than they cost are dropped in the end.
-        moderation: whether terms have to pay for being much larger than all that moves a state, as those are that
-            nearly cancel.
-        undisturbed: whether terms are also searched as if nothing disturbed, where something is believed to.
+        moderation: whether terms have a price for being much larger than the total drive of a state, as terms
+            that nearly cancel are.
+        undisturbed: whether terms are also searched as if there were no disturbance, if one was estimated.
         implicit: whether quotients with a denominator of their own are searched, and equations of joints that share
             masses.
-        contacts: whether what begins at a place, as the force of a stop or behind the play of a gear does, is searched.
+        contacts: whether terms that begin at a place are searched, such as the force of a stop or of a gear with
+            backlash.
         friction: whether dry friction is searched.
         lags: whether lags and delays of the actuators are searched.
-        at_once: whether a lag that tuning has shown to be nothing is dropped.
-        apart: whether commands of one unit and bounds may lag differently.
+        at_once: whether a lag that is tuned to nearly 0 is dropped.
+        apart: whether commands of the same unit and bounds may have different lags.
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
             replaced them.
-        hidden: whether a hidden state that commands fill and that decays, such as a climb or heat, is searched.
+        hidden: whether a hidden state is searched that commands drive and that decays, such as a climb or heat.
         offsets: whether sensors may be late or early against those of the driven states.
-        cleaning: whether single readings that no motion has made are ignored before anything is learnt.
-        outliers: whether readings that the predictions of a tuned model miss by far are ignored.
+        cleaning: whether single wrong readings are ignored before anything is learnt.
+        outliers: whether readings far from the predictions of a tuned model are ignored.
         tuning: whether constants are tuned on predictions.
         tuning_steps: largest number of steps of the tuning.
-        pruning: whether terms are dropped whose tuned constants are too uncertain to pay for them.
+        pruning: whether terms are dropped whose tuned constants are too uncertain.
         support: whether terms are dropped that share too few readings with others.
         passes: number of selections of terms; from the second on with states that the model has smoothed.
         committee_size: models that judge tests, the best included.
         parts: whether, as long as there is one run, models of its parts are members too.
-        earlier_twin: whether the twin of before the last flights is kept where it follows them all and the new one does
-            not.
-        rough: whether a law with linear terms only is learnt, too, where no other follows the flights.
-        causes: whether what disturbs for long is told from an error of the law; otherwise all of it is taken to come
-            from outside.
-        exactness: whether what is no more than the inaccuracy of the law may be an error of it.
+        earlier_twin: whether the earlier twin is kept if it follows all flights and the new
+            one does not.
+        rough: whether a linear law is learnt if no other law follows the flights.
+        causes: whether slow disturbances are separated into external ones and model errors; otherwise
+            all count as external.
+        exactness: whether a disturbance within the inaccuracy of the law may be a model error.
         divergence_factor: multiple of a state's scale beyond which a run counts as diverged.
     """
 

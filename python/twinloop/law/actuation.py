@@ -1,4 +1,4 @@
-"""What stands between commands and a law: actuators that lag or delay, and hidden states that commands fill."""
+"""What stands between commands and a law: actuators that lag or delay, and hidden states that commands drive."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Actuator(NamedTuple):
 
 
 class HiddenState(NamedTuple):
-    """A state h that commands fill and nobody measures: dh/dt = level − rest − h / time, 0 at the start of a run.
+    """An unmeasured state h that commands drive: dh/dt = level − rest − h / time, 0 at the start of a run.
 
     The level is the mean over its commands of what each gives, in units of its scale.
 
@@ -57,7 +57,7 @@ class Actuation(Recorded, kind="actuation"):
 
     Args:
         actuators: one a command.
-        hidden: states that commands fill.
+        hidden: states that commands drive.
     """
 
     actuators: tuple[Actuator, ...]

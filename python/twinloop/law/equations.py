@@ -104,7 +104,9 @@ class _Page:
         lines = [f"Form {self.law.form!r}: {kinds[self.law.form]}; {units}."]
         body = signals.kinematics if self.law.form == "acceleration" else None
         if body is not None:
-            lines.append(f"{', '.join(body.angles)} go on as a quaternion, so that no pitch is singular")
+            lines.append(
+                f"{', '.join(body.angles)} are integrated as a quaternion, so that no pitch is singular"
+            )
         lines += [
             f"{state.name} wraps: the equations see it from {-0.5 * state.period:g} to {0.5 * state.period:g}"
             f" {state.unit}".rstrip()
@@ -169,9 +171,7 @@ class _Page:
             if offset != 0.0:
                 deviation = self._deviation([member.offsets[place] for member in self.members])
                 when = "later" if offset > 0.0 else "earlier"
-                lines.append(
-                    f"{name} is read {abs(offset):.3g}{deviation} s {when} than the states that outputs drive"
-                )
+                lines.append(f"{name} is read {abs(offset):.3g}{deviation} s {when} than the driven states")
         return lines
 
     # The equations
@@ -220,7 +220,7 @@ class _Page:
         return ", ".join(f"± {sd:.2g}" for sd in varying_in(every, node, self.writer.names))
 
     def _filling(self, name: str, number: int) -> list[str]:
-        """The equation of a hidden state that commands fill."""
+        """The equation of a hidden state that commands drive."""
         hidden = self.law.actuation.hidden[number]
         symbols = [self.law.command_symbols[place] + "**2" * hidden.squared for place in hidden.commands]
         share = len(symbols)

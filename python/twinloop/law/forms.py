@@ -5,6 +5,6 @@ from __future__ import annotations
 FORMS = ("absolute", "increment", "acceleration", "explicit-euler", "semi-implicit-euler")
 """The next state; what a period adds; derivatives, integrated finely; the same in one step of Euler a period."""
 EULER = FORMS[3:]
-"""Forms of one step of Euler a period, in which a state goes on by its derivative at the start or at the end of it."""
+"""Forms of one step of Euler a period, in which a state is advanced by its derivative at the start or at the end."""
 DERIVATIVES = FORMS[2:]
 """Forms whose outputs are the derivatives of the states that no others give."""

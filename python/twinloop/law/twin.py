@@ -267,7 +267,7 @@ class Twin(Shown, Recorded, kind="twin"):
             flown: the flight.
 
         Returns:
-            The predicted run, as from `simulate`. It is remembered: whoever asks again for the same flight gets it.
+            The predicted run, as from `simulate`. It is cached for the same flight.
         """
         key = id(test), id(flown)
         if key not in self._free_runs:

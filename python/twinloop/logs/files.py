@@ -211,5 +211,5 @@ def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -
         return float(text)
     except ValueError as reason:
         raise InvalidInput(
-            f"Log {called}, line {line}: expected a number for {name}, found {text!r}; mend or remove the line."
+            f"Log {called}, line {line}: expected a number for {name}, found {text!r}; correct or remove the line."
         ) from reason

@@ -138,8 +138,8 @@ def _parsed(path: Path, called: str, topics: list[str]) -> Any:
         ) from reason
     if log.file_corruption:
         raise InvalidInput(
-            f"Log {called}: expected a whole log, found a damaged one; take it from the card again, or save what is"
-            " whole of it as CSV."
+            f"Log {called}: expected a whole log, found a damaged one; copy it from the card again, or save"
+            " its undamaged part as CSV."
         )
     return log
 
@@ -165,7 +165,7 @@ def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> _S
     micro = data["timestamp"]
     if len(micro) < 2 or (micro[1:] <= micro[:-1]).any() or micro[0] < log.start_timestamp:
         raise InvalidInput(
-            f"Log {called}: expected at least two samples of {address}, at times that go on, found others."
+            f"Log {called}: expected at least two samples of {address}, at increasing times, found others."
         )
     return _Samples(address, (micro - np.uint64(log.start_timestamp)).astype(np.float64) * 1e-6, values)
 

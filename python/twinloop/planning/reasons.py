@@ -49,8 +49,8 @@ def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
     sentences = [_what_flies(why, options), _what_it_tells(why, signals)]
     if not why.safe:
         sentences.append(
-            "No candidate keeps the envelope with its margin, or lasts at all, on every model and under the noise"
-            " of the sensors: this is the safest that is known. Fly it with a hand on the switch, or not at all."
+            "No candidate completes the flight within the envelope and its margin on every"
+            " model under sensor noise: this is the safest known. Fly it with a hand on the switch, or not at all."
         )
     return " ".join(sentence for sentence in sentences if sentence)
 
@@ -70,16 +70,16 @@ def _what_it_tells(why: Why, signals: Signals) -> str:
     """What is expected of the flight."""
     high, low = why.members
     if not why.trusted:
-        return "The twin does not follow the flights so far: it cannot say what this one will tell."
+        return "The twin does not follow the flights so far: it cannot say what this one will show."
     if why.exploits:
-        return "The best gains that the twin knows, flown as they are."
+        return "The best gains found on the twin, without excitation."
     if why.plain:
-        promise = "The gains that promise most of those that may be flown, as they are."
+        promise = "The most promising gains that may be flown, without excitation."
         return "" if why.repeats else promise
     if why.disagreement > 0.0 and high != low:
         return (
             f"Models {high} and {low} disagree most on {signals.state_names[why.state]},"
-            f" {why.step * signals.dt:.2g} s after the start; the flight tells"
+            f" {why.step * signals.dt:.2g} s after the start; information:"
             f" {why.disagreement / float(log(2.0)):.3g} bits."
         )
-    return "The models predict the same of it: the flight tests what they have in common."
+    return "The models agree on it: the flight tests what they have in common."

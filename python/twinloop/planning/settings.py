@@ -26,7 +26,8 @@ class PlanningOptions:
         backtracking: whether some candidates are on the way from the best gains flown to the tuned ones; not with the
             goal "model".
         nearness: standard deviation of the candidates' gains around the tuned ones, in ranges of the gains.
-        worth: whether a test may be predicted worse only by what it may tell is worth; otherwise by the share `worse`.
+        worth: whether the value of its information limits how much worse a test may be predicted; otherwise the
+            share `worse` does.
         worse: largest share by which an informative test may be predicted worse than the tuned gains, and than the
             best flight so far.
         accuracy: requested relative accuracy of predicted qualities: the part of the members' spread above it counts
@@ -43,11 +44,11 @@ class PlanningOptions:
         evaluations: number of flights on which gains are tuned, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
-        delay_margin: whether gains are tuned on, and must bear, one more period of delay until a prediction has come
-            true.
+        delay_margin: whether gains are tuned on, and must tolerate, one more period of delay until a prediction
+            has come true.
         confidence: share of members and draws that must find new gains better than the best flown ones.
-        track_record: whether new gains must also be better by what earlier predictions were wrong.
-        alone: whether flown gains are compared without what the excitation of their flights has done.
+        track_record: whether new gains must also be better by the error of earlier predictions.
+        alone: whether flown gains are compared without the effect of their excitation.
         exploit_last: whether the last experiment of a budget flies the tuned gains without excitation.
         quality_weights: of the states in the quality (n_x,); none: the default weights.
         effort: weight of the commands' squares in the quality.

@@ -28,13 +28,13 @@ SMOKE_RUNS, SMOKE_GENERATIONS = 2, 20
     "--generations", type=int, help="Of the model loop; 15000 by default, the test loop keeps its ratio."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Equal seeds give equal results.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @click.option("--smoke", is_flag=True, help="A few seconds: does it run? The numbers mean nothing.")
 @click.option("--output", type=Path, metavar="FILE.json", help="Also write the result there, as JSON.")
 @click.option(
     "--plot", type=Path, metavar="FILE.svg|png", help="Where to draw figure6; figure6.svg by default."
 )
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
 def reproduce(
     context: click.Context,

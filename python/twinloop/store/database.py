@@ -168,7 +168,7 @@ def said(name: str, failure: Exception) -> TwinloopError:
     if "not a database" in low or "malformed" in low or "encrypted" in low:
         return InvalidInput(
             f"Store {name}: expected a database of Twinloop, found a file that is damaged or none at all ({reason});"
-            " nothing was changed in it: take another file, or a copy from before."
+            " nothing was changed in it: use another file, or an earlier copy."
         )
     for words, what, advice in REFUSALS:
         if words in low:
@@ -176,8 +176,8 @@ def said(name: str, failure: Exception) -> TwinloopError:
                 f"Store {name}: expected {what}, found none ({reason}); nothing is lost: {advice}."
             )
     return StoreFailure(
-        f"Store {name}: expected an answer of the database, found: {reason}; nothing that was kept is lost: mend that,"
-        " then do the same again."
+        f"Store {name}: expected an answer of the database, found: {reason}; no stored data is lost: correct that, then"
+        " repeat the command."
     )
 
 
@@ -249,8 +249,8 @@ def _check_whole(store: Store) -> None:
         answer = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
     if answer != "ok":
         raise InvalidInput(
-            f"Store {store.name}: expected a whole database, found a damaged one ({str(answer)[:100]}); nothing was"
-            " changed in it: take a copy from before."
+            f"Store {store.name}: expected a whole database, found a damaged one ({str(answer)[:100]}); nothing"
+            " was changed in it: use an earlier copy."
         )
 
 

@@ -112,8 +112,8 @@ def found(store: Store, name: str | None) -> Stored | None:
     for i, run in enumerate(runs):
         if _hash(run.record) != run.sha256:
             raise InvalidInput(
-                f"{what}: expected experiment {i} as it was told, found another one; somebody has changed it: take a"
-                " copy from before."
+                f"{what}: expected experiment {i} as it was told, found another one; it was changed:"
+                " use an earlier copy."
             )
     logbook = {name: [from_text(entry.record, what) for entry in found] for name, found in entries.items()}
     return Stored(

@@ -24,17 +24,21 @@ from twinloop.sweep.workers import HERE
 @click.option(
     "--presets", default="default", show_default=True, help=f"Comma-separated: {', '.join(PRESETS)}."
 )
-@click.option("--experiments", type=int, default=4, show_default=True, help="Of each campaign.")
+@click.option("--experiments", type=int, default=4, show_default=True, help="Experiments of each campaign.")
 @click.option(
-    "--vary", multiple=True, metavar="NAME=VALUE", help="An option; each further value of it is tried, too."
+    "--vary", multiple=True, metavar="NAME=VALUE", help="An option; repeat it to try further values."
 )
 @click.option(
     "--cluster", default=HERE, show_default=True, help="here, local:N, or the address of a Dask scheduler."
 )
 @click.option(
-    "--store", default="sweep.db", show_default=True, metavar="FILE.db|URL", help="Where all is kept."
+    "--store",
+    default="sweep.db",
+    show_default=True,
+    metavar="FILE.db|URL",
+    help="Where the campaigns are stored.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
 def sweep(
     context: click.Context,
@@ -47,7 +51,7 @@ def sweep(
     store: str,
     as_json: bool,
 ) -> None:
-    """Fly campaigns on SYSTEMS over seeds, presets and options; what is kept in the store is not flown again.
+    """Fly campaigns on SYSTEMS over seeds, presets and options; campaigns in the store are not flown again.
 
     A system is a built-in one, such as quadrotor, quadrotor:noise=0.001 or quadrotor:harsh, or module:object.
     """

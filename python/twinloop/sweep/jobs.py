@@ -127,7 +127,7 @@ def system_of(text: str, seed: int) -> Any:
         system = found(seed=seed) if isinstance(found, type) or not hasattr(found, "run") else found
     except (ValueError, TypeError) as failure:
         raise InvalidInput(
-            f"System {text!r}: expected a system or a function of seed that makes one, found: {failure}; mend it."
+            f"System {text!r}: expected a system or a function of seed that makes one, found: {failure}; correct it."
         ) from failure
     missing = [needed for needed in NEEDED if not hasattr(system, needed)]
     if missing:

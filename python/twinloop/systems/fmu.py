@@ -127,7 +127,7 @@ class _Run:
             self.close(cause)
             raise SystemFailure(
                 f"The FMU {self.system.path} failed in step {self.k}, {self.k * dt:.4g} s after the start: {cause};"
-                " tell the test as failed, or mend the FMU."
+                " tell the test as failed, or correct the FMU."
             ) from cause
         self.k += 1
         # FMI 3.0: (event, terminate, early return, time).

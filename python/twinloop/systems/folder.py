@@ -34,7 +34,7 @@ class Folder(System):
     Args:
         path: of the folder; made if it does not exist.
         signals: its states, commands and period.
-        timeout: seconds to wait for a log; None: for ever.
+        timeout: seconds to wait for a log; None: no limit.
         settled: seconds for which a log must not have changed.
         default_gains: a safe first controller, by name.
 
@@ -133,7 +133,7 @@ class Folder(System):
             elif self.timeout is not None and now - begun > self.timeout:
                 raise NoAnswer(
                     f"Folder {self.path}: expected flight-{digits}.csv or .npz within {self.timeout:g} s, found none;"
-                    " the test still waits: look after the rig, and go on once the log is there."
+                    " the test still waits: check the rig, and continue once the log is there."
                 )
             time.sleep(min(LOOK, self.settled))
 
@@ -146,7 +146,7 @@ class Folder(System):
         try:
             run = load(log, self._signals, ended=ended, reason=reason or "the rig stopped it")
         except TwinloopError as refusal:
-            raise NoAnswer(f"{refusal} The test still waits; mend {log.name}, and go on.") from refusal
+            raise NoAnswer(f"{refusal} The test still waits; correct {log.name}, and go on.") from refusal
         if run.steps > test.steps or (ended == "completed" and run.steps < test.steps):
             advice = "cut it" if run.steps > test.steps else f"write why it was stopped into {why.name}"
             raise NoAnswer(

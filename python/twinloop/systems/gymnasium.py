@@ -103,7 +103,7 @@ class _Run:
             raise SystemFailure(str(reason)) from reason
         except Exception as cause:
             raise SystemFailure(
-                f"The environment raised {type(cause).__name__} when it was reset: {cause}; mend options, place or"
+                f"The environment raised {type(cause).__name__} when it was reset: {cause}; correct options, place or"
                 " state."
             ) from cause
 

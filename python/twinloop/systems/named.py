@@ -60,7 +60,7 @@ def system_named(name: object, arguments: Mapping[str, Any], signals: Signals | 
     if signals is not None and own.to_record() != signals.to_record():
         raise InvalidInput(
             f"System {name!r}: expected its own states, commands and dt to be those of the campaign file, found others;"
-            " mend the file, or leave [states], [commands] and dt out of it."
+            " correct the file, or leave [states], [commands] and dt out of it."
         )
     made: System = system
     return made
@@ -129,7 +129,7 @@ def _made(name: str, found: Any, arguments: dict[str, Any], signals: Signals | N
         raise
     except Exception as reason:
         raise InvalidInput(
-            f"System {name!r}: expected to be made of {arguments}, found {type(reason).__name__}: {reason}; mend it."
+            f"System {name!r}: expected to be made of {arguments}, found {type(reason).__name__}: {reason}; correct it."
         ) from reason
 
 

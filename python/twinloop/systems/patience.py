@@ -41,8 +41,8 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
     before = _hanging.get(id(system))
     if before is not None and before.is_alive():
         raise NoAnswer(
-            "The system has not come back from the test before, which it did not answer in time; mend it, and go on in"
-            " a new process."
+            "The system has not come back from the test before, which it did not answer in time; correct it, and"
+            " continue in a new process."
         )
     answer: list[Trajectory] = []
     failure: list[BaseException] = []
@@ -62,7 +62,7 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
         _hanging[id(system)] = thread
         raise NoAnswer(
             f"The system did not answer test {test.number} within {limit:g} s; the test still waits and nothing is"
-            " lost: look after the system, then go on, or abandon the test."
+            " lost: check the system, then continue, or abandon the test."
         )
     if failure:
         raise failure[0]

@@ -180,7 +180,7 @@ class Guard:
             raise
         except Exception as cause:
             self.failure = SystemFailure(
-                f"The step function raised {type(cause).__name__} at step {number}: {cause}; mend it for that"
+                f"The step function raised {type(cause).__name__} at step {number}: {cause}; correct it for that"
                 " state and command, or return a state that is not finite to end the run there."
             )
             raise self.failure from cause

@@ -22,7 +22,7 @@ Pair = tuple[Measured, Measured]
 
 @dataclass(frozen=True)
 class Measure:
-    """What is compared; less is better.
+    """What is compared; lower is better.
 
     Args:
         name: a word for it, in JSON.

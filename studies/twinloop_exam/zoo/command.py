@@ -41,7 +41,7 @@ FORMATS = {"text": as_text, "markdown": as_markdown}
 @click.option("--table", "form", help=f"Only show what is there: {', '.join((*FORMATS, 'json'))}.")
 @click.option("--ablation", "without", metavar="NAMES",
               help="Also without some ideas, comma-separated, or all: compared with the whole preset.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Answer with one JSON object.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option(
     "--optima", is_flag=True, help="Search the optima by CMA-ES instead, and write them to their file."
 )

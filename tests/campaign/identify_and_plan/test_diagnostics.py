@@ -74,7 +74,7 @@ def test_copies_of_a_record_count_once_and_are_told():
     first, second = flown(), flown(1)
     assert distinct([first, second, flown(), second]) == [first, second]
     (sentence,) = said(first, second, flown(), second)
-    assert sentence.startswith("2 of 4 records equal an earlier one")
+    assert sentence.startswith("2 of 4 records are exact copies of an earlier one")
 
 
 def test_runs_that_were_all_cut_and_a_twin_that_does_not_follow_are_told():
@@ -107,14 +107,15 @@ def test_the_states_that_a_free_run_misses_are_named():
     angle, rate = Miss(1, 1, 0.25, 4.5, False), Miss(2, 2, 0.04, 9.0, True)
     (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, True, STEPS, misses=[angle, rate])
     assert (
-        "over the 2 runs" in remark.sentence and "Something acts that no term describes." in remark.sentence
+        "over the 2 runs" in remark.sentence
+        and "There is an effect that no term describes." in remark.sentence
     )
     assert (
-        "rate on 2 (up to 4 % of how far it goes, 9 times what is explained), angle on 1 (up to 25 %"
+        "rate on 2 (up to 4 % of its range, 9 times what noise and disturbances explain), angle on 1 (up to 25 %"
         in remark.sentence
     )
     (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[rate])
-    assert "may come from outside or be an error of the law" in remark.sentence
+    assert "may be an external disturbance or a model error" in remark.sentence
     (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(0, 1, np.inf, np.inf, False)])
     assert "the twin diverges on 1." in remark.sentence
 
@@ -160,7 +161,7 @@ def frozen(x, i=1, row=STEPS // 2):
 def test_a_sensor_that_freezes_half_way_is_a_serious_remark(noise):
     found = diagnostics_of([flown(noise=noise, change=frozen)], SIGNALS, True, STEPS)
     assert ("frozen", True) in [(remark.code, remark.serious) for remark in found]
-    assert "angle gives one number" in " ".join(remark.sentence for remark in found)
+    assert "angle is constant over" in " ".join(remark.sentence for remark in found)
     back = flown(noise=noise, change=lambda x: np.concatenate([frozen(x, row=60)[:100], x[100:]]))
     assert "frozen" in codes(back)
 

@@ -1,4 +1,4 @@
-"""What a free run misses, state by state, and what explains it: gusts from outside do, an error of the law does not."""
+"""What a free run misses, state by state, and what explains it: gusts from outside do, a model error does not."""
 
 from types import SimpleNamespace
 

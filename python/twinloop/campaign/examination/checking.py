@@ -47,21 +47,21 @@ def _of_twin(found: Examination) -> Iterator[Check]:
     follows = twin.follows
     yield Check(
         "follows", "twin", worst, None, follows, True,
-        f"Flown by itself the twin {_follows(follows, worst)} the"
+        f"In free run the twin {_follows(follows, worst)} the"
         f" {runs} experiment{'s' * (runs != 1)} that it was learnt from: {_error(worst)} (0 is perfect, 1 a"
         " model that never moves).",
     )  # fmt: skip
     grave = [remark for remark in twin.remarks if remark.serious]
     yield Check(
         "remarks", "twin", float(len(grave)), 0.0, not grave, True,
-        "Nothing serious speaks against the data or the twin." if not grave else " ".join(str(each) for each in grave),
+        "There are no serious remarks on the data or the twin." if not grave else " ".join(str(each) for each in grave),
     )  # fmt: skip
     if found.movement is not None:
         state, most = found.movement
         yield Check(
             "movement", "twin", most, MOVED, most >= MOVED, False,
-            f"The state that moved least in all flights, {state}, moved by {most:.3g} standard deviations of its"
-            f" sensor; with less than {MOVED:g} little can be learnt of it.",
+            f"The state that moved least in all flights, {state}, moved by {most:.3g} standard deviations"
+            f" of its sensor's noise; below {MOVED:g} little can be learnt about it.",
         )  # fmt: skip
     yield from _of_unseen(found)
     yield from _of_innovations(found)
@@ -81,8 +81,8 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
     if not found.unseen:
         yield Check(
             "unseen-flight", "twin", None, LEFT, False, True,
-            "No experiment is left that the twin had not learnt when it was made: what it predicts of a new one nobody"
-            " knows. Fly one more.",
+            "There is no experiment that the twin has not learnt from, so its error on a new"
+            " one is unknown. Fly one more.",
         )  # fmt: skip
         return
     last = found.unseen[-1]
@@ -90,24 +90,24 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
     good = last.error <= LEFT
     yield Check(
         "unseen-flight", "twin", last.error, LEFT, good, True,
-        f"Before it had learnt it, the twin {'predicted' if good else 'did not predict'} {which}:"
-        f" {f'error {last.error:.2g}' if math.isfinite(last.error) else 'it diverged'}, at most {LEFT:g} is asked for.",
+        f"Before learning it, the twin {'predicted' if good else 'did not predict'} {which}:"
+        f" {f'error {last.error:.2g}' if math.isfinite(last.error) else 'it diverged'}; at most {LEFT:g} is allowed.",
     )  # fmt: skip
     if last.inside is not None:
         wide = last.inside >= INSIDE
         yield Check(
             "band", "twin", last.inside, INSIDE, wide, True,
             f"{100.0 * last.inside:.0f} % of the readings of {which} were inside the band predicted for 90 % of"
-            f" them; at least {100.0 * INSIDE:.0f} % are asked for.",
+            f" them; at least {100.0 * INSIDE:.0f} % are required.",
         )  # fmt: skip
     miss = found.last_miss
     if miss is not None:
         near = abs(miss) <= MISSES
         missed = (
-            f"The last quality that was predicted missed what was flown by {abs(miss):.2g} of its standard deviations;"
-            f" at most {MISSES:g} are asked for."
+            f"The last quality that was predicted differs from what was flown by {abs(miss):.2g} of its standard"
+            f" deviations; at most {MISSES:g} are allowed."
         )
-        diverged = "Of the last flight no quality was predicted: the twin diverged under its gains."
+        diverged = "No quality was predicted for the last flight: the twin diverged under its gains."
         yield Check(
             "quality", "twin", abs(miss), MISSES, near, True, missed if math.isfinite(miss) else diverged,
         )  # fmt: skip
@@ -118,15 +118,15 @@ def _of_innovations(found: Examination) -> Iterator[Check]:
     if own is None or causes is None:
         return
     for name, these, words in (
-        ("whiteness", own, "of the innovations with themselves"),
-        ("commands", causes, "of the innovations with the commands before them"),
+        ("whiteness", own, "of the innovations with their own past"),
+        ("commands", causes, "of the innovations with earlier commands"),
     ):
         white = these.outside <= COLOURED
         shows = "would show" if white else "shows"
         yield Check(
             name, "twin", these.outside, COLOURED, white, True,
             f"{100.0 * these.outside:.0f} % of the correlations {words} are beyond their 99 % limits; more than"
-            f" {100.0 * COLOURED:.0f} % {shows} that something acts which the twin has not got.",
+            f" {100.0 * COLOURED:.0f} % {shows} an effect that the twin lacks.",
         )  # fmt: skip
 
 
@@ -135,21 +135,22 @@ def _damping(worst: LoopMargins) -> Check:
         "sensitivity", "controller", worst.sensitivity, SENSITIVITY, worst.sensitivity <= SENSITIVITY,
         worst.sensitivity > FRAGILE,
         f"The largest sensitivity over loops and committee is {worst.sensitivity:.2f}, of {worst.loop}; up to"
-        f" {SENSITIVITY:g} is usual, and with more than {FRAGILE:g} nothing is to be flown.",
+        f" {SENSITIVITY:g} is usual; do not fly above {FRAGILE:g}.",
     )  # fmt: skip
 
 
 def _delay(worst: LoopMargins, dt: float) -> Check:
     periods = worst.delay / dt
     borne = (
-        f"The loop that bears least delay, {worst.loop}, stays stable with up to {1e3 * worst.delay:.3g} ms more,"
+        f"The loop with the smallest delay margin, {worst.loop}, stays stable with up to"
+        f" {1e3 * worst.delay:.3g} ms more,"
         f" {periods:.3g} periods"
         if math.isfinite(periods)
         else "No delay makes any loop unstable"
     )
     return Check(
         "delay", "controller", periods, PERIODS, periods >= PERIODS, True,
-        f"{borne}; at least {PERIODS:g} is asked for, by which a command may be late.",
+        f"{borne}; at least {PERIODS:g} is required, since a command may be that late.",
     )  # fmt: skip
 
 
@@ -177,11 +178,11 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         safe = best.risk <= RISK
         yield Check(
             "envelope", "controller", best.risk, RISK, safe, True,
-            f"The probability that it leaves the envelope is {best.risk:.2g} by the committee; at most {RISK:g} is"
-            " asked for.",
+            f"The probability that it leaves the envelope is {best.risk:.2g} according to the"
+            f" committee; at most {RISK:g} is allowed.",
         )  # fmt: skip
     flown = any(run.number == best.number and run.kept_envelope for run in found.experiments)
     yield Check(
         "flown", "controller", None, None, flown, False,
-        "These gains have flown to the end, within the envelope." if flown else "These gains have not flown yet.",
+        "These gains have completed a flight within the envelope." if flown else "These gains have not flown yet.",
     )  # fmt: skip

@@ -134,7 +134,7 @@ class Examination:
 
     @cached_property
     def beside(self) -> tuple[Beside, ...]:
-        """Each experiment beside the free run of the twin of today."""
+        """Each experiment beside the free run of the present twin."""
         return tuple(beside(self.twin, run) for run in self.experiments)
 
     @cached_property
@@ -292,7 +292,7 @@ class Examination:
 
     @cached_property
     def first_flown(self) -> Experiment | None:
-        """The first flight that was asked for: the old gains, perhaps with an excitation."""
+        """The first planned flight: the old gains, perhaps with an excitation."""
         return next((run for run in self.experiments if run.test is not None), None)
 
     @cached_property

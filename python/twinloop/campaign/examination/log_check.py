@@ -125,20 +125,20 @@ def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:
         yield serious("short", f"The log has {len(t)} rows: at least 3 are needed to learn from.")
         return
     if len(steps) < len(t) - 1:
-        yield serious("times", "Some rows have no time: take them out.")
+        yield serious("times", "Some rows have no time: remove them.")
         return
     if (steps <= 0.0).any():
         row = int(np.argmax(steps <= 0.0)) + 1
         yield serious(
             "order",
-            f"Time does not go on at row {row + 1}, {t[row]:g} s: sort the rows, and take out what was logged twice.",
+            f"Time does not increase at row {row + 1}, {t[row]:g} s: sort the rows and remove duplicates.",
         )
         return
     period = float(np.median(steps))
     if abs(period / dt - 1.0) > JITTER:
         yield serious(
             "period",
-            f"Rows are {period:.6g} s apart ({1.0 / period:.4g} Hz), {dt:g} s are declared: thin the log out, declare"
+            f"Rows are {period:.6g} s apart ({1.0 / period:.4g} Hz), {dt:g} s are declared: downsample the log, declare"
             " its own period as dt, or look whether t is in s.",
         )
         return
@@ -149,7 +149,7 @@ def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:
         yield serious(
             "gaps",
             f"Rows are missing in {int(lost.sum())} place{'s' * (int(lost.sum()) != 1)}, about {rows} in all, the first"
-            f" after {t[first]:g} s: cut the log there and use its parts, or put the rows in.",
+            f" after {t[first]:g} s: split the log there, or fill in the rows.",
         )
     worst = float(np.abs(steps[~lost] / dt - 1.0).max(initial=0.0))
     if worst > JITTER:
@@ -203,8 +203,8 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
     if column.missing:
         yield serious(
             "not-a-number",
-            f"{name} has no finite number in {column.missing} of {rows} rows: take these rows out, or cut the log"
-            " there.",
+            f"{name} has no finite number in {column.missing} of {rows} rows: remove these rows, or cut"
+            " the log there.",
         )
         return
     if column.command:
@@ -212,14 +212,14 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
             yield serious(
                 "beyond-bounds",
                 f"{name} is beyond its bounds in {100.0 * column.beyond:.3g} % of the rows ({column.least:g} to"
-                f" {column.greatest:g} {column.unit}): check its unit, and that what was sent was logged, not what was"
-                " asked for.",
+                f" {column.greatest:g} {column.unit}): check its unit, and that the sent command was logged,"
+                " not the requested one.",
             )
         elif (column.at_bound or 0.0) > SATURATED and column.least != column.greatest:
             yield note(
                 "saturated",
-                f"{name} is at a bound in {100.0 * (column.at_bound or 0.0):.3g} % of the rows: what it does in between"
-                " can hardly be learnt.",
+                f"{name} is at a bound in {100.0 * (column.at_bound or 0.0):.3g} % of the rows: its effect in"
+                " between can hardly be learnt.",
             )
         return
     if column.least == column.greatest:
@@ -230,8 +230,8 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
     elif column.moved is not None and column.moved < MOVED:
         yield note(
             "little-moved",
-            f"{name} moved only {column.moved:.2g} times its noise: below {MOVED:g} little can be learnt of it; excite"
-            " it more.",
+            f"{name} moved only {column.moved:.2g} times its noise: below {MOVED:g} little can be learnt about"
+            " it; excite it more.",
         )
     if column.beyond:
         yield note(

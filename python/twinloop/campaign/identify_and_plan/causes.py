@@ -47,7 +47,7 @@ from twinloop.signals import Signals
 Predictions = Sequence[tuple[Floats, Floats, Floats]]
 """Of each run whitened errors and states (n + 1, n_x), and correlated disturbances (n + 1, chains)."""
 SURE = 3.0
-"""Standard deviations of unrelated flights by which the products of an error of the law must be larger."""
+"""Standard deviations of unrelated flights by which the products of a model error must be larger."""
 AT_MOST = 0.5
 """Correlation between flights that something from outside must not have, even if the products are too small by luck."""
 BY_LUCK = 2.0

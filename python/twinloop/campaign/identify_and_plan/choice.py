@@ -67,9 +67,13 @@ class Choice:
         if flown is None:
             if refused:
                 raise NotAvailable(
-                    f"{UNKNOWN}{refused}, and none is known to fly to the end. Fly another one that you trust."
+                    f"{UNKNOWN}{refused}, and no gains have completed a flight. Fly another controller that you"
+                    " trust."
                 )
-            reason = "Tuned on the twin, which sees them keep the envelope; none is known to fly to the end."
+            reason = (
+                "Tuned on the twin, which predicts that they stay in the envelope; no gains have completed a flight"
+                " yet."
+            )
             return self._tuned(tuned, judged, recorded, reason)
         flies = standing.flies(self.book, flown.number)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
@@ -78,10 +82,11 @@ class Choice:
             refused = self._not_preferred(members, recorded, tuned, flown, better)
         if not refused:
             share = f"{100 * better:.3g} %"
-            reason = f"Tuned on the twin, which prefers them to the best flown in {share} of its predictions."
+            reason = f"Tuned on the twin: better than the best flown gains in {share} of its predictions."
             if not flies:
                 reason = (
-                    "Tuned on the twin: no model sees them leave the envelope, as the best gains flown did."
+                    "Tuned on the twin: no model predicts that they leave the envelope, as the best flown gains"
+                    " did."
                 )
             return self._tuned(tuned, judged, recorded, reason)
         reason = f"The best gains flown: {refused}."
@@ -106,11 +111,11 @@ class Choice:
         if nearby(self.planner.family, tuned[np.newaxis], standing.unfit(self.book))[0]:
             return "a flight with gains close to those that the twin prefers failed or was cut"
         if self._no_gains_count(members, judged):
-            return "the twin flies the same whatever the gains are, so that no command acts in it"
+            return "the gains have no effect on the twin, since no command acts in it"
         off = off_start(self.book)
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
-            return "a model sees those that the twin prefers leave the envelope"
+            return "a model predicts that those preferred by the twin leave the envelope"
         return ""
 
     def _no_gains_count(self, members: Sequence[_core.Model], judged: Judged) -> bool:
@@ -124,7 +129,7 @@ class Choice:
     ) -> str:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         if tuned.tobytes() == flown.genes.tobytes():
-            return "the twin knows no better ones"
+            return "the twin finds no better ones"
         if self.planner.options.track_record and (spoken := self._spoken_against(members, recorded, flown)):
             return spoken
         if better < self.confidence:
@@ -145,24 +150,24 @@ class Choice:
             predicted, _ = expected(recorded[:, :, 0])
             if not predicted * promised < alone:
                 return (
-                    f"the last two flights were worse than promised, both by {100 * (promised - 1):.2g} % or more, and"
-                    f" others that the twin promises {predicted:.3g} of would then be no better than the {alone:.3g} of"
-                    " these"
+                    f"the last two flights were worse than predicted, both by {100 * (promised - 1):.2g} % or more, and"
+                    f" others, corrected for that, would be no better ({predicted:.3g} predicted) than these"
+                    f" ({alone:.3g})"
                 )
         if measured is not None and self._doubtful(members, flown, recorded, measured, without):
             return (
-                "the twin expects worse of others than was measured of these, but of these it expects worse, too, and"
-                " so is not believed here"
+                "the twin predicts worse for others than was measured with these, but for these it also predicts worse"
+                " than was measured, so its prediction is not used here"
             )
         if alone is not None and not confirmed(self.book.experiments):
             predicted, spread = expected(recorded[:, :, 0])
             spread = calibrated(spread, predicted, self.book.experiments)
             if not predicted + SURE * spread < alone:
-                worth = f"{alone:.3g} was measured of these"
+                worth = f"{alone:.3g} was measured with these"
                 if flown.excitation is not None:
-                    worth = f"these, without the excitation of their flight, are worth {alone:.3g}"
+                    worth = f"these, without the excitation of their flight, reach {alone:.3g}"
                 return (
-                    "the last flight was not what had been predicted, and of others the twin predicts"
+                    "the last flight was not as predicted, and for others the twin predicts"
                     f" {predicted:.3g} ± {spread:.2g} where {worth}"
                 )
         return ""

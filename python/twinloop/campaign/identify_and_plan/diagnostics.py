@@ -81,8 +81,8 @@ def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
     if states:
         yield serious(
             "unmoved",
-            f"By the law nothing moves {', '.join(states)}, but the flights show motion that the controller"
-            " answers to: what commands do there is lost in what disturbs. Gains for it cannot be tuned yet.",
+            f"In the twin nothing drives {', '.join(states)}, but the flights show motion that the"
+            " controller reacts to: disturbances hide the effect of the commands. Gains for it cannot be tuned yet.",
         )
 
 
@@ -91,12 +91,12 @@ def _does_not_follow(explained: bool) -> Iterator[Remark]:
     cause = (
         "the remarks before this one say why"
         if explained
-        else "something acts that no term describes, such as a contact, play, friction that sticks, or a state that"
-        " nobody reads; the records themselves show no wrong sign or unit"
+        else "there is an effect that no term describes, such as a contact, backlash, stiction or"
+        " an unmeasured state; the records show no wrong sign or unit"
     )
     yield serious(
         "does-not-follow",
-        f"Flown by itself the twin does not follow the runs that it was learnt from: {cause}.",
+        f"In free run the twin does not follow the runs that it was learnt from: {cause}.",
     )
 
 
@@ -105,8 +105,8 @@ def _model_error(states: Sequence[str]) -> Iterator[Remark]:
     if states:
         yield note(
             "model-error",
-            f"What disturbs {', '.join(states)} comes again at the same times in flight after flight. So it is"
-            " an error of the law, and no disturbance: a term is missing there.",
+            f"The disturbance of {', '.join(states)} recurs at the same times in each flight. So it"
+            " is a model error, not a disturbance: a term is missing there.",
         )
 
 
@@ -116,8 +116,7 @@ def _copies(experiments: Sequence[Experiment]) -> Iterator[Remark]:
     if copies:
         yield note(
             "copies",
-            f"{copies} of {len(experiments)} records equal an earlier one to the last bit: they were learnt from"
-            " once.",
+            f"{copies} of {len(experiments)} records are exact copies of an earlier one: each was used once.",
         )
 
 
@@ -127,8 +126,8 @@ def _none_complete(experiments: Sequence[Experiment], steps: int) -> Iterator[Re
         longest = max(run.trajectory.steps for run in experiments)
         yield serious(
             "none-complete",
-            f"No run was complete, the longest had {longest} of {steps} steps: what comes after them nobody has"
-            " seen.",
+            f"No run was complete, the longest had {longest} of {steps} steps. Nothing is known of"
+            " later times.",
         )
 
 
@@ -139,21 +138,21 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
         what = f"diverges on {max(miss.flights for miss in worst if miss.diverges)}"
     else:
         named = [
-            f"{signals.state_names[miss.state]} on {miss.flights} (up to {100.0 * miss.share:.2g} % of how far it goes,"
-            f" {miss.times:.2g} times what is explained)"
+            f"{signals.state_names[miss.state]} on {miss.flights} (up to {100.0 * miss.share:.2g} % of its range,"
+            f" {miss.times:.2g} times what noise and disturbances explain)"
             for miss in worst[:NAMED]
         ]
         others = [f"and {len(worst) - NAMED} more"] if len(worst) > NAMED else []
-        what = f"misses more than noise and known disturbances explain: {', '.join([*named, *others])}"
+        what = f"deviates more than noise and known disturbances explain: {', '.join([*named, *others])}"
     why = (
-        "What disturbs them may come from outside or be an error of the law; flights under other gains would tell."
-        " Until then trust it no further than that."
+        "The cause may be an external disturbance or a model error; flights with other gains would"
+        " tell. Until then trust it only to that accuracy."
         if all(miss.undecided for miss in misses)
-        else "Something acts that no term describes. Do not believe it beyond the flights that were made."
+        else "There is an effect that no term describes. Do not trust the twin outside these flights."
     )
     yield serious(
         "free-run",
-        f"Flown by itself over the {runs} run{'s' if runs > 1 else ''} that it was learnt from, the twin {what}. {why}",
+        f"In free run over the {runs} run{'s' if runs > 1 else ''} that it was learnt from, the twin {what}. {why}",
     )
 
 

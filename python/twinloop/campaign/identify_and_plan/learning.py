@@ -31,14 +31,14 @@ PLAIN = 1_000_000
 """Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""
 ROUGH = serious(
     "rough",
-    "No law with other than linear terms follows the flights as well when it is flown by itself. The twin has linear"
-    " terms only: it follows them roughly, which may do to tune gains, and is no simulator.",
+    "No nonlinear law follows the flights as well in free run, so the twin is linear. It follows"
+    " them roughly: this may be enough to tune gains, but it is not a simulator.",
 )
 """What is said of a twin that is linear because no other one follows."""
 BEFORE = note(
     "known-before",
-    "What all flights teach misses some of them, flown by itself; what was known before the last of them misses none."
-    " The twin is the one of before.",
+    "The twin learnt from all flights misses some of them in free run; the twin of before the last flight"
+    " misses none. The earlier twin is kept.",
 )
 """What is said of a twin that has not learnt all flights and follows them, where the one that has does not."""
 

@@ -39,7 +39,7 @@ class Learnt(Recorded, kind="learnt"):
         experiments: number of these experiments.
         identified: the model, its committee and how they were found.
         believed: members of the committee that follow the flights, the best first.
-        follows: whether the best model, flown by itself, follows at least half of them.
+        follows: whether the best model follows at least half of them in free run.
         needed: factors on the committees' spreads that the flights would have needed, each predicted before it was
             learnt.
         lessons: records of this identification and of those that it began with.

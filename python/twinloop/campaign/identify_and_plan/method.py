@@ -154,7 +154,7 @@ class IdentifyAndPlan:
     def _asked_of_nobody(self, book: Logbook) -> Test:
         """A test that no committee chose."""
         genes, excitation = self.planner.baseline(len(book.tests), first_genes(self.setup, book))
-        test = book.new_test(genes, excitation=excitation, reason="No committee was asked.")
+        test = book.new_test(genes, excitation=excitation, reason="Chosen without a committee.")
         plan = Planned(
             test.number, tuple(genes.tolist()), float("nan"), 0.0, 0.0, True, 0.0, 0.0, test.reason
         )

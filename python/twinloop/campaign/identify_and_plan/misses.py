@@ -36,7 +36,7 @@ class Miss:
         flights: on how many it is missed so.
         share: of how far the state went, on the flight where this is most; infinite where the twin diverges.
         times: what noise and disturbances explain, on the flight where this is most; infinite where the twin diverges.
-        undecided: whether it would be explained if all were disturbances that are not told from an error of the law.
+        undecided: whether it would be explained if all were disturbances that are not told from a model error.
     """
 
     state: int
@@ -62,7 +62,7 @@ def misses_of(
 ) -> list[Miss]:
     """States that a model misses, in order; none on a flight whose commands were sent in pulses.
 
-    Only what is known to come from outside explains anything: a disturbance that may as well be an error of the law
+    Only what is known to come from outside explains anything: a disturbance that may as well be a model error
     would explain whatever the law is wrong about.
 
     Args:
@@ -118,7 +118,7 @@ def misses_any(
         followed: free runs.
         flights: N of them, at least one.
         noise: of the sensors, and disturbances.
-        causes: of its correlated disturbances; an error of the law for certain explains nothing.
+        causes: of its correlated disturbances; a model error for certain explains nothing.
         unit: of which the draws are a part.
         limits: where a run counts as diverged.
         workers: how the work is carried out.

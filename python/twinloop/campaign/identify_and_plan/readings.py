@@ -33,23 +33,23 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
         if frozen:
             yield serious(
                 "frozen",
-                f"{state.name} gives one number over a tenth or more of {frozen} of {len(runs)} runs, at once and while"
-                " it was moving: its sensor froze, the log repeats its last value, or it met a stop; take out what is"
-                " no reading.",
+                f"{state.name} is constant over a tenth or more of {frozen} of {len(runs)} runs, although it"
+                " was moving before: its sensor froze, the log repeats its last value, or it hit a"
+                " stop; remove these rows.",
             )
     for j, command in enumerate(signals.commands):
         sent = [run.commands[:, j] for run in runs]
         if min(map(np.min, sent)) == max(map(np.max, sent)):
             yield note(
                 "constant-command",
-                f"{command.name} is {sent[0][0]:g} {command.unit} in every row: what it does cannot be learnt; check"
-                " that what was sent was logged.",
+                f"{command.name} is {sent[0][0]:g} {command.unit} in every row: its effect cannot be learnt;"
+                " check that the command that was sent was logged.",
             )
     moved = [i for i in range(signals.n_x) if any(np.ptp(run.states[:, i]) > 0.0 for run in runs)]
     if moved and all(ratio([run.states[:, i] for run in runs]) > WHITE for i in moved):
         yield serious(
             "only-noise",
-            "Readings change from one to the next as much as over whole runs: there is nothing but noise in them; check"
+            "Readings change from row to row as much as over whole runs: they contain only noise; check"
             " the sensors, their units, and that the period is not far too long.",
         )
 

@@ -78,5 +78,5 @@ def known_gains(memory: Memory, best: Test | None) -> tuple[Floats, str]:
     known = [] if asked is None or asked.gains is None else [asked.gains]
     known += [] if best is None else [best.genes]
     if not known:
-        raise NotAvailable(f"{UNKNOWN}none has flown, and none was tuned yet. Let it learn to its end.")
-    return known[0], " Nothing was tuned on this twin yet."
+        raise NotAvailable(f"{UNKNOWN}none has flown, and none was tuned yet. Let it finish learning.")
+    return known[0], " No gains were tuned on this twin yet."

@@ -27,15 +27,15 @@ SHORTEST = 16
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Address to listen on; others than loopback ask for a token.",
+    help="Address to listen on; others than loopback require a token.",
 )
 @click.option("--token", help=f"Of at least {SHORTEST} characters; by default one is made and printed.")
-@click.option("--threads", type=int, help="Threads of the engine; all by default. No result depends on it.")
+@click.option("--threads", type=int, help="Number of threads; all by default. Results do not depend on it.")
 @json_option
 def dashboard(
     store: str, port: int, host: str, token: str | None, threads: int | None, as_json: bool
 ) -> None:
-    """Show STORE in the browser: the report, live, the next test, and forms to approve and to tell."""
+    """Show STORE in the browser: a live report, the next test, and forms to approve it and to record its flight."""
     server, address = prepared(store, port, host, token, threads)
     answer({"address": address}, f"Dashboard: {address}  (Ctrl-C ends it)", as_json)
     with suppress(KeyboardInterrupt):  # the way to end it: there is nothing to say of that

@@ -73,7 +73,7 @@
     const cards = found.tests ? found.tests.map(card) : [];
     if (!cards.length) {
       const none = document.createElement("p");
-      none.textContent = found.failed || "None waits to be flown.";
+      none.textContent = found.failed || "No test is waiting.";
       cards.push(none);
     }
     get("tests").replaceChildren(...cards);

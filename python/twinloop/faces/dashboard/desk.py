@@ -112,7 +112,7 @@ class Desk:
         """
         with self._writing(name) as campaign:
             tell(campaign, number, log, aborted=aborted, name=called)
-            return f"Test {number} told: {len(campaign.experiments)} experiments are kept."
+            return f"Test {number} recorded: {len(campaign.experiments)} experiments are stored."
 
     def attach(self, name: str, log: Path, called: str) -> str:
         """Attaches a flight without a test.
@@ -128,7 +128,7 @@ class Desk:
         """
         with self._writing(name) as campaign:
             attach(campaign, log, name=called)
-            return f"Attached: {len(campaign.experiments)} experiments are kept."
+            return f"Attached: {len(campaign.experiments)} experiments are stored."
 
     def fail(self, name: str, number: int, reason: str) -> str:
         """Tells that a test failed.
@@ -176,14 +176,12 @@ class Desk:
             with self._campaign(name) as campaign:
                 if not campaign.experiments:
                     raise NotAvailable(
-                        "Ask: expected a flight that was told, found none; tell the first test, or attach a flight."
+                        "Ask: expected a recorded flight, found none; record the first test, or attach a flight."
                     )
                 campaign.ask(last=last)
 
         if not self._turn.acquire(blocking=False):
-            raise InvalidInput(
-                "Ask: expected nothing else under way, found something; wait until it is done."
-            )
+            raise InvalidInput("Ask: expected no other task to be running, found one; wait until it is done.")
         try:
             self._failed.pop(name, None)
             self._busy.add(name)
@@ -209,7 +207,7 @@ class Desk:
     def _writing(self, name: str) -> Iterator[Campaign]:
         """The campaign, with this process as its only writer, one thing at a time."""
         if not self._turn.acquire(blocking=False):
-            raise InvalidInput("Expected nothing else under way, found something; wait until it is done.")
+            raise InvalidInput("Expected no other task to be running, found one; wait until it is done.")
         try:
             with self._campaign(name) as campaign:
                 yield campaign
@@ -234,9 +232,9 @@ def in_words(seen: Doing) -> str:
     else:
         names = {"models": "evolving models", "tests": "evolving tests"}
         what, turn = (USUAL[phase][0], "step") if phase in USUAL else (names.get(phase, phase), "generation")
-        said = f"{what}, {turn} {step} of {steps}; experiments told: {done} of {experiments}"
+        said = f"{what}, {turn} {step} of {steps}; experiments recorded: {done} of {experiments}"
     if remaining is not None:
         said += f"; about {duration(remaining)} left"
     if seen.silent > LOST:
-        said += f"; nothing was heard of it for {duration(seen.silent)}, it may have ended without a word"
+        said += f"; no progress for {duration(seen.silent)}, it may have stopped"
     return f"Working: {said}."

@@ -22,10 +22,10 @@ def _earlier(found: Examination) -> str:
     before = found.unseen[:-1]
     known = [f"{said(each.number)} {100.0 * each.inside:.0f} %" for each in before if each.inside is not None]
     bare = len(before) - len(known)
-    text = f" Of those before it, each against the twin of its time: {', '.join(known)}." if known else ""
+    text = f" Earlier unseen flights, each with the twin of that time: {', '.join(known)}." if known else ""
     # What an older version has learnt has no band.
     if bare:
-        text += f" Of {bare} earlier such flight{'s' * (bare != 1)} the band is not known any more."
+        text += f" Of {bare} earlier unseen flight{'s' * (bare != 1)} the band is no longer known."
     return text
 
 
@@ -51,7 +51,7 @@ def unseen(found: Examination) -> Figure | None:
     how = "its recorded commands" if last.number is None else "the test's own controller"
     return Figure(
         "unseen",
-        f"The twin against {said(last.number)}, which it had not learnt",
+        f"The twin against {said(last.number)}, which it had not learnt from",
         panels,
         f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under"
         f" {how}; no reading after the first was used.{band}{others}",
@@ -71,8 +71,8 @@ def flights(found: Examination) -> Figure:
         "flights",
         "All flights beside the twin" if len(shown) == len(found.experiments) else f"The last {MOST} flights",
         panels,
-        "Free runs of the twin of today, which has learnt these flights: they show what is left, not what it can"
-        " foretell.",
+        "Free runs of the current twin, which has learnt from these flights: they show its residuals, not"
+        " how well it predicts.",
         columns=len(shown),
     )
 

@@ -42,8 +42,8 @@ def errors(found: Examination) -> Figure:
                 "identification (experiments learnt)",
             )
         ],
-        "Mean squares of whole flights: 0 is perfect, 1 is useless, ∞ diverged. Framed cells are flights that the twin"
-        " had not learnt: they are the ones to believe.",
+        "Mean squares of whole flights: 0 is perfect, 1 is useless, ∞ diverged. Framed cells are flights that"
+        " the twin had not learnt from: judge it by these.",
         columns=1,
     )
 
@@ -87,7 +87,7 @@ def qualities(found: Examination) -> Figure | None:
         marks.append(Level(predicted, "target", "controller to fly, predicted"))
     most = max([q for _, q in flown] + [q + 2 * s for _, q, s in predictions] + [0.0])
     main = Panel(
-        "Quality of each flight (less is better)",
+        "Quality of each flight (lower is better)",
         marks,
         "test",
         quality_label(found),
@@ -114,7 +114,7 @@ def qualities(found: Examination) -> Figure | None:
                 whole=True,
             )
         )
-    return Figure("qualities", "Qualities foretold and met", panels, columns=2)
+    return Figure("qualities", "Qualities, predicted and flown", panels, columns=2)
 
 
 def complexity(found: Examination) -> Figure | None:
@@ -137,7 +137,7 @@ def complexity(found: Examination) -> Figure | None:
                 faint=True,
             ),
             Line([len(r.terms) for r in chosen], [0.0 for _ in chosen], "limit", "chosen", joined=False),
-            Level(10.0, "target", "10: the flights speak against it"),
+            Level(10.0, "target", "10: the flights contradict it"),
         ]
         most = max(r.above for r in rivals)
         panels.append(
@@ -156,7 +156,6 @@ def complexity(found: Examination) -> Figure | None:
         "complexity",
         "Complexity against error",
         panels,
-        "Each dot is a sum of terms that annealing considered, by how much longer a description of the readings it"
-        " makes; error and number of terms both count. Dots below the line are rivals that the flights hardly tell"
-        " apart.",
+        "Each dot is a sum of terms that annealing considered, with the increase in description length, which counts"
+        " the error and the number of terms. Dots below the line are rivals that the flights hardly distinguish.",
     )

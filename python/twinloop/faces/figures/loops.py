@@ -45,7 +45,7 @@ def bode(found: Examination) -> Figure | None:
         "Frequency response of the twin, and of the flights",
         panels,
         "The twin is linearised at the target, the flights are whole manoeuvres: far from the target the two may"
-        " differ. Dots are pale where the flights and the commands do not cohere, or where the sensors' noise is too"
+        " differ. Dots are pale where the flights and the commands are not coherent, or where the sensors' noise is too"
         " large a share of the reading: in closed loop noise goes back into the commands there.",
         columns=2,
     )
@@ -122,7 +122,7 @@ def sensitivities(found: Examination) -> Figure | None:
         "sensitivities",
         "Sensitivity and complementary sensitivity",
         panels,
-        "S: what feedback makes of a disturbance, above 1 where it makes it larger; T: how the loop follows.",
+        "S: how feedback changes a disturbance, above 1 where it amplifies it; T: how the loop follows its target.",
     )
 
 
@@ -150,7 +150,7 @@ def closed(found: Examination) -> Figure | None:
         panels.append(Panel(title, lines, x_label, label, x_log=True, y_log=True, y_range=ends))
     return Figure(
         "closed",
-        "What noise and disturbances do",
+        "Effect of noise and disturbances",
         panels,
         "With all loops closed, root sum of squares over the states' sensors, and over the commands; in units of the"
         " states' scales and the commands' half ranges.",

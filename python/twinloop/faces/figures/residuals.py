@@ -33,10 +33,10 @@ def autocorrelation(found: Examination) -> Figure | None:
     ]
     return Figure(
         "autocorrelation",
-        "Innovations with themselves",
+        "Autocorrelation of the innovations",
         panels,
-        f"What one period ahead could not be foretold, over {own.count} readings a state. A twin that has all there is"
-        f" leaves bars inside the limits but for one in a hundred; here {100.0 * own.outside:.0f} % are outside.",
+        f"Errors of the prediction one period ahead, over {own.count} readings a state. For a complete twin"
+        f" one bar in a hundred is outside the limits; here {100.0 * own.outside:.0f} % are outside.",
     )
 
 
@@ -66,9 +66,9 @@ def crosscorrelation(found: Examination) -> Figure | None:
         )
     return Figure(
         "crosscorrelation",
-        "Innovations with the commands before them",
+        "Correlation of the innovations with earlier commands",
         panels,
-        "This counts more: a command that tells what the twin will miss acts in a way that the twin has not got. "
+        "This counts more: where it is large, the command acts in a way that the twin lacks. "
         f"{100.0 * both.outside:.0f} % are beyond the limits.",
     )
 

@@ -17,7 +17,7 @@ MOST = 12
 
 
 def coverage(found: Examination) -> Figure | None:
-    """State against command where it was flown, and where the controller to fly will go if there is one."""
+    """State against command where it was flown, and the prediction for the controller to fly if there is one."""
     planned = found.planned
     states = np.concatenate([run.trajectory.states[:-1] for run in found.experiments])
     commands = np.concatenate([run.trajectory.commands for run in found.experiments])
@@ -59,11 +59,11 @@ def coverage(found: Examination) -> Figure | None:
     )
     return Figure(
         "coverage",
-        "Where it was flown" + (", and where the controller to fly will go" if planned else ""),
+        "Flown range" + (", and the prediction for the controller to fly" if planned else ""),
         panels[:MOST],
-        "Beyond the dots the twin is asked about what nobody has seen."
+        "Beyond the dots the twin extrapolates."
         if planned is None
-        else f"Where the line leaves the dots the twin is asked about what nobody has seen.{leaves}",
+        else f"Where the line leaves the dots the twin extrapolates.{leaves}",
     )
 
 
@@ -100,7 +100,7 @@ def gains(found: Examination) -> Figure | None:
         "gains",
         "Quality against each gain, ± 20 %",
         panels,
-        "One gain at a time, the others held, on the twin without noise. A flat line is a gain that need not be exact;"
-        " a line that ends in the middle is a gain at a bound of its box.",
+        "One gain at a time, the others held, on the twin without noise. A flat line: the gain need not be"
+        " exact. A line that ends early: the gain is at its bound.",
         columns=3,
     )

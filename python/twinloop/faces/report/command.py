@@ -19,16 +19,16 @@ from twinloop.faces.text import table
 
 @click.command()
 @click.argument("campaign")
-@click.option("--name", help="Of the campaign, where the store holds several.")
+@click.option("--name", help="Name of the campaign, if the store holds several.")
 @click.option(
-    "-o", "--output", type=Path, metavar="FILE.html|FOLDER", help="Where to; by default report.html."
+    "-o", "--output", type=Path, metavar="FILE.html|FOLDER", help="File to write; by default report.html."
 )
 @click.option(
     "--format", "form", help=f"Instead of the page, all figures as files in FOLDER: {', '.join(FORMATS)}."
 )
 @json_option
 def report(campaign: str, name: str | None, output: Path | None, form: str | None, as_json: bool) -> None:
-    """One page on CAMPAIGN, a store or a record in a file: what to believe, and why."""
+    """Write an HTML report on CAMPAIGN, a store or a record in a file: what to trust, and why."""
     if form is not None:
         files = _figures(campaign, name, output or Path("figures"), form)
         answer({"files": files}, "\n".join(f"Figure: {file}" for file in files), as_json, err=True)
@@ -65,12 +65,15 @@ def _figures(campaign: str, name: str | None, folder: Path, form: str) -> list[s
 @click.argument("first")
 @click.argument("second")
 @click.option(
-    "--name", "names", multiple=True, help="Of the campaign in each store, where they hold several; twice."
+    "--name",
+    "names",
+    multiple=True,
+    help="Name of the campaign in each store, if they hold several; give it twice.",
 )
-@click.option("-o", "--output", type=Path, metavar="FILE.html", help="Also as a page.")
+@click.option("-o", "--output", type=Path, metavar="FILE.html", help="Also write an HTML page.")
 @json_option
 def compare(first: str, second: str, names: tuple[str, ...], output: Path | None, as_json: bool) -> None:
-    """Two campaigns side by side, FIRST and SECOND: stores, or records in files."""
+    """Compare two campaigns, FIRST and SECOND: stores, or records in files."""
     if len(names) not in (0, 1, 2):
         raise InvalidInput(f"--name: expected it at most twice, found {len(names)} of them.")
     if output is not None:

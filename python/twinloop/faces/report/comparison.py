@@ -86,7 +86,7 @@ def _answers(source: Source) -> list[Row]:
     if best is not None:
         predicted, spread = predicted_quality(best, found.experiments)
         rows += [
-            (f"quality predicted{unit}, less is better", predicted),
+            (f"quality predicted{unit}, lower is better", predicted),
             (f"± spread{unit}", spread),
             (f"quality flown{unit}", best.measured),
             ("risk of leaving the envelope (probability)", best.risk),

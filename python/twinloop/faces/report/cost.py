@@ -20,29 +20,29 @@ def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
     rows = [
         ["runs on the system", str(cost["runs"])],
         ["of these cut, failed", f"{cost['cut']}, {cost['failed']}"],
-        ["flight that was recorded", f"{cost['seconds']:.4g} s"],
+        ["recorded flight time", f"{cost['seconds']:.4g} s"],
         ["runs that left the envelope", str(cost["left"])],
         [
-            "most of the envelope that any used",
+            "largest use of the envelope",
             f"{100.0 * cost['usage']:.3g} %" if cost["usage"] else "none declared",
         ],
     ]
     if cost["attached"]:
-        rows.insert(1, ["flights that nobody asked for", str(cost["attached"])])
+        rows.insert(1, ["attached flights, not planned here", str(cost["attached"])])
     if cost["abandoned"]:
         rows.insert(1, ["tests that were not flown", str(cost["abandoned"])])
     if cost["given_away"] is not None:
         given = f"{shown_value(cost['given_away'])} {unit}".rstrip()
         rows.append(
-            ["quality given away", f"{given} over a best of {shown_value(cost['best'])} {unit}".rstrip()]
+            ["cumulative regret", f"{given} over a best of {shown_value(cost['best'])} {unit}".rstrip()]
         )
     if elapsed is not None:
-        rows.append(["from its beginning to the last flight told", duration(elapsed)])
+        rows.append(["elapsed time to the last recorded flight", duration(elapsed)])
     note = (
-        "Given away: by how much all other complete runs of the task were worse than the best one, together."
+        "Regret: how much worse than the best run the other complete runs of the task were, summed."
         if (cost["given_away"] is not None)
         else ""
     )
     if elapsed is not None:
-        note += " The time on the clock holds learning, planning, flying and all that lay between."
-    return Table("cost", "What it cost", ["spent", "how much"], rows, note.strip(), texts=(1,))
+        note += " Elapsed time includes learning, planning, flying and pauses."
+    return Table("cost", "Cost of the campaign", ["spent", "how much"], rows, note.strip(), texts=(1,))

@@ -67,13 +67,13 @@ def verdict(
 
 
 PLAIN = {
-    "follows": "flown by itself it does not follow the experiments that it was learnt from",
+    "follows": "in free run it does not follow the experiments that it was learnt from",
     "remarks": "its remarks are serious",
-    "unseen-flight": "it did not foretell the last flight that it had not learnt",
-    "band": "readings of that flight were outside of its band",
+    "unseen-flight": "it did not predict the last unseen flight",
+    "band": "too many readings of that flight were outside its band",
     "quality": "the last quality that it predicted was far off",
-    "whiteness": "what it misses now tells what it will miss next",
-    "commands": "the commands tell what it will miss",
+    "whiteness": "its residuals are correlated in time",
+    "commands": "its residuals are correlated with the commands",
 }
 """What each check of the twin means where it fails."""
 
@@ -84,22 +84,24 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
     if failed:
         lacks = [check for check in failed if check.name in ("whiteness", "commands")]
         text = "; ".join(
-            "it has foretold no flight yet that it had not learnt"
+            "it has not predicted an unseen flight yet"
             if check.name == "unseen-flight" and not found.unseen
             else PLAIN[check.name]
             for check in failed
         )
         if lacks:
             share = max(check.value or 0.0 for check in lacks)
-            text += f" (up to {100.0 * share:.0f} % of the correlations are beyond their 99 % limits): something acts"
-            text += " that it has not got"
+            text += (
+                f" (up to {100.0 * share:.0f} % of the correlations are beyond their 99 % limits): it lacks"
+            )
+            text += " an effect"
         return Sentence("Twin", "Do not trust it", False, f"{_capital(text)}.{unseen}", _links(failed))
     text = unseen.strip()
     if found.autocorrelation is not None:
-        text += " What is left is noise: it is correlated neither with itself nor with the commands."
+        text += " Its residuals are noise: they are correlated neither in time nor with the commands."
     return Sentence(
-        "Twin", "Trust it where it was flown", True, f"{text} {_scope(found)}".strip(),
-        (("unseen", "unseen flight"), ("ranges", "the range"), ("crosscorrelation", "what is left"),
+        "Twin", "Trust it within the flown range", True, f"{text} {_scope(found)}".strip(),
+        (("unseen", "unseen flight"), ("ranges", "flown range"), ("crosscorrelation", "residuals"),
          ("checks", "all checks")),
     )  # fmt: skip
 
@@ -107,7 +109,7 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
 def _scope(found: Examination) -> str:
     """For what the twin may be trusted: as long and as far as was flown."""
     longest = max(float(run.trajectory.t[-1] - run.trajectory.t[0]) for run in found.experiments)
-    held = f"This holds within the range that was flown, for flights of up to {longest:.3g} s"
+    held = f"This holds within the flown range, for flights of up to {longest:.3g} s"
     if found.beyond is None:
         return f"{held}."
     share = f"{100.0 * found.beyond:.0f}"
@@ -120,9 +122,9 @@ def _unseen(found: Examination) -> str:
     if not found.unseen:
         return ""
     last = found.unseen[-1]
-    which = f" Of {said(last.number)}, which it had not learnt,"
+    which = f"For {said(last.number)}, which it had not learnt from,"
     if not np.isfinite(last.rmse).all():
-        return f"{which} its free run diverged."
+        return f" {which} its free run diverged."
     fits = np.where(np.isfinite(last.fit), last.fit, np.inf)
     worst = int(np.argmin(fits))
     if not np.isfinite(fits[worst]):
@@ -133,7 +135,7 @@ def _unseen(found: Examination) -> str:
         else f"; {100.0 * last.inside:.0f} % of the readings were inside its 90 % band"
     )
     state = words(found.signals.state_names[worst])
-    return f"{which} the course was foretold with a FIT of {fits[worst]:.3g} % at worst, of {state}{inside}."
+    return f" {which} the lowest FIT of its free run is {fits[worst]:.3g} %, for {state}{inside}."
 
 
 def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Sentence:
@@ -143,7 +145,7 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
         return Sentence("Controller", "None to fly", False, found.no_controller, (("checks", "all checks"),))
     measure = result["quality"]
     quality = quality_words(measure["kind"], measure["unit"]).rstrip(")")
-    worth = f"{quality}{'; ' if measure['unit'] else ' ('}less is better): {_predicted(found, best)}"
+    worth = f"{quality}{'; ' if measure['unit'] else ' ('}lower is better): {_predicted(found, best)}"
     worth += f", {shown_value(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
     if first is not None and first["measured"] is not None:
         worth += f"; the first gains had {shown_value(first['measured'])}"
@@ -157,10 +159,14 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
             _links(failed),
         )
     if not checks.twin_passed:
-        rests = "What is predicted rests on a twin that is not to be trusted: believe what was flown."
+        rests = "The prediction rests on a twin that is not to be trusted: rely on what was flown."
         text = f"{_capital(worth)}. {rests}"
         return Sentence(
-            "Controller", "Not on this twin's word", False, text, (("step", "step"), ("qualities", "flights"))
+            "Controller",
+            "Not on this twin's prediction",
+            False,
+            text,
+            (("step", "step"), ("qualities", "flights")),
         )
     return Sentence(
         "Controller", "Fly it" if best["measured"] is None else "Keep it", True, f"{_capital(worth)}.{margins}",
@@ -210,8 +216,8 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
         )
     if not checks.twin_passed:
         text = (
-            "Look into the checks that fail, then fly again where they point: what the twin says about the worth of"
-            " another flight is worth no more than the twin."
+            "Look into the checks that fail, then fly again where they point: the twin's estimate of what"
+            " another flight would bring is no better than the twin."
         )
         return Sentence(
             "Next", "Find out what the twin lacks", False, text, (("checks", "all checks"), *links)
@@ -226,7 +232,7 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
         return Sentence("Next", "Ask for a calmer controller", None, text, (*_links(failed), *links))
     if advice["gain"] is None:
         return Sentence(
-            "Next", "Ask", None, "No flight was planned yet; ask for one to hear what it would bring.", links
+            "Next", "Ask", None, "No flight was planned yet; ask for one to see what it would bring.", links
         )
     if advice["gain"] == 0.0:
         text = "The models agree on what to fly: another flight would not improve the quality."

@@ -67,9 +67,9 @@ def advice_text(result: Mapping[str, Any]) -> str:
     title = "ANOTHER EXPERIMENT?\n"
     scatter = advice["scatter"]
     if advice["gain"] is None:
-        return title + "No committee was asked for a flight yet; ask for one to hear what it would bring."
+        return title + "No flight was planned yet; ask for one to see what it would bring."
     if not advice["trusted"]:
-        return f"{title}The twin is not to be believed yet: it cannot say. Look into the remarks, and fly another."
+        return f"{title}The twin is not reliable yet, so it cannot say. Look into the remarks, then fly another test."
     share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
     words = f"{title}When test {advice['before_test']} was planned, knowing which model is right would"
     size = None if scatter is None else with_unit(scatter, unit)

@@ -103,7 +103,7 @@ def _flights(result: Mapping[str, Any]) -> str:
     ]
     measure = result["quality"]
     title = (
-        f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; less is better.\n"
+        f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; lower is better.\n"
         f"What counts: {counted(measure)}."
     )
     note = (
@@ -115,7 +115,7 @@ def _flights(result: Mapping[str, Any]) -> str:
 
 def _of_run(run: Mapping[str, Any]) -> str:
     if run["test"] is None:
-        return f"A run of {run['steps']} steps that nobody asked for."
+        return f"A run of {run['steps']} steps, attached."
     return f"Test {run['test']}: {run['why'] or _own(run)}"
 
 

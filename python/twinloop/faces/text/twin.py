@@ -11,8 +11,8 @@ A_DAY = 86_400.0
 """Seconds: what takes longer to fade does not fade within a flight."""
 CAUSES = {
     "disturbance": "",
-    "law": ", an error of the law",
-    "undecided": ", from outside or an error of the law",
+    "law": ", a model error",
+    "undecided": ", external or a model error",
 }
 """What is added to a correlated disturbance, by its cause."""
 
@@ -40,7 +40,7 @@ def program_errors_text(result: Mapping[str, Any]) -> str:
         "Errors are mean squares over steps and states, SI units; normalised: 1 is a model that never"
         " moves.\nδ is the distance of the last state to the target."
     )
-    return "ERRORS OF THE TWIN, ONE ROW A TEST\n" + table(head, rows) + "\n" + note
+    return "ERRORS OF THE TWIN, ONE ROW PER TEST\n" + table(head, rows) + "\n" + note
 
 
 def states_text(result: Mapping[str, Any]) -> str:
@@ -58,15 +58,15 @@ def states_text(result: Mapping[str, Any]) -> str:
     ]
     head = ["state", "unit", "error of the twin", "noise of the sensor", "ratio"]
     lines = [
-        "WHAT THE TWIN LEAVES, STATE BY STATE",
+        "RESIDUALS OF THE TWIN, BY STATE",
         table(head, rows),
         "Errors: root mean square of flown minus simulated, over whole flights, each from where it began."
-        " Noise:\nstandard deviation, as estimated. A ratio of 1 is a twin that leaves the sensors' noise alone.",
+        " Noise:\nstandard deviation, as estimated. A ratio of 1: only the sensors' noise is left.",
         _disturbances(twin["disturbances"]),
         _actuators(twin["actuators"]),
         *(_hidden(state) for state in twin["hidden"]),
         f"{twin['terms']} terms, {twin['committee']} models in the committee; χ² a reading {cell(twin['misfit'])}"
-        f" (1: noise and disturbances explain what is left)\nover {twin['readings']} readings,"
+        f" (1: noise and disturbances explain the residuals)\nover {twin['readings']} readings,"
         f" {twin['ignored']} ignored.",
         *(remark["sentence"] if isinstance(remark, dict) else str(remark) for remark in twin["remarks"]),
     ]
@@ -75,7 +75,7 @@ def states_text(result: Mapping[str, Any]) -> str:
 
 def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
     if not disturbances:
-        return "Disturbances: none were found beside the sensors' noise."
+        return "Disturbances: none found beyond the sensors' noise."
     words = []
     for found in disturbances:
         name, unit = found["name"], found["unit"] or "1"
@@ -94,7 +94,7 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
     for actuator in actuators:
         groups.setdefault((actuator["lag"], actuator["delay"]), []).append(actuator["name"])
     if list(groups) == [(0.0, 0)]:
-        return "Actuators: no lag and no delay were found."
+        return "Actuators: no lag and no delay found."
     words = []
     for (lag, delay), names in groups.items():
         slow = f"lag {lag:.3g} s" if lag else "no lag"
@@ -106,8 +106,9 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
 def _hidden(state: Mapping[str, Any]) -> str:
     """A state that no sensor reads, in words."""
     what = "squares" if state["squared"] else "values"
-    fading = f"forgotten to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "not forgotten"
-    return f"Hidden: the {what} of {', '.join(state['commands'])} fill a state that no sensor reads; it is {fading}."
+    fading = f"decays to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "does not decay"
+    driven = f"the {what} of {', '.join(state['commands'])} drive a state that is not measured"
+    return f"Hidden state: {driven}; it {fading}."
 
 
 def errors_text(result: Mapping[str, Any]) -> str:
@@ -128,7 +129,7 @@ def errors_text(result: Mapping[str, Any]) -> str:
         f"Mean squares over steps and states ({squared_units(result)}), to the noisy readings. Normalised: over that of"
         " a model that\nnever moves; 1 is useless. Before learning: the same, of the twin that had not seen the flight."
     )
-    return "ERRORS OF THE TWIN, ONE ROW A TEST\n" + table(head, rows) + "\n" + note
+    return "ERRORS OF THE TWIN, ONE ROW PER TEST\n" + table(head, rows) + "\n" + note
 
 
 def squared_units(result: Mapping[str, Any]) -> str:

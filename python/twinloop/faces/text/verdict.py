@@ -30,7 +30,7 @@ def _verdict_on_twin(result: Mapping[str, Any]) -> str:
     ]
     if grave:
         more = f" There are {len(grave) - 1} more serious remarks." if len(grave) > 1 else ""
-        return f"not to be believed yet. {grave[0]}{more}"
+        return f"not reliable yet. {grave[0]}{more}"
     worst = max(
         (run["normalised"] for run in result["experiments"] if run["normalised"] is not None), default=None
     )
@@ -57,10 +57,10 @@ def _next(result: Mapping[str, Any]) -> str:
     if advice is None:
         return "fly another test, or this controller; the preset paper does not say what a test would bring."
     if advice["gain"] is None or (advice["trusted"] and advice["stop"] is None):
-        return "ask for a flight to hear what it would bring."
+        return "ask for a flight to see what it would bring."
     if not advice["trusted"]:
         return "look into the remarks, then fly another test: the twin cannot say what it would bring."
     if advice["stop"]:
         last = "fly this controller, then stop" if result["controller"]["measured"] is None else "stop"
-        return f"{last}; another flight would bring no more than one measurement scatters."
+        return f"{last}; another flight would bring less than the scatter of one measurement."
     return f"another flight may bring {with_unit(advice['gain'], result['quality']['unit'])}."

@@ -1,4 +1,4 @@
-"""Hidden states that commands fill: searched by description length, then tuned.
+"""Hidden states that commands drive: searched by description length, then tuned.
 
 A machine carries more than its sensors read: a climb that thrust has built up, heat that a current has left. Where such
 a state matters it is an input like another: alone, times every input, and times what moves an output.

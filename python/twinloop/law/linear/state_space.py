@@ -62,7 +62,7 @@ class Linear:
             ) from missing
         if self.delays.any() or self.offsets.any():
             raise NotAvailable(
-                "python-control: expected no delays in continuous time, for it has none, found"
+                "python-control: expected no delays in continuous time, because it has none, found"
                 f" {self.delays.tolist()} s of commands and {self.offsets.tolist()} s of sensors;"
                 " linearise with discrete=True, where they are states."
             )

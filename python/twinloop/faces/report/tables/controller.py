@@ -100,10 +100,8 @@ def steps(found: Examination) -> Table | None:
             rows.append([words(answer.state), name, *numbers])
     if not rows:
         return None
-    head = ["state", "flight", "rise 10–90 % (s)", "overshoot (%)", "settling 5 % (s)", "off at the end (%)"]
-    return table_of(
-        "steps", "The step", head, rows, "–: it does not get there within the flight.", texts=(1,)
-    )
+    head = ["state", "flight", "rise 10–90 % (s)", "overshoot (%)", "settling 5 % (s)", "final error (%)"]
+    return table_of("steps", "Step response", head, rows, "–: not reached within the flight.", texts=(1,))
 
 
 def effort(found: Examination) -> Table | None:
@@ -124,7 +122,7 @@ def effort(found: Examination) -> Table | None:
         "command",
         "used (%)",
         "at a bound (%)",
-        "change a period (%)",
+        "change per period (%)",
         "first: used (%)",
         "first: at a bound (%)",
         "from sensors' noise (%)",
@@ -158,7 +156,7 @@ def envelope(found: Examination) -> Table | None:
     risk = (
         ""
         if found.best is None or found.best.risk is None
-        else (f" Probability that the flight leaves it, by the committee: {found.best.risk:.2g}.")
+        else (f" Probability that the flight leaves it, according to the committee: {found.best.risk:.2g}.")
     )
-    head = ["state", "foretold (%)", "met (%)", "most of all flights (%)"]
+    head = ["state", "predicted (%)", "flown (%)", "largest of all flights (%)"]
     return table_of("envelope", "Use of the envelope", head, rows, f"100 % is a bound.{risk}")

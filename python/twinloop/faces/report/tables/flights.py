@@ -26,8 +26,8 @@ def flights(result: Mapping[str, Any]) -> Table:
     head = ["flight", f"predicted{unit}", f"± spread{unit}", f"flown{unit}", f"predicted − flown{unit}",
             "risk (probability)", "why"]  # fmt: skip
     note = (
-        f"Quality: {quality_words(measure['kind'], measure['unit'])}; less is better. What counts: {counted(measure)}."
-        " Predicted and its spread are what was said before the flight."
+        f"Quality: {quality_words(measure['kind'], measure['unit'])}; lower is better. What counts: {counted(measure)}."
+        " The prediction and its spread were made before the flight."
     )
     return table_of("flights-table", "Flights", head, rows, note, texts=(6,))
 
@@ -44,15 +44,15 @@ def data(found: Examination) -> Table:
         "flight",
         "length (s)",
         "ended",
-        "least moved, in noises",
+        "least moved (noise σ)",
         "at a bound (%)",
         "beyond 3 σ (%)",
         "envelope (%)",
         "SHA-256 of the data",
     ]
     note = (
-        "Least moved: the state that moved least, in standard deviations of its sensor; below about 10 little can be"
-        " learnt of it. Beyond 3 σ: innovations; 0.3 % are expected of noise. The last column begins the SHA-256 of"
-        " times, states and commands as little-endian doubles."
+        "Least moved: the state that moved least, in standard deviations of its sensor; below about 10 little can"
+        " be learnt about it. Beyond 3 σ: innovations; 0.3 % are expected of noise. The last column begins the SHA-256"
+        " of times, states and commands as little-endian doubles."
     )
     return table_of("data", "Data, flight by flight", head, rows, note)

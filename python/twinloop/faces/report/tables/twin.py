@@ -16,7 +16,7 @@ RIVALS = 3
 """Rivals of each equation that are shown."""
 CAUSES = {
     "disturbance": "a disturbance",
-    "law": "an error of the law",
+    "law": "a model error",
     "undecided": "not decided yet",
 }
 """What a correlated disturbance is, by its cause."""
@@ -38,9 +38,9 @@ def states(result: Mapping[str, Any]) -> Table | None:
     head = ["state", "unit", "error of whole flights", "sensor's noise", "ratio", "read late by (ms)"]
     note = (
         "Errors are root mean squares of flown minus simulated; noise is a standard deviation, as estimated. A ratio"
-        " of 1 leaves nothing but the sensors."
+        " of 1: only the sensors' noise is left."
     )
-    return table_of("noise", "What the twin leaves, state by state", head, rows, note)
+    return table_of("noise", "Residuals of the twin, by state", head, rows, note)
 
 
 def disturbances(result: Mapping[str, Any]) -> Table | None:
@@ -92,7 +92,7 @@ def rivals(found: Examination) -> Table | None:
     if not rows:
         return None
     head = ["equation of", "terms", "with", "without", "above the chosen (χ²)"]
-    note = "From about 10 on the flights speak against a rival; below that they cannot tell the two apart."
+    note = "From about 10 on the flights contradict a rival; below that they cannot distinguish the two."
     return table_of("rivals", "Rival equations", head, rows, note, (2, 3))
 
 
@@ -100,7 +100,10 @@ def poles(found: Examination) -> list[Table]:
     """Of the twin alone, and closed."""
     both = [
         _poles(
-            "poles", "Poles of the twin at the target", found.open_poles, "A negative time constant grows."
+            "poles",
+            "Poles of the twin at the target",
+            found.open_poles,
+            "A negative time constant: unstable.",
         ),
         _poles("closed-poles", "Poles with the loops closed", found.closed_poles, ""),
     ]
@@ -140,5 +143,5 @@ def ranges(found: Examination) -> Table:
             signals, every.min(axis=0), every.max(axis=0), strict=True
         ):
             rows.append([words(name), unit, factor * float(low), factor * float(high)])
-    note = "Of all flights together. Beyond, the twin goes on from its equations, and nobody has looked."
-    return table_of("ranges", "The range that was flown", ["signal", "unit", "from", "to"], rows, note)
+    note = "Over all flights together; outside it the twin extrapolates."
+    return table_of("ranges", "Flown range", ["signal", "unit", "from", "to"], rows, note)

@@ -57,7 +57,7 @@ def variables(law: Law, start: Floats, rest: Floats) -> list[Variable]:
         attributes = {"unit": one_line(command.unit), "min": low, "max": high, "start": repr(value)}
         found.append(Variable(command.name, len(found), "input", attributes, "held for a period"))
     for name in law.hidden_symbols:
-        found.append(Variable(name, len(found), "local", {}, "a hidden state that commands fill"))
+        found.append(Variable(name, len(found), "local", {}, "a hidden state that commands drive"))
     for place in late_states(law):
         state, name = signals.states[place], f"{signals.state_names[place]}_read"
         while name in taken:
