@@ -65,6 +65,7 @@ class IdentificationOptions:
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
             replaced them.
         hidden: whether a hidden state that commands fill and that decays, such as a climb or heat, is searched.
+        storage: whether hidden states that motion fills, such as the twist of a joint or a wall's heat, are searched.
         offsets: whether sensors may be late or early against those of the driven states.
         cleaning: whether single readings that no motion has made are ignored before anything is learnt.
         outliers: whether readings that the predictions of a tuned model miss by far are ignored.
@@ -113,6 +114,7 @@ class IdentificationOptions:
     apart: bool = True
     longest_delay: int = 2
     hidden: bool = True
+    storage: bool = True
     offsets: bool = True
     cleaning: bool = True
     outliers: bool = True
@@ -148,6 +150,7 @@ class IdentificationOptions:
             contacts=False,
             friction=False,
             hidden=False,
+            storage=False,
             parts=False,
         )
 

@@ -107,7 +107,8 @@ def _hidden(state: Mapping[str, Any]) -> str:
     """A state that no sensor reads, in words."""
     what = "squares" if state["squared"] else "values"
     fading = f"forgotten to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "not forgotten"
-    return f"Hidden: the {what} of {', '.join(state['commands'])} fill a state that no sensor reads; it is {fading}."
+    sources = ", ".join((*state["commands"], *state["states"]))
+    return f"Hidden: the {what} of {sources} fill a state that no sensor reads; it is {fading}."
 
 
 def errors_text(result: Mapping[str, Any]) -> str:
