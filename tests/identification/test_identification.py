@@ -485,7 +485,7 @@ def test_a_hidden_state_that_commands_fill_is_found():
     rests = [np.array([1.0, 1.0])]
     blind = identified(runs, signals, rests=rests, form="acceleration", hidden=False)
     found = identified(runs, signals, rests=rests, form="acceleration")
-    [(commands, squared, rest, time)] = found.actuation.hidden
+    [(commands, squared, rest, time, *_)] = found.actuation.hidden
     assert (list(commands), squared, rest) == ([0, 1], True, 1.0)
     assert time == pytest.approx(0.8, rel=0.1)
     assert found.description_length < blind.description_length - 100.0 and found.terms < 8
@@ -511,7 +511,7 @@ def test_what_fills_a_hidden_state_that_never_empties_is_kept_for_no_longer_than
         speed = np.array(states)[:, :1]
         runs.append(Run.of(speed + 1e-3 * stream.normal(size=speed.shape), commands))
     found = identified(runs, signals, rests=[np.zeros(1)], form="acceleration")
-    [(_, squared, _, time)] = found.actuation.hidden
+    [(_, squared, _, time, *_)] = found.actuation.hidden
     assert not squared and time == pytest.approx(LONGEST_MEMORY * 60 * dt)
 
 

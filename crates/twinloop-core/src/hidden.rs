@@ -203,3 +203,77 @@ impl Stored {
 /// Shares of a step from its start to the next stage's point, and the weights of the stages, as the integrator has them.
 const NEXT: [f64; 3] = [0.5, 0.5, 1.0];
 const SIXTHS: [f64; 4] = [1.0, 2.0, 2.0, 1.0];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Wide;
+
+    const DT: f64 = 0.02;
+    const TIMES: [f64; 2] = [0.3, 0.05];
+
+    fn filled_by_the_second(squared: bool, settled: bool) -> Hidden {
+        Hidden { commands: vec![], states: vec![1], squared, rest: Some(0.25), settled, time: 0.3 }
+    }
+
+    /// What a state of 4 (1 + t), in units of 4, has filled by a time: h' = 1 + t − rest − h / T, or with (1 + t)².
+    fn exact(t: f64, time: f64, squared: bool, settled: bool) -> f64 {
+        // A particular solution a + b t + c t², and what fades of the difference at the start.
+        let (first, second, third) = if squared { (0.75, 2.0, 1.0) } else { (0.75, 1.0, 0.0) };
+        let c = third * time;
+        let b = (second - 2.0 * c) * time;
+        let a = (first - b) * time;
+        let begun = if settled { 0.75 * time } else { 0.0 };
+        a + b * t + c * t * t + (begun - a) * (-t / time).exp()
+    }
+
+    fn state(t: f64) -> [Wide<f64, 2>; 2] {
+        [Wide::splat(7.0), Wide::splat(4.0 * (1.0 + t))]
+    }
+
+    #[test]
+    fn what_a_moving_state_fills_is_what_its_equation_says_on_every_lane() {
+        for (squared, settled) in [(false, false), (false, true), (true, false), (true, true)] {
+            for (staged, close) in [(true, 2e-5), (false, 2e-3)] {
+                let hidden = filled_by_the_second(squared, settled);
+                let mut storage =
+                    Storage::<Wide<f64, 2>>::new(&[hidden], &[1.0, 0.25], &TIMES, DT, staged).unwrap();
+                let effects = [Wide::splat(-1.0)];
+                for k in 0..40 {
+                    let t = f64::from(k) * DT;
+                    let shares: &[f64] = if staged { &[0.0, 0.5, 0.5, 1.0] } else { &[0.0] };
+                    let seen: Vec<_> = shares
+                        .iter()
+                        .map(|share| storage.see(&state(t + share * DT), &effects).to_vec())
+                        .collect();
+                    for (lane, time) in TIMES.into_iter().enumerate() {
+                        let found = seen[0][1].lane(lane);
+                        assert_eq!(seen[0][0].lane(lane), -1.0);
+                        let expected = exact(t, time, squared, settled);
+                        assert!(
+                            (found - expected).abs() < close,
+                            "{squared} {settled} {staged} {k}: {found} {expected}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_fills_nothing_is_no_storage_and_what_does_not_fit_is_refused() {
+        let by_commands = Hidden { commands: vec![0], states: vec![], ..filled_by_the_second(true, false) };
+        assert!(Storage::<Wide<f64, 2>>::new(&[by_commands.clone()], &[1.0], &TIMES, DT, true).is_none());
+        assert!(by_commands.clone().validated(1, 2).is_ok());
+        assert!(filled_by_the_second(true, true).validated(1, 2).is_ok());
+        for wrong in [
+            filled_by_the_second(true, true).validated(1, 1),
+            Hidden { rest: None, ..filled_by_the_second(true, true) }.validated(1, 2),
+            Hidden { commands: vec![0], ..filled_by_the_second(true, false) }.validated(1, 2),
+            Hidden { settled: true, ..by_commands.clone() }.validated(1, 2),
+            Hidden { commands: vec![], ..by_commands }.validated(1, 2),
+        ] {
+            assert!(wrong.is_err());
+        }
+    }
+}

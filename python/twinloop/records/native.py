@@ -87,7 +87,7 @@ def _hidden_record(
 
 
 def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, float, list[int], bool]:
-    found = keys(value, (*HIDDEN_KEYS, *MOTION_KEYS), where, optional=MOTION_KEYS)
+    found = keys(value, HIDDEN_KEYS, where, optional=MOTION_KEYS)
 
     def places(key: str) -> list[int]:
         items = read_list(found.get(key, []), f"{where}.{key}")

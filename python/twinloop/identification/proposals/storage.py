@@ -21,7 +21,7 @@ from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.sensors.noise import calm
-from twinloop.law.actuation import HiddenState, alike_commands
+from twinloop.law.actuation import Actuation, HiddenState, alike_commands
 from twinloop.law.forms import DERIVATIVES
 
 TIMES = (0.02, 0.1, 0.5)
@@ -48,9 +48,10 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         return
     context.watch("hidden")
     bare = replace(hypothesis, fit=None)
-    for found in filled_by_motion(context, bare):
-        if found.evidence.beats(bare.evidence):
-            yield fitted(context, from_both_sides(context, found, found.sums))
+    for variant in (bare, *_at_once(context, bare)):
+        for found in filled_by_motion(context, variant):
+            if found.evidence.beats(bare.evidence):
+                yield fitted(context, from_both_sides(context, found, found.sums))
 
 
 def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -74,6 +75,13 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
     yield _with_all_terms(context, screen, strongest([_timed(screen, alone[place]) for place in order]))
     pairs = (pair for place in order for pair in _pairs(context, alone[place], order, times))
     yield _with_all_terms(context, screen, strongest([screen(pair) for pair in pairs]))
+
+
+def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The same with commands that act at once, if any do not: a lag may have stood in for what is stored."""
+    actuation, direct = hypothesis.actuation, Actuation.direct(context.signals)
+    if context.may_lag and actuation.actuators != direct.actuators:
+        yield replace(hypothesis, actuation=replace(actuation, actuators=direct.actuators))
 
 
 def _timed(screen: _Screen, best: Hypothesis) -> Hypothesis:
