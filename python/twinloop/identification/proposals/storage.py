@@ -15,6 +15,7 @@ from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
 from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.hidden import filled, with_hidden
 from twinloop.identification.records import Stages, stages
@@ -47,17 +48,18 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if problem.priors.bounds or (still and hypothesis.fit.stable) or hypothesis.actuation.stored:
         return
     context.watch("hidden")
-    bare = replace(hypothesis, fit=None)
+    # Behind a short memory of noisy readings their noise would explain itself.
+    bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
     for variant in (bare, *_at_once(context, bare)):
         for found in filled_by_motion(context, variant):
-            if found.evidence.beats(bare.evidence):
-                yield fitted(context, from_both_sides(context, found, found.sums))
+            yield fitted(context, from_both_sides(context, found, found.sums))
 
 
 def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """The hypothesis, not fitted, with the best single storage, and with the best pair, whether they pay or not.
+    """The hypothesis, not fitted, with the best single storage, and with the best pair of each time; none that
+    does not pay at all.
 
-    A pair describes what is linear whatever its time: where one storage does as well, tuning shows it.
+    A pair describes what is linear whatever its time, which predictions alone tell.
 
     Args:
         context: of the identification.
@@ -69,12 +71,14 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
     alone = {
         place: strongest([screen(single) for single in _single(place, times)]) for place in _sources(context)
     }
-    order = sorted(alone, key=lambda place: alone[place].evidence.length)[:NEAR]
-    if not order:
-        return
-    yield _with_all_terms(context, screen, strongest([_timed(screen, alone[place]) for place in order]))
-    pairs = (pair for place in order for pair in _pairs(context, alone[place], order, times))
-    yield _with_all_terms(context, screen, strongest([screen(pair) for pair in pairs]))
+    order, without = sorted(alone, key=lambda place: alone[place].evidence.length)[:NEAR], screen(())
+    by_state = [alone[place] for place in order]
+    pairs = [
+        [screen(pair) for one in by_state for pair in _pairs(context, one, order, time)] for time in times
+    ]
+    for several in ([_timed(screen, one) for one in by_state], *pairs):
+        if several and (best := strongest(several)).evidence.beats(without.evidence):
+            yield _with_all_terms(context, screen, best)
 
 
 def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -171,15 +175,12 @@ def _single(place: int, times: Sequence[float]) -> Iterator[Sources]:
         yield (HiddenState((), False, 0.0, time, (place,), settled),)
 
 
-def _pairs(
-    context: Context, alone: Hypothesis, others: Sequence[int], times: Sequence[float]
-) -> Iterator[Sources]:
+def _pairs(context: Context, alone: Hypothesis, others: Sequence[int], time: float) -> Iterator[Sources]:
     """What one state fills, beside what a group of commands or another state does in the same time."""
     (by_state,) = alone.actuation.hidden
-    for time in times:
-        first = by_state._replace(time=time)
-        # Settled or empty at the start, but for what the law's constants hold.
-        rest = None if first.settled else 0.0
+    # Empty at the start, or settled but for what the law's constants hold.
+    for settled, rest in ((False, 0.0), (True, None)):
+        first = by_state._replace(time=time, settled=settled)
         for group in alike_commands(context.signals):
             yield HiddenState(tuple(group), False, rest, time), first
         for place in others:
