@@ -488,7 +488,9 @@ def test_the_time_of_a_hidden_state_is_tuned_with_the_constants():
     stream, records, steps = np.random.default_rng(5), [], 160
     for _ in range(2):
         commands = np.repeat(stream.uniform(-2.0, 2.0, (steps // 10, 1)), 10, axis=0)
-        inputs = _core.command_effects([(0.0, 0, None)], [([0], True, 0.0, truth[3], [], False)], [1.0], DT, commands)
+        inputs = _core.command_effects(
+            [(0.0, 0, None)], [([0], True, 0.0, truth[3], [], False)], [1.0], DT, commands
+        )
         states = [np.array([0.5])]
         for k in range(steps):
             stages = iter([inputs[0][k], inputs[1][k], inputs[1][k], inputs[2][k]])

@@ -16,7 +16,7 @@ LAGGING = 12.0
 HIDING = 30.0
 """What a hidden state must gain: its time, its kind, and what a search may find by luck."""
 STORING = 10.0
-"""What each hidden state that states fill must gain besides, and the choice among all states."""
+"""What each hidden state must gain besides where states fill one, with the choice among all that may."""
 CORRELATED = 16.0
 """What a correlated disturbance must gain, each: its size, its correlation time, and the choice of having one."""
 STEPPING = 12.0
@@ -90,5 +90,6 @@ def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], state
         STEPPING * (form == "increment" or form in EULER)
         + LAGGING * lagging
         + HIDING * bool(actuation.hidden)
-        + len(actuation.stored) * (STORING + 2.0 * float(log(2.0 * states * (1 + len(alike)))))
+        + bool(actuation.stored) * STORING * len(actuation.hidden)
+        + len(actuation.stored) * 2.0 * float(log(2.0 * states * (1 + len(alike))))
     )

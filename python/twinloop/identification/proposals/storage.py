@@ -29,6 +29,8 @@ TIMES = (0.02, 0.1, 0.5)
 """Times that are tried, in lengths of the longest run."""
 FINER = (2.0, 1.25)
 """Factors between times that are tried where a storage has shown."""
+STEPS = 4
+"""Such factors at most, one after the other."""
 NEAR = 2
 """Single states, the best ones, beside which another source is tried."""
 STORED = 50
@@ -56,10 +58,10 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 
 
 def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """The hypothesis, not fitted, with the best single storage, and with the best pair of each time; none that
-    does not pay at all.
+    """The hypothesis, not fitted, with the best storage of each kind; none that does not pay at all.
 
-    A pair describes what is linear whatever its time, which predictions alone tell.
+    Kinds are what one state fills, empty or settled at the start, and pairs of each time that is tried. A pair
+    describes what is linear whatever its time, which predictions alone tell.
 
     Args:
         context: of the identification.
@@ -68,17 +70,21 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
     screen = _Screen.of(context, hypothesis)
     longest = context.signals.dt * max(len(run.commands) for run in hypothesis.runs)
     times = [share * longest for share in TIMES]
-    alone = {
-        place: strongest([screen(single) for single in _single(place, times)]) for place in _sources(context)
+    singles = {
+        begins: [
+            strongest([screen(one) for one in _single(place, begins, times)]) for place in _sources(context)
+        ]
+        for begins in (False, True)
     }
-    order, without = sorted(alone, key=lambda place: alone[place].evidence.length)[:NEAR], screen(())
-    by_state = [alone[place] for place in order]
-    pairs = [
-        [screen(pair) for one in by_state for pair in _pairs(context, one, order, time)] for time in times
-    ]
-    for several in ([_timed(screen, one) for one in by_state], *pairs):
-        if several and (best := strongest(several)).evidence.beats(without.evidence):
-            yield _with_all_terms(context, screen, best)
+    best = [strongest(pair) for pair in zip(*singles.values(), strict=True)]
+    near, without = sorted(best, key=lambda one: one.evidence.length)[:NEAR], screen(())
+    others = [one.actuation.hidden[0].states[0] for one in near]
+    kinds: list[tuple[list[Hypothesis], Sequence[float]]] = [(found, FINER) for found in singles.values()]
+    for time in times:
+        kinds.append(([screen(pair) for one in near for pair in _pairs(context, one, others, time)], ()))
+    for several, factors in kinds:
+        if several and (found := strongest(several)).evidence.beats(without.evidence):
+            yield _with_all_terms(context, screen, _timed(screen, found, factors))
 
 
 def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -88,18 +94,19 @@ def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         yield replace(hypothesis, actuation=replace(actuation, actuators=direct.actuators))
 
 
-def _timed(screen: _Screen, best: Hypothesis) -> Hypothesis:
+def _timed(screen: _Screen, best: Hypothesis, factors: Sequence[float]) -> Hypothesis:
     """The hypothesis with hidden states of the time that is best near theirs."""
-    for factor in FINER:
-        moved = True
-        while moved:
+    for factor in factors:
+        for _ in range(STEPS):
             hidden = best.actuation.hidden
             beside = [
                 screen(tuple(one._replace(time=one.time * by) for one in hidden))
                 for by in (1.0 / factor, factor)
             ]
             found = strongest([best, *beside])
-            best, moved = found, found is not best
+            if found is best:
+                break
+            best = found
     return best
 
 
@@ -169,9 +176,9 @@ class _Screen:
         return replace(tried, sums=tuple(sums))
 
 
-def _single(place: int, times: Sequence[float]) -> Iterator[Sources]:
+def _single(place: int, settled: bool, times: Sequence[float]) -> Iterator[Sources]:
     """One state that fills a storage, which is empty at the start or settled."""
-    for settled, time in itertools.product((False, True), times):
+    for time in times:
         yield (HiddenState((), False, 0.0, time, (place,), settled),)
 
 
