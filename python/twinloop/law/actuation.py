@@ -55,13 +55,6 @@ class HiddenState(NamedTuple):
     states: tuple[int, ...] = ()
     settled: bool = False
 
-    def begun(self, level: Floats) -> Floats:
-        """What it holds at the start of a run under a first level, of any shape."""
-        full: Floats = (
-            self.time * (level - self.rest) if self.settled and self.rest is not None else 0.0 * level
-        )
-        return full
-
 
 @dataclass(frozen=True)
 class Actuation(Recorded, kind="actuation"):

@@ -96,7 +96,7 @@ class Twin(Shown, Recorded, kind="twin"):
         """Multiple of a state's scale at which that is, as records have it."""
         return self._limits.divergence_factor
 
-    VERSION = 4
+    VERSION = 5
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
