@@ -82,9 +82,17 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
     kinds: list[tuple[list[Hypothesis], Sequence[float]]] = [(found, FINER) for found in singles.values()]
     for time in times:
         kinds.append(([screen(pair) for one in near for pair in _pairs(context, one, others, time)], ()))
-    for several, factors in kinds:
-        if several and (found := strongest(several)).evidence.beats(without.evidence):
-            yield _with_all_terms(context, screen, _timed(screen, found, factors))
+    showing = [
+        (found, factors)
+        for found, factors in ((strongest(several), factors) for several, factors in kinds if several)
+        if found.evidence.beats(without.evidence)
+    ]
+    # Which one shows on the terms that there are; whether there is one, when all may change.
+    bare = _with_all_terms(context, screen, without) if showing else without
+    for found, factors in showing:
+        grown = _with_all_terms(context, screen, _timed(screen, found, factors))
+        if grown.evidence.beats(bare.evidence):
+            yield grown
 
 
 def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
