@@ -263,7 +263,10 @@ mod tests {
     #[test]
     fn what_fills_nothing_is_no_storage_and_what_does_not_fit_is_refused() {
         let by_commands = Hidden { commands: vec![0], states: vec![], ..filled_by_the_second(true, false) };
-        assert!(Storage::<Wide<f64, 2>>::new(&[by_commands.clone()], &[1.0], &TIMES, DT, true).is_none());
+        assert!(
+            Storage::<Wide<f64, 2>>::new(std::slice::from_ref(&by_commands), &[1.0], &TIMES, DT, true)
+                .is_none()
+        );
         assert!(by_commands.clone().validated(1, 2).is_ok());
         assert!(filled_by_the_second(true, true).validated(1, 2).is_ok());
         for wrong in [

@@ -107,7 +107,7 @@ def _hidden(state: Mapping[str, Any]) -> str:
     """A state that no sensor reads, in words."""
     what = "squares" if state["squared"] else "values"
     fading = f"forgotten to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "not forgotten"
-    sources = ", ".join((*state["commands"], *state["states"]))
+    sources = ", ".join((*state["commands"], *state.get("states", ())))
     return f"Hidden: the {what} of {sources} fill a state that no sensor reads; it is {fading}."
 
 
