@@ -14,8 +14,9 @@ _Counters = tuple[int, int, int, int, int, int]
 """Seed, iteration, generation, evaluations, spared offspring, generations with a capped archive."""
 _Actuator = tuple[float, int, float | None]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
-_Hidden = tuple[Sequence[int], bool, float | None, float]
-"""Commands, whether their squares fill it, their mean at rest (scaled; None: of the first period), and time (s)."""
+_Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool]
+"""Commands, whether squares fill it, the mean at rest (scaled; None: of the first period), time (s), states that fill
+it where no commands do, and whether a run begins with it settled."""
 _Motion = tuple[float, float, float]
 """Variance of a white disturbance, variance of a lasting one, time after which that is forgotten to 1/e (s)."""
 _Chain = tuple[Sequence[int], Sequence[float], _Motion, str]
@@ -270,7 +271,7 @@ class Model:
         """One a command; none at all where every command acts at once and nothing is hidden."""
     @property
     def hidden(self) -> list[_Hidden]:
-        """States that commands fill; inputs of the program after the commands."""
+        """States that commands fill, then those that states fill; inputs of the program after the commands."""
     @property
     def constants(self) -> _Floats:
         """Of the effective program, in its order."""

@@ -294,7 +294,7 @@ def calls(world):
             _core.command_effects,
             {
                 "actuators": w.actuators,
-                "hidden": [([0], True, None, 1.0)],
+                "hidden": [([0], True, None, 1.0, [], False)],
                 "scales": w.command_scales,
                 "dt": w.dt,
                 "commands": w.commands,

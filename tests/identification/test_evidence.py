@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, Evidence, price, strongest
+from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, STORING, Evidence, price, strongest
 from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -15,6 +15,9 @@ AT_ONCE, LATE = Actuation((Actuator(), Actuator())), Actuation((Actuator(), Actu
 BOTH_LATE = Actuation((Actuator(0.1), Actuator(0.1)))
 APART, TOGETHER = ((0,), (1,)), ((0, 1),)
 CLIMB = (HiddenState((0, 1), True, None, 2.0),)
+TWIST = HiddenState((), False, 0.0, 2.0, (1,))
+PUSHED = (HiddenState((0,), False, 0.0, 2.0), TWIST)
+STATES = 3
 
 
 @given(EVIDENCE, EVIDENCE, EVIDENCE)
@@ -67,16 +70,19 @@ def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
         ("acceleration", LATE, LAGGING),
         ("acceleration", Actuation(LATE.actuators, CLIMB), LAGGING + HIDING),
         ("increment", Actuation(AT_ONCE.actuators, CLIMB), STEPPING + HIDING),
+        # Two ways to begin, three states, two groups of commands or none beside them.
+        ("acceleration", Actuation(AT_ONCE.actuators, (TWIST,)), HIDING + STORING + 2.0 * np.log(18.0)),
+        ("acceleration", Actuation(AT_ONCE.actuators, PUSHED), HIDING + 2.0 * STORING + 2.0 * np.log(18.0)),
     ],
 )
 def test_what_is_there_beside_terms_is_paid_for(form, actuation, expected):
-    assert price(form, actuation, APART) == expected
+    assert price(form, actuation, APART, STATES) == pytest.approx(expected)
 
 
 def test_each_group_of_commands_that_lags_pays_and_commands_of_one_group_pay_once():
-    assert price("acceleration", BOTH_LATE, APART) == 2 * LAGGING
-    assert price("acceleration", BOTH_LATE, TOGETHER) == LAGGING
-    assert price("acceleration", LATE, TOGETHER) == LAGGING
+    assert price("acceleration", BOTH_LATE, APART, STATES) == 2 * LAGGING
+    assert price("acceleration", BOTH_LATE, TOGETHER, STATES) == LAGGING
+    assert price("acceleration", LATE, TOGETHER, STATES) == LAGGING
 
 
 def test_rounding_alone_decides_nothing():

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from law_twins import SIGNALS, TWINS
+from law_twins import SIGNALS, TWINS, stored_twin
 from twinloop.law.accuracy import TestErrors
 from twinloop.law.noise import CorrelatedDisturbance, Noise
 
@@ -34,8 +34,9 @@ print(json.dumps({**found, "equations": twin.equations(17)}))
 
 def write(folder=FOLDER):
     """Saves twins of all kinds with the records at hand, and what they simulate."""
-    for which, name in (("actuators and hidden states", "hidden"), ("kinematics", "body")):
-        bare = TWINS[which]()
+    hidden, body = TWINS["actuators and hidden states"], TWINS["kinematics"]
+    for make, name in ((hidden, "hidden"), (body, "body"), (stored_twin, "stored")):
+        bare = make()
         low, high = np.array([command.bounds for command in bare.signals.commands]).T
         shares = np.modf(0.3819660112501051 * np.arange(1, STEPS * len(low) + 1))[0].reshape(STEPS, -1)
         run = bare.simulate_commands(np.full(bare.signals.n_x, 0.125), low + (high - low) * shares)
@@ -63,7 +64,7 @@ def write(folder=FOLDER):
 
 
 def test_the_records_at_hand_are_kept_for_later_versions():
-    assert {f"version-{tl.Twin.VERSION}-{name}" for name in ("hidden", "body")} <= {
+    assert {f"version-{tl.Twin.VERSION}-{name}" for name in ("hidden", "body", "stored")} <= {
         path.stem for path in SAVED
     }
 

@@ -1,9 +1,9 @@
 //! Actuation: what stands between commands and a model. Each command has an actuator with a delay and a first-order
-//! lag; hidden states that commands fill may follow.
+//! lag; hidden states that commands fill may follow, and after these some that states fill.
 
 use crate::error::{Result, invalid};
 use crate::hidden::{Filling, Hidden};
-use crate::lanes::{Vector, numbers, vectors, zeros};
+use crate::lanes::{Vector, vectors, zeros};
 
 /// The way from one command to its effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,13 +45,13 @@ impl Actuator {
 pub struct Actuation {
     /// One a command, or none at all where every command acts at once and nothing is hidden.
     pub actuators: Vec<Actuator>,
-    /// States that commands fill.
+    /// States that commands fill, then those that other states fill.
     pub hidden: Vec<Hidden>,
 }
 
 impl Actuation {
-    /// Refuses parts that do not fit so many commands.
-    pub fn validated(self, commands: usize) -> Result<Self> {
+    /// Refuses parts that do not fit so many commands and states.
+    pub fn validated(self, commands: usize, states: usize) -> Result<Self> {
         if self.actuators.len() != commands {
             return invalid(format!(
                 "actuators: expected one for each of {commands} commands, found {}",
@@ -59,8 +59,14 @@ impl Actuation {
             ));
         }
         let actuators = self.actuators.into_iter().map(Actuator::validated).collect::<Result<Vec<_>>>()?;
-        let hidden: Vec<_> =
-            self.hidden.into_iter().map(|hidden| hidden.validated(commands)).collect::<Result<_>>()?;
+        let hidden: Vec<_> = self
+            .hidden
+            .into_iter()
+            .map(|hidden| hidden.validated(commands, states))
+            .collect::<Result<_>>()?;
+        if !hidden.is_sorted_by_key(Hidden::moves) {
+            return invalid("hidden states: expected those that commands fill before those that states fill");
+        }
         let direct = hidden.is_empty() && actuators.iter().all(Actuator::is_direct);
         Ok(Self { actuators: if direct { vec![] } else { actuators }, hidden })
     }
@@ -76,6 +82,11 @@ impl Actuation {
         lags.chain(self.hidden.iter().map(|hidden| hidden.time)).collect()
     }
 
+    /// The same, each on so many lanes, lane by lane.
+    pub fn times_on(&self, lanes: usize) -> Vec<f64> {
+        self.times().into_iter().flat_map(|time| vec![time; lanes]).collect()
+    }
+
     /// The same with other lags and times.
     pub fn with_times(&self, times: &[f64]) -> Result<Self> {
         if times.len() != self.actuators.len() + self.hidden.len() {
@@ -89,7 +100,7 @@ impl Actuation {
         let (lags, rest) = times.split_at(self.actuators.len());
         other.actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
         other.hidden.iter_mut().zip(rest).for_each(|(hidden, &time)| hidden.time = time);
-        if self.is_direct() { Ok(other) } else { other.validated(self.actuators.len()) }
+        if self.is_direct() { Ok(other) } else { other.validated(self.actuators.len(), usize::MAX) }
     }
 }
 
@@ -110,24 +121,22 @@ pub struct Line<V> {
 }
 
 impl<V: Vector> Line<V> {
-    /// Actuation at the start of a run, of commands in units of 1 / `factors`. `times` (lanes) stand in for its own,
-    /// where they are given.
-    pub fn new(actuation: &Actuation, factors: &[f64], dt: f64, times: Option<&[V]>) -> Self {
+    /// Actuation at the start of a run, of commands in units of 1 / `factors`, with its times lane by lane.
+    pub fn new(actuation: &Actuation, factors: &[f64], dt: f64, times: &[f64]) -> Self {
         let Actuation { actuators, hidden } = actuation;
         let commands = actuators.len();
         // Lane by lane: there is one line a run, and arithmetic on vectors would be compiled for each of them.
-        let lanes: Vec<f64> = match times {
-            Some(times) => numbers(times),
-            None => actuation.times().into_iter().flat_map(|time| vec![time; V::LANES]).collect(),
-        };
-        let (decays, gains) = fading(&lanes, dt);
+        let (decays, gains) = fading(times, dt);
         let (decays, gains): (Vec<V>, Vec<V>) = (vectors(&decays), vectors(&gains));
-        let effects = || zeros(decays.len());
+        let effects = || zeros(commands + filled_by_commands(hidden).count());
         Self {
             memory: zeros(commands),
             effects: [effects(), effects(), effects()],
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
-            hidden: (commands..).zip(hidden).map(|(i, one)| Filling::new(one, decays[i], gains[i])).collect(),
+            hidden: (commands..)
+                .zip(filled_by_commands(hidden))
+                .map(|(i, one)| Filling::new(one, decays[i], gains[i]))
+                .collect(),
             halves: decays,
             factors: factors.to_vec(),
             actuators: actuators.clone(),
@@ -173,6 +182,11 @@ impl<V: Vector> Line<V> {
     }
 }
 
+/// The hidden states that commands fill; those that states fill come after them.
+fn filled_by_commands(hidden: &[Hidden]) -> impl Iterator<Item = &Hidden> {
+    hidden.iter().take_while(|one| !one.moves())
+}
+
 /// For each time constant: the decay over half a period, e^(−dt / 2 time) or 0 for a time of 0, and the gain of its input.
 fn fading(times: &[f64], dt: f64) -> (Vec<f64>, Vec<f64>) {
     let decay = |&time: &f64| if time > 0.0 { libm::exp(-0.5 * dt / time) } else { 0.0 };
@@ -183,7 +197,7 @@ fn fading(times: &[f64], dt: f64) -> (Vec<f64>, Vec<f64>) {
 /// period (n × (n_u + hidden) each). Every command has its actuator.
 pub fn effects(actuation: &Actuation, factors: &[f64], dt: f64, commands: &[f64]) -> [Vec<f64>; 3] {
     use crate::lanes::Scalar;
-    let mut line = Line::<Scalar>::new(actuation, factors, dt, None);
+    let mut line = Line::<Scalar>::new(actuation, factors, dt, &actuation.times());
     let mut out = [vec![], vec![], vec![]];
     for command in commands.chunks_exact(actuation.actuators.len().max(1)) {
         line.pass(&command.iter().map(|&value| Scalar::splat(value)).collect::<Vec<_>>());
@@ -214,7 +228,7 @@ pub fn checked_effects(
     let factors: Vec<f64> = scales.iter().map(|scale| 1.0 / scale).collect();
     // Actuators that all act at once are kept: here they only pass commands on.
     let actuators = actuation.actuators.clone();
-    let checked = Actuation { actuators, ..actuation.validated(n_u)? };
+    let checked = Actuation { actuators, ..actuation.validated(n_u, 0)? };
     let columns = n_u + checked.hidden.len();
     Ok((effects(&checked, &factors, dt, commands), columns))
 }
@@ -257,7 +271,14 @@ mod tests {
     fn a_hidden_state_fills_and_fades_as_its_equation_says() {
         let (time, dt, scale) = (0.3, 0.02, 2.0);
         for squared in [false, true] {
-            let hidden = Hidden { commands: vec![0, 1], squared, rest: Some(0.25), time };
+            let hidden = Hidden {
+                commands: vec![0, 1],
+                states: vec![],
+                squared,
+                rest: Some(0.25),
+                settled: false,
+                time,
+            };
             let actuation = Actuation { actuators: vec![Actuator::DIRECT; 2], hidden: vec![hidden] };
             // Ten periods of 3 and 1, then ten at rest.
             let (full, rest): (f64, f64) = if squared { (1.25, 0.5) } else { (1.0, 0.25) };
@@ -280,17 +301,24 @@ mod tests {
 
     #[test]
     fn parts_that_fit_no_commands_are_refused() {
-        let hidden = |commands: Vec<usize>, time: f64| Hidden { commands, squared: true, rest: None, time };
+        let hidden = |commands: Vec<usize>, time: f64| Hidden {
+            commands,
+            states: vec![],
+            squared: true,
+            rest: None,
+            settled: false,
+            time,
+        };
         for wrong in
             [hidden(vec![], 1.0), hidden(vec![1], 1.0), hidden(vec![0], 0.0), hidden(vec![0], f64::NAN)]
         {
             let actuation = Actuation { actuators: vec![Actuator::DIRECT], hidden: vec![wrong] };
-            assert!(actuation.validated(1).is_err());
+            assert!(actuation.validated(1, 1).is_err());
         }
-        let direct = of(Actuator::DIRECT).validated(1).unwrap();
+        let direct = of(Actuator::DIRECT).validated(1, 1).unwrap();
         assert!(direct.is_direct() && direct.times().is_empty());
         let right = Actuation { actuators: vec![Actuator::DIRECT], hidden: vec![hidden(vec![0], 1.0)] };
-        let right = right.validated(1).unwrap();
+        let right = right.validated(1, 1).unwrap();
         assert_eq!(right.with_times(&[0.0, 2.0]).unwrap().times(), [0.0, 2.0]);
         assert!(right.with_times(&[0.0]).is_err());
     }

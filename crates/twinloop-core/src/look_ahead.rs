@@ -170,7 +170,9 @@ impl LookAhead {
         );
         let command = scalars(command);
         for (model, workspace) in self.members.iter().zip(&mut self.workspaces) {
-            model.view().remember(workspace, &command);
+            let model = model.view();
+            let state = model.state_of(&scalars(reading));
+            model.pass(workspace, &state, &command);
         }
         self.period += 1;
         Ok(())

@@ -10,8 +10,9 @@ from twinloop._experiment.envelope import readings_leave
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
+from twinloop.law.actuation import HiddenState
 from twinloop.objectives import normalised_error
-from twinloop.records import Recorded
+from twinloop.records import Record, Recorded
 from twinloop.remarks import Remark
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -166,6 +167,10 @@ class Planned(Recorded, kind="planned"):
     flown: float | None = None
 
 
+def _of_four(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 4
+
+
 @dataclass(frozen=True)
 class Lesson(Recorded, kind="lesson"):
     """One identification of the preset `default`, and the tests planned after it.
@@ -181,8 +186,8 @@ class Lesson(Recorded, kind="lesson"):
         sensors: standard deviation of each state's sensor, estimated, in its unit.
         lags: time constant of each command's actuator, s.
         delays: of each command's actuator, periods.
-        hidden: states that commands drive: which commands, whether squared, the mean at rest in units of their scale
-            (None: that of the first period), and the time constant in s.
+        hidden: unmeasured states: which commands or states drive each, whether squared, the mean at rest in units of
+            their scale (None: that of the first period), the time constant in s, and how it begins.
         offsets: delay of each state's readings against those of the driven states, s.
         closed_loop: of the best model, one for each selected test, SI units squared; infinite where it diverges.
         normalised: closed_loop over that of the model that never moves.
@@ -205,7 +210,7 @@ class Lesson(Recorded, kind="lesson"):
     sensors: tuple[float, ...]
     lags: tuple[float, ...]
     delays: tuple[int, ...]
-    hidden: tuple[tuple[tuple[int, ...], bool, float | None, float], ...]
+    hidden: tuple[HiddenState, ...]
     offsets: tuple[float, ...]
     closed_loop: tuple[float, ...]
     normalised: tuple[float, ...]
@@ -214,6 +219,20 @@ class Lesson(Recorded, kind="lesson"):
     recurring: tuple[str, ...] = ()
     undecided: tuple[str, ...] = ()
     asked: tuple[Planned, ...] = ()
+
+    VERSION = 2
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version, in which commands alone filled hidden states, that had no names."""
+        found = super().renewed(record)
+        hidden = found.get("hidden")
+        if isinstance(hidden, list):
+            found["hidden"] = [
+                dict(zip(HiddenState._fields, [*one, [], False], strict=True)) if _of_four(one) else one
+                for one in hidden
+            ]
+        return found
 
     def cause(self, state: str) -> Cause:
         """What causes the correlated disturbance of a state, by its name."""

@@ -231,12 +231,14 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) 
         ],
         "hidden": [
             {
-                "commands": [campaign.signals.commands[i].name for i in commands],
-                "squared": squared,
-                "rest": rest,
-                "time": time,
+                "commands": [campaign.signals.command_names[i] for i in hidden.commands],
+                "squared": hidden.squared,
+                "rest": hidden.rest,
+                "time": hidden.time,
+                "states": [campaign.signals.state_names[i] for i in hidden.states],
+                "settled": hidden.settled,
             }
-            for commands, squared, rest, time in lesson.hidden
+            for hidden in lesson.hidden
         ],
         "disturbances": [dataclasses.asdict(each) for each in disturbances(twin, lesson)],
         "remarks": [

@@ -70,6 +70,11 @@ class Context:
         return self.options.hidden and len(self.runs) > 1
 
     @property
+    def may_store(self) -> bool:
+        """Whether a hidden state that motion fills is looked for; not in one run, as any other."""
+        return self.options.storage and len(self.runs) > 1
+
+    @property
     def known_terms(self) -> list[int]:
         """Terms of what was learnt earlier."""
         return [] if self.earlier is None else [node for found in self.earlier.sums for node in found.weights]

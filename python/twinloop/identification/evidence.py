@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from twinloop._ground.elementary import log
 from twinloop.identification.search.description import shorter
 from twinloop.law.actuation import Actuation
 from twinloop.law.forms import EULER
@@ -14,6 +15,8 @@ LAGGING = 12.0
 """What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
 HIDING = 30.0
 """What a hidden state must gain: its time, its kind, and what a search may find by luck."""
+STORING = 10.0
+"""What each hidden state must gain besides where states fill one, with the choice among all that may."""
 CORRELATED = 16.0
 """What a correlated disturbance must gain, each: its size, its correlation time, and the choice of having one."""
 STEPPING = 12.0
@@ -73,17 +76,20 @@ def strongest(hypotheses: Iterable[Hypotheses]) -> Hypotheses:
     return best
 
 
-def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]]) -> float:
+def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], states: int) -> float:
     """What a hypothesis pays for besides its terms and its disturbances, in units of χ².
 
     Args:
         form: what its outputs mean.
         actuation: between commands and its law.
         alike: groups of commands; those of a group share one lag and one delay, and pay for them once.
+        states: how many may fill a hidden state, empty or settled at the start, beside a group of commands or none.
     """
     lagging = sum(any(not actuation.actuators[i].direct for i in group) for group in alike)
     return (
         STEPPING * (form == "increment" or form in EULER)
         + LAGGING * lagging
         + HIDING * bool(actuation.hidden)
+        + bool(actuation.stored) * STORING * len(actuation.hidden)
+        + len(actuation.stored) * 2.0 * float(log(2.0 * states * (1 + len(alike))))
     )

@@ -142,8 +142,8 @@ def brief_look(
         first = with_offsets(brief, first)
     if known is not None:
         first = replace(first, actuation=known.actuation)
-        if known.actuation.hidden:
-            first = replace(first, candidates=with_hidden(brief, first.candidates))
+        if hidden := known.actuation.hidden:
+            first = replace(first, candidates=with_hidden(brief, first.candidates, len(hidden)))
     found = climbed(brief, from_both_sides(brief, first))
     for calmer in undisturbed(brief, found, CALMER):
         found = calmer

@@ -56,7 +56,7 @@ class Hypothesis(Recorded, kind="hypothesis"):
         offsets: by how much later than those of the driven states each state's readings were taken from it (n_x,), s.
         runs: the records as they are read under it: moved by the offsets, with outliers weighed 0, and with the states
             that features are made of, once a model has smoothed them.
-        actuation: lags, delays and hidden states between commands and the law.
+        actuation: lags, delays and hidden states of the law.
         alike: groups of commands that share a lag and a delay.
         candidates: the terms to choose from.
         driven: chains that outputs drive, with a first guess of their noise.
@@ -100,10 +100,10 @@ class Hypothesis(Recorded, kind="hypothesis"):
     def evidence(self) -> Evidence:
         """What the readings say for it."""
         if self.fit is not None:
-            length = self.fit.length + price(self.form, self.actuation, self.alike)
+            length = self.fit.length + price(self.form, self.actuation, self.alike, len(self.offsets))
             return Evidence(fitted=True, stable=self.fit.stable, smoothed=False, length=length)
         correlated = CORRELATED * sum(found.chain.motion.correlated > 0.0 for found in self.sums)
-        length = self.length + correlated + price(self.form, self.actuation, self.alike)
+        length = self.length + correlated + price(self.form, self.actuation, self.alike, len(self.offsets))
         return Evidence(fitted=False, stable=True, smoothed=self.smoothed, length=length)
 
     def next_unit(self, unit: Unit) -> Unit:

@@ -30,6 +30,7 @@ from twinloop.identification.proposals.hidden import hidden
 from twinloop.identification.proposals.lags import lags
 from twinloop.identification.proposals.parts import parts
 from twinloop.identification.proposals.second_look import second_look
+from twinloop.identification.proposals.storage import storage
 from twinloop.identification.proposals.terms import terms
 from twinloop.identification.proposals.undisturbed import undisturbed
 from twinloop.identification.records import Run
@@ -43,7 +44,7 @@ from twinloop.signals import Signals
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
 PROPOSALS: tuple[Proposal, ...] = (
-    lags, hidden, terms, undisturbed, apart, friction, contacts, second_look, parts, at_once,
+    lags, hidden, terms, undisturbed, apart, storage, friction, contacts, second_look, parts, at_once,
 )  # fmt: skip
 """In the order in which they are made."""
 

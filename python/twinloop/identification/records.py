@@ -10,7 +10,8 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.identification.interpolation import FALLS, FEWEST, integration_error, middles, points, segments
-from twinloop.law.actuation import Actuation
+from twinloop.identification.stored import stored
+from twinloop.law.actuation import Actuation, HiddenState
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -68,6 +69,19 @@ class Stages:
     runs: tuple[slice, ...]
     integration: Floats
 
+    def storing(self, hidden: Sequence[HiddenState], signals: Signals) -> Stages:
+        """The same with hidden states that states fill behind its inputs."""
+        found = self
+        for one in hidden:
+            start, middle, end = stored(one, (self.start, self.middle, self.end), self.runs, signals)
+            found = replace(
+                found,
+                start=np.column_stack([found.start, start]),
+                middle=np.column_stack([found.middle, middle]),
+                end=np.column_stack([found.end, end]),
+            )
+        return found
+
 
 def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stages:
     """What a model sees within each period: states, effects of commands in units of their scale, hidden states.
@@ -107,7 +121,8 @@ def stages(runs: Sequence[Run], signals: Signals, actuation: Actuation) -> Stage
         first += len(before)
     start, middle, end = (np.concatenate(stage) for stage in zip(*parts, strict=True))
     noise = guessed_noise(runs, np.array([state.scale for state in signals.states]))
-    return Stages(start, middle, end, tuple(slices), integration_error(pieces, noise))
+    found = Stages(start, middle, end, tuple(slices), integration_error(pieces, noise))
+    return found.storing(actuation.stored, signals)
 
 
 def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:

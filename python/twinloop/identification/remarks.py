@@ -21,14 +21,16 @@ TWINS = 4.0
 """Description length within which two laws are equally good."""
 
 
-def symbols_of(signals: Signals) -> list[str]:
-    """What the inputs of a model are called in remarks: states, commands, a hidden state."""
-    return [*signals.state_names, *signals.command_names, *hidden_names(signals, 1)]
+def symbols_of(signals: Signals, pool: Pool, sums: Sequence[Sum]) -> list[str]:
+    """What the inputs of a model are called in remarks: states, commands, the hidden states of some sums."""
+    terms = {term for found in sums for subset in found.subsets for term in subset.terms}
+    hidden = max((pool.reach(term) - pool.inputs for term in terms), default=0)
+    return [*signals.state_names, *signals.command_names, *hidden_names(signals, max(1, hidden))]
 
 
 def identities(found: Sum, pool: Pool, signals: Signals) -> list[Remark]:
     """The nearest other law that the runs cannot tell from this one: an identity that held on them."""
-    symbols = symbols_of(signals)
+    symbols = symbols_of(signals, pool, [found])
     driven = signals.state_names[found.chain.states[0]]
     ours = set(found.weights)
     for subset, above in found.others:
@@ -61,7 +63,7 @@ def held_at_bounds(
     Returns:
         One a constant that is at a bound.
     """
-    symbols = symbols_of(signals)
+    symbols = symbols_of(signals, pool, sums)
     said = []
     for found in sums:
         state = found.chain.states[0]

@@ -66,6 +66,7 @@ class IdentificationOptions:
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
             replaced them.
         hidden: whether a hidden state is searched that commands drive and that decays, such as a climb or heat.
+        storage: whether hidden states are searched that measured states drive, such as the twist of a joint.
         offsets: whether sensors may be late or early against those of the driven states.
         cleaning: whether single wrong readings are ignored before anything is learnt.
         outliers: whether readings far from the predictions of a tuned model are ignored.
@@ -114,6 +115,7 @@ class IdentificationOptions:
     apart: bool = True
     longest_delay: int = 2
     hidden: bool = True
+    storage: bool = True
     offsets: bool = True
     cleaning: bool = True
     outliers: bool = True
@@ -149,6 +151,7 @@ class IdentificationOptions:
             contacts=False,
             friction=False,
             hidden=False,
+            storage=False,
             parts=False,
         )
 

@@ -106,12 +106,12 @@ def anew(context: Context, aligned: Hypothesis) -> Hypothesis:
 
 def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothesis:
     """What was known, with its lags and its hidden state, tuned on all runs."""
-    candidates = aligned.candidates
+    candidates, hidden = aligned.candidates, known.actuation.hidden
     begins = replace(
         aligned,
         actuation=known.actuation,
         alike=alike_commands(context.signals, known.actuation),
-        candidates=with_hidden(context, candidates) if known.actuation.hidden else candidates,
+        candidates=with_hidden(context, candidates, len(hidden)) if hidden else candidates,
         sums=tuple(replace(found, others=[]) for found in known.sums),
         start=RENEWED,
     )

@@ -1,4 +1,4 @@
-"""What stands between commands and a law: actuators that lag or delay, and hidden states that commands drive."""
+"""What stands between commands and a law: actuators that lag or delay; hidden states that commands or states drive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.records import Recorded
+from twinloop.records import Record, Recorded
 from twinloop.signals import Signals
 
 
@@ -34,21 +34,26 @@ class Actuator(NamedTuple):
 
 
 class HiddenState(NamedTuple):
-    """An unmeasured state h that commands drive: dh/dt = level − rest − h / time, 0 at the start of a run.
+    """An unmeasured state h that commands or states drive: dh/dt = level − rest − h / time.
 
-    The level is the mean over its commands of what each gives, in units of its scale.
+    The level is the mean over its sources of what each gives, in units of its scale. h is 0 at the start of a run, or
+    what it settles at under the first level.
 
     Args:
-        commands: places of those that fill it.
-        squared: whether they do so with their squares.
-        rest: level at which it neither fills nor empties; None: that of the first period.
+        commands: places of those that fill it; none where states do.
+        squared: whether its sources fill it with their squares.
+        rest: level at which it neither fills nor empties; None, of commands alone: that of the first period.
         time: after which 1/e of it is left, s.
+        states: places of the states that fill it; none where commands do.
+        settled: whether a run begins with it settled at what fills it then; only where states fill it.
     """
 
     commands: tuple[int, ...]
     squared: bool
     rest: float | None
     time: float
+    states: tuple[int, ...] = ()
+    settled: bool = False
 
 
 @dataclass(frozen=True)
@@ -57,9 +62,10 @@ class Actuation(Recorded, kind="actuation"):
 
     Args:
         actuators: one a command.
-        hidden: states that commands drive.
+        hidden: states that commands drive, then those that other states drive.
     """
 
+    VERSION = 2
     actuators: tuple[Actuator, ...]
     hidden: tuple[HiddenState, ...] = ()
 
@@ -73,13 +79,32 @@ class Actuation(Recorded, kind="actuation"):
         """That of a model, with an actuator for each command even where all act at once."""
         if not model.actuators:
             return Actuation.direct(signals)
-        hidden = (HiddenState(tuple(of), squared, rest, time) for of, squared, rest, time in model.hidden)
+        hidden = (
+            HiddenState(tuple(commands), squared, rest, time, tuple(states), settled)
+            for commands, squared, rest, time, states, settled in model.hidden
+        )
         return Actuation(tuple(Actuator(*actuator) for actuator in model.actuators), tuple(hidden))
 
     def effects(self, signals: Signals, commands: Floats) -> list[Floats]:
-        """What arrives of commands (n, n_u), then hidden states, at the start, middle and end of each period."""
+        """What arrives of commands (n, n_u), then hidden states that they fill, within each period."""
         scales = np.array([command.size for command in signals.commands])
-        return _core.command_effects(self.actuators, self.hidden, scales, signals.dt, commands)
+        filled = [state for state in self.hidden if not state.states]
+        return _core.command_effects(self.actuators, filled, scales, signals.dt, commands)
+
+    @property
+    def stored(self) -> tuple[HiddenState, ...]:
+        """Hidden states that states fill."""
+        return tuple(state for state in self.hidden if state.states)
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version, in which commands alone filled hidden states."""
+        found = super().renewed(record)
+        hidden = found.get("hidden")
+        if isinstance(hidden, list):
+            by_commands = {"states": [], "settled": False}
+            found["hidden"] = [{**by_commands, **one} if isinstance(one, dict) else one for one in hidden]
+        return found
 
     def at_once(self, commands: Sequence[int]) -> Actuation:
         """The same with some commands that act at once."""

@@ -220,12 +220,19 @@ class _Page:
         return ", ".join(f"± {sd:.2g}" for sd in varying_in(every, node, self.writer.names))
 
     def _filling(self, name: str, number: int) -> list[str]:
-        """The equation of a hidden state that commands drive."""
+        """The equation of a hidden state that commands or states drive."""
         hidden = self.law.actuation.hidden[number]
-        symbols = [self.law.command_symbols[place] + "**2" * hidden.squared for place in hidden.commands]
+        symbols = [self.law.command_symbols[place] for place in hidden.commands]
+        for state in (self.signals.states[place] for place in hidden.states):
+            symbols.append(
+                state.name if state.scale == 1.0 else f"({state.name}/{self.writer.number(state.scale)})"
+            )
+        symbols = [symbol + "**2" * hidden.squared for symbol in symbols]
         share = len(symbols)
         given = [("+", symbol if share == 1 else f"{symbol}/{share}") for symbol in symbols]
         start = "from 0 at the start"
+        if hidden.settled:
+            start = "as it settles under what fills it at the start"
         if hidden.rest is None:
             rest = f"{name}_rest"
             start += f"; {rest}: the terms before it in the first period"
@@ -234,7 +241,8 @@ class _Page:
         times = [member.actuation.hidden[number].time for member in self.members if self._alike(member)]
         deviation = self._deviation(times)
         note = f"{start}; its time {self.writer.number(hidden.time)}{deviation} s" if deviation else start
-        terms = [*given, ("-", rest), ("-", f"{name}/{self.writer.number(hidden.time)}")]
+        emptied = [] if hidden.states and hidden.rest == 0.0 else [("-", rest)]
+        terms = [*given, *emptied, ("-", f"{name}/{self.writer.number(hidden.time)}")]
         return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
 
     def _alike(self, member: Law) -> bool:

@@ -17,7 +17,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, floats, number
 from twinloop._ground.showing import Shown
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
 from twinloop.law.equations import equations
 from twinloop.law.exports.environment import Reward, environment
@@ -96,7 +96,7 @@ class Twin(Shown, Recorded, kind="twin"):
         """Multiple of a state's scale at which that is, as records have it."""
         return self._limits.divergence_factor
 
-    VERSION = 4
+    VERSION = 5
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
@@ -334,7 +334,13 @@ class Twin(Shown, Recorded, kind="twin"):
 
         Raises:
             InvalidInput: shapes that do not fit.
+            NotAvailable: a past of a law whose hidden states are filled by motion, which commands do not tell.
         """
+        if past is not None and self.law.actuation.stored:
+            raise NotAvailable(
+                "Twin.predict, past: expected a law whose memory earlier commands tell, found a hidden state that"
+                " motion fills; run it from the start with simulate_commands."
+            )
         single = np.ndim(states) == 1
         x = floats("States", np.atleast_2d(states), (None, self.signals.n_x))
         u = floats("Commands", np.atleast_2d(commands), (len(x), self.signals.n_u))
@@ -382,7 +388,7 @@ class Twin(Shown, Recorded, kind="twin"):
     def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
         """The twin around a point, by exact derivatives of its equations.
 
-        Actuators are at rest under the command of the point, hidden states are 0.
+        Actuators are at rest under the command of the point; hidden states are 0, or where the state settles them.
 
         Args:
             at: state (n_x,), SI units, radians.

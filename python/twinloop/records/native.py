@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from twinloop import _core
@@ -18,6 +19,7 @@ from twinloop.records.reading import (
 MODEL_KEYS = ("program", "form", "actuators", "hidden")
 ACTUATOR_KEYS = ("lag", "delay", "rest")
 HIDDEN_KEYS = ("commands", "squared", "rest", "time")
+MOTION_KEYS = ("states", "settled")
 
 
 def read_program(value: object, where: str) -> _core.Program:
@@ -33,7 +35,7 @@ def model_record(model: _core.Model) -> dict[str, Any]:
         "program": str(model.program),
         "form": model.form,
         "actuators": [dict(zip(ACTUATOR_KEYS, actuator, strict=True)) for actuator in model.actuators],
-        "hidden": [dict(zip(HIDDEN_KEYS, hidden, strict=True)) for hidden in model.hidden],
+        "hidden": [_hidden_record(*hidden) for hidden in model.hidden],
     }
     return record | {"offsets": model.offsets} if model.offsets else record
 
@@ -71,16 +73,29 @@ def _actuator(value: object, where: str) -> tuple[float, int, float | None]:
     return read_number(found["lag"], f"{where}.lag"), _count(delay, where), _rest(found["rest"], where)
 
 
-def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, float]:
-    found = keys(value, HIDDEN_KEYS, where)
-    commands = [
-        _count(read_whole(item, where), where) for item in read_list(found["commands"], f"{where}.commands")
-    ]
-    squared, time = (
-        read_flag(found["squared"], f"{where}.squared"),
-        read_number(found["time"], f"{where}.time"),
-    )
-    return commands, squared, _rest(found["rest"], where), time
+def _hidden_record(
+    commands: Sequence[int],
+    squared: bool,
+    rest: float | None,
+    time: float,
+    states: Sequence[int],
+    settled: bool,
+) -> dict[str, Any]:
+    """A hidden state; one that commands fill as every version has written it."""
+    record = dict(zip(HIDDEN_KEYS, (list(commands), squared, rest, time), strict=True))
+    return record | dict(zip(MOTION_KEYS, (list(states), settled), strict=True)) if states else record
+
+
+def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, float, list[int], bool]:
+    found = keys(value, HIDDEN_KEYS, where, optional=MOTION_KEYS)
+
+    def places(key: str) -> list[int]:
+        items = read_list(found.get(key, []), f"{where}.{key}")
+        return [_count(read_whole(item, where), where) for item in items]
+
+    squared, settled = (read_flag(found.get(key, False), f"{where}.{key}") for key in ("squared", "settled"))
+    time = read_number(found["time"], f"{where}.time")
+    return places("commands"), squared, _rest(found["rest"], where), time, places("states"), settled
 
 
 def _rest(value: object, where: str) -> float | None:

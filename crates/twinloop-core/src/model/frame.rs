@@ -76,6 +76,8 @@ pub struct Frame {
     commands: usize,
     /// What the inputs of a program after the states are multiplied by: commands, then hidden states.
     pub(super) factors: Vec<f64>,
+    /// One over the scale of each state, for the hidden states that they fill.
+    pub(super) state_factors: Vec<f64>,
     pub(super) slopes: Vec<Slope>,
     pub(super) given: Vec<Given>,
     pub(super) body: Option<RigidBody>,
@@ -91,15 +93,29 @@ impl Frame {
         let slopes: Vec<_> = slopes(signals).collect();
         let given = in_order(&slopes, signals.kinematics.as_ref());
         let factors: Vec<f64> = signals.command_scales.iter().map(|scale| 1.0 / scale).collect();
+        let state_factors = signals.state_scales.iter().map(|scale| 1.0 / scale).collect();
         let (commands, actuation) = (factors.len(), Actuation::default());
         let (body, periods) = (signals.kinematics, signals.periods.clone());
         let (dt, substeps, sensors) = (signals.dt, signals.substeps(), Sensors::default());
-        Self { form, dt, substeps, commands, factors, slopes, given, body, periods, actuation, sensors }
+        Self {
+            form,
+            dt,
+            substeps,
+            commands,
+            factors,
+            state_factors,
+            slopes,
+            given,
+            body,
+            periods,
+            actuation,
+            sensors,
+        }
     }
 
     /// The same with something between commands and model, an actuator for each command.
     pub fn with_actuation(self, actuation: Actuation) -> Result<Self> {
-        let actuation = actuation.validated(self.commands)?;
+        let actuation = actuation.validated(self.commands, self.slopes.len())?;
         let mut factors = self.factors;
         // Hidden states are made of commands in units of their scales.
         factors.resize(self.commands + actuation.hidden.len(), 1.0);

@@ -2,6 +2,7 @@
 
 use super::Model;
 use super::frame::Slope;
+use crate::hidden::Storage;
 use crate::integrator::Field;
 use crate::lanes::Vector;
 use crate::lgp::Bank;
@@ -10,6 +11,7 @@ use crate::lgp::Bank;
 pub(super) struct Held<'a, V> {
     pub model: &'a Model<'a>,
     pub bank: &'a mut Bank<V>,
+    pub storage: &'a mut Option<Box<Storage<V>>>,
     pub effects: [&'a [V]; 3],
     pub stage: usize,
 }
@@ -20,7 +22,7 @@ const STAGES: [usize; 4] = [0, 1, 1, 2];
 impl<V: Vector> Field<V> for Held<'_, V> {
     #[inline(always)]
     fn slope(&mut self, states: &[V], slope: &mut [V]) {
-        let outputs = self.model.outputs(self.bank, states, self.effects[STAGES[self.stage]]);
+        let outputs = self.model.outputs(self.bank, self.storage, states, self.effects[STAGES[self.stage]]);
         self.stage += 1;
         let still = V::splat(0.0);
         for (slope, source) in slope.iter_mut().zip(&self.model.frame.slopes) {

@@ -17,8 +17,9 @@ use std::borrow::Cow;
 use crate::actuators::Line;
 use crate::dynamics::{Dynamics, step_apart};
 use crate::error::{Result, invalid};
+use crate::hidden::Storage;
 use crate::integrator::{Stages, rk4};
-use crate::lanes::{Vector, vectors, zeros};
+use crate::lanes::{Vector, numbers, vectors, zeros};
 use crate::lgp::{Bank, Code, Program};
 use crate::sensors::Recent;
 use crate::signals::Signals;
@@ -72,6 +73,15 @@ impl<'a> Model<'a> {
         Cow::Owned(state)
     }
 
+    /// Moves the memory on by a period that began at a state, under a command.
+    pub(crate) fn pass<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &[V], command: &[V]) {
+        if workspace.storage.is_some() {
+            step_apart(self, workspace, &mut state.to_vec(), command);
+        } else {
+            self.remember(workspace, command);
+        }
+    }
+
     /// Moves the states of a run on by the period whose command is remembered already.
     #[inline(always)]
     pub(crate) fn advance<V: Vector>(
@@ -80,14 +90,14 @@ impl<'a> Model<'a> {
         state: &mut [V],
         command: &[V],
     ) {
-        let ModelWorkspace { bank, stages, line, turned, seen, .. } = workspace;
+        let ModelWorkspace { bank, stages, line, storage, turned, seen, .. } = workspace;
         let effects = match line {
             None => [command; 3],
             Some(line) => [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]],
         };
         match self.frame.form {
             form @ (Form::Absolute | Form::Increment) => {
-                let outputs = self.outputs(bank, state, effects[1]);
+                let outputs = self.outputs(bank, storage, state, effects[1]);
                 if form == Form::Absolute {
                     state.copy_from_slice(outputs);
                 } else {
@@ -97,22 +107,32 @@ impl<'a> Model<'a> {
                 }
             }
             Form::Acceleration => {
-                let field = Held { model: self, bank, effects, stage: 0 };
+                let field = Held { model: self, bank, storage, effects, stage: 0 };
                 match &self.frame.body {
                     None => rk4(state, self.frame.dt, stages, field),
                     Some(body) => turn(state, self.frame, stages, field, body, turned, seen),
                 }
             }
             form @ (Form::ExplicitEuler | Form::SemiImplicitEuler) => {
-                let outputs = self.outputs(bank, state, effects[0]);
+                let outputs = self.outputs(bank, storage, state, effects[0]);
                 euler(state, outputs, self.frame, form == Form::SemiImplicitEuler);
             }
         }
     }
 
-    /// The code's outputs at a state, under a command.
+    /// The code's outputs at the next point of a period: a state, under a command.
     #[inline(always)]
-    fn outputs<'b, V: Vector>(&self, bank: &'b mut Bank<V>, state: &[V], command: &[V]) -> &'b [V] {
+    fn outputs<'b, V: Vector>(
+        &self,
+        bank: &'b mut Bank<V>,
+        storage: &mut Option<Box<Storage<V>>>,
+        state: &[V],
+        command: &[V],
+    ) -> &'b [V] {
+        let command = match storage {
+            None => command,
+            Some(storage) => storage.see(state, command),
+        };
         let mut wrapped = Vec::new();
         if self.frame.periods.any() {
             wrapped.extend_from_slice(state);
@@ -130,6 +150,8 @@ pub struct ModelWorkspace<V: Vector> {
     stages: Stages<V>,
     /// What the actuators hold, where there are any.
     line: Option<Line<V>>,
+    /// What motion has filled, where it fills anything.
+    pub(crate) storage: Option<Box<Storage<V>>>,
     /// What sensors may read yet.
     recent: Recent,
     /// Of a rigid body: the states and the quaternion of its angles behind them; the states of a stage.
@@ -141,20 +163,32 @@ impl<'a> Model<'a> {
     /// A workspace whose lanes are models of their own: constants of the code (each on lanes, in the code's order), and
     /// times of the actuation.
     pub(crate) fn variants<V: Vector>(&self, constants: &[V], times: &[V]) -> ModelWorkspace<V> {
-        self.workspace_of(self.code.bank_of(constants), self.line(Some(times)))
+        self.workspace_of(self.code.bank_of(constants), Some(times))
     }
 
-    fn line<V: Vector>(&self, times: Option<&[V]>) -> Option<Line<V>> {
-        let Frame { actuation, factors, dt, .. } = self.frame;
-        (!actuation.is_direct()).then(|| Line::new(actuation, factors, *dt, times))
+    /// What commands and motion leave in the actuation, at the start of a run. `times` (lanes) stand in for its own, where
+    /// they are given.
+    #[inline(never)]
+    fn memory<V: Vector>(&self, times: Option<&[V]>) -> (Option<Line<V>>, Option<Box<Storage<V>>>) {
+        let Frame { actuation, factors, state_factors, dt, .. } = self.frame;
+        let times = times.map_or_else(|| actuation.times_on(V::LANES), numbers);
+        let line = Line::new(actuation, factors, *dt, &times);
+        let of_hidden = &times[actuation.actuators.len() * V::LANES..];
+        let staged = self.frame.form == Form::Acceleration;
+        let steps = if staged && self.frame.body.is_some() { self.frame.substeps } else { 1 };
+        (Some(line), Storage::new(&actuation.hidden, state_factors, of_hidden, dt / steps as f64, staged))
     }
 
-    fn workspace_of<V: Vector>(&self, bank: Bank<V>, line: Option<Line<V>>) -> ModelWorkspace<V> {
+    fn workspace_of<V: Vector>(&self, bank: Bank<V>, times: Option<&[V]>) -> ModelWorkspace<V> {
+        let (line, storage) = match self.frame.actuation.is_direct() {
+            true => (None, None),
+            false => self.memory(times),
+        };
         let states = if self.frame.form == Form::Acceleration { self.frame.states() } else { 0 };
         let body = if states > 0 && self.frame.body.is_some() { states } else { 0 };
         let turned = zeros(if body > 0 { body + 4 } else { 0 });
         let (stages, seen) = (Stages::new(states.max(turned.len())), zeros(body));
-        ModelWorkspace { bank, stages, line, recent: Recent::default(), turned, seen }
+        ModelWorkspace { bank, stages, line, storage, recent: Recent::default(), turned, seen }
     }
 }
 
@@ -162,7 +196,7 @@ impl Dynamics for Model<'_> {
     type Workspace<V: Vector> = ModelWorkspace<V>;
 
     fn workspace<V: Vector>(&self) -> ModelWorkspace<V> {
-        self.workspace_of(self.code.bank(), self.line(None))
+        self.workspace_of(self.code.bank(), None)
     }
 
     #[inline(always)]

@@ -23,7 +23,7 @@ pub(super) fn turn<V: Vector>(
     let (states, attitude) = turned.split_at_mut(state.len());
     states.copy_from_slice(state);
     set_attitude(attitude, before);
-    let Held { model, bank, effects, .. } = field;
+    let Held { model, bank, storage, effects, .. } = field;
     let steps = frame.substeps as f64;
     for part in 0..frame.substeps {
         let mut within = [vec![], vec![], vec![]];
@@ -36,7 +36,7 @@ pub(super) fn turn<V: Vector>(
             }
             within.each_ref().map(Vec::as_slice)
         };
-        let field = Held { model, bank: &mut *bank, effects, stage: 0 };
+        let field = Held { model, bank: &mut *bank, storage: &mut *storage, effects, stage: 0 };
         rk4(turned, frame.dt / steps, stages, Turning { field, body, before, seen: &mut *seen });
     }
     let (states, attitude) = turned.split_at(state.len());

@@ -142,7 +142,7 @@ class Knowledge:
             learnt: from the first experiments.
         """
         identified, signals = learnt.identified, self.setup.signals
-        symbols = symbols_of(signals)
+        symbols = symbols_of(signals, identified.pool, identified.sums)
         return tuple(
             Rival(
                 signals.state_names[found.chain.states[0]],

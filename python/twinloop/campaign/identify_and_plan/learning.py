@@ -141,10 +141,7 @@ class Learner:
             sensors=tuple(identified.sensors(self.setup.signals.n_x).tolist()),
             lags=tuple(actuator.lag for actuator in identified.actuation.actuators),
             delays=tuple(actuator.delay for actuator in identified.actuation.actuators),
-            hidden=tuple(
-                (hidden.commands, hidden.squared, hidden.rest, hidden.time)
-                for hidden in identified.actuation.hidden
-            ),
+            hidden=identified.actuation.hidden,
             offsets=tuple(identified.offsets.tolist()),
             closed_loop=tuple(free),
             normalised=tuple(

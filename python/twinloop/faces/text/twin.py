@@ -107,8 +107,8 @@ def _hidden(state: Mapping[str, Any]) -> str:
     """A state that no sensor reads, in words."""
     what = "squares" if state["squared"] else "values"
     fading = f"decays to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "does not decay"
-    driven = f"the {what} of {', '.join(state['commands'])} drive a state that is not measured"
-    return f"Hidden state: {driven}; it {fading}."
+    sources = ", ".join((*state["commands"], *state.get("states", ())))
+    return f"Hidden state: the {what} of {sources} drive a state that is not measured; it {fading}."
 
 
 def errors_text(result: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ from twinloop.identification.fit.models import bounds_of, layout, model_of
 from twinloop.identification.fit.predictions import without_outliers
 from twinloop.identification.fit.support import supported
 from twinloop.identification.fit.tuning import tune
+from twinloop.identification.fit.unused import without_unused
 from twinloop.identification.hypothesis import Fit, Hypothesis
 from twinloop.identification.search.structure import Sum, Weights, prices
 from twinloop.identification.sensors.chains import Chain
@@ -82,6 +83,7 @@ def _pruned(context: Context, hypothesis: Hypothesis) -> Hypothesis:
 
 def _tuned(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Fit]:
     """The hypothesis with its model tuned, and that fit."""
+    hypothesis = without_unused(hypothesis)
     sums, steps = hypothesis.sums, context.options.tuning_steps
     observer = [*(found.chain for found in sums), *hypothesis.given]
     fit, _ = tune(context, hypothesis, model_of(context, hypothesis), observer, steps)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from twinloop import _core
 from twinloop.errors import engine_input
@@ -16,10 +17,10 @@ from twinloop.signals import Bounds
 
 
 def model_of(context: Context, hypothesis: Hypothesis) -> _core.Model:
-    """The model whose outputs are a hypothesis' sums; without hidden states that no sum uses."""
+    """The model whose outputs are a hypothesis' sums; without the last hidden states that no sum uses."""
     pool, actuation = hypothesis.pool, hypothesis.actuation
-    if not any(pool.is_hidden(term) for found in hypothesis.sums for term in found.weights):
-        actuation = actuation.bare()
+    used = (pool.reach(term) - pool.inputs for found in hypothesis.sums for term in found.weights)
+    actuation = replace(actuation, hidden=actuation.hidden[: max(0, *used, 0)])
     outputs = [dict.fromkeys(_fixed(hypothesis, found), 1.0) | found.weights for found in hypothesis.sums]
     if hypothesis.form == "absolute":
         for i, terms in enumerate(outputs):

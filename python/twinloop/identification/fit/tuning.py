@@ -48,7 +48,11 @@ def tune(
     free = list(range(len(model.constants))) if hypothesis.form == "absolute" else layout(hypothesis)[0]
     actuation = Actuation.of(model, signals)
     lags = [list(group) for group in hypothesis.alike if actuation.actuators[group[0]].lag > 0.0]
-    lags += [[signals.n_u + j] for j in range(len(actuation.hidden))]
+    # Hidden states that begin with one time keep one.
+    times = [state.time for state in actuation.hidden]
+    lags += [
+        [signals.n_u + j for j, other in enumerate(times) if other == time] for time in dict.fromkeys(times)
+    ]
     limits = limits_of(hypothesis) if tuning else {}
     # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
     start = model.constants.tolist()

@@ -84,18 +84,21 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
     return replace(best, sums=tuple(sums), candidates=with_hidden(context, best.candidates))
 
 
-def with_hidden(context: Context, candidates: Candidates) -> Candidates:
-    """The candidates with terms of a hidden state on the first rung, and with those that were known of it."""
+def with_hidden(context: Context, candidates: Candidates, count: int = 1) -> Candidates:
+    """The candidates with terms of so many hidden states on the first rung, and with those that were known of them."""
     grown = candidates.growing()
     known = [node for node in context.known_terms if grown.pool.is_hidden(node)]
-    return grown.with_terms([*filled(grown.pool), *known])
+    return grown.with_terms([*filled(grown.pool, count), *known])
 
 
-def filled(pool: Pool) -> list[int]:
-    """Terms of the hidden state, on the first rung: itself, and times every input and what moves an output together."""
-    state = pool.hidden(0)
+def filled(pool: Pool, count: int = 1) -> list[int]:
+    """Terms of hidden states, on the first rung: each alone, times every input, and what moves an output together."""
+    states = [pool.hidden(number) for number in range(count)]
     found = [node for node in pool.found if pool.is_hidden(node)]
-    terms = [state, *(pool.product(i, state) for i in range(pool.inputs)), *found]
+    terms = [
+        term for state in states for term in (state, *(pool.product(i, state) for i in range(pool.inputs)))
+    ]
+    terms += found
     pool.rungs.update(dict.fromkeys(terms, 0))
     return terms
 
@@ -111,10 +114,9 @@ def enter_directions(pool: Pool, found: Sequence[Direction]) -> None:
 
 
 def _known(context: Context, hypothesis: Hypothesis) -> tuple[HiddenState, ...]:
-    """Hidden states that were found before."""
-    return hypothesis.actuation.hidden or (
-        () if context.earlier is None else context.earlier.actuation.hidden
-    )
+    """Hidden states that commands fill and that were found before."""
+    earlier = () if context.earlier is None else context.earlier.actuation.hidden
+    return tuple(state for state in hypothesis.actuation.hidden or earlier if state.commands)
 
 
 def _unit(context: Context, hypothesis: Hypothesis) -> Unit:

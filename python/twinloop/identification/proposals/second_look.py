@@ -28,7 +28,7 @@ def second_look(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis
             return
         context.watch("smoothed")
         again = climbed(context, again, brief=True)
-        if look == 1 and context.may_hide:
+        if look == 1 and context.may_hide and not again.actuation.stored:
             again = strongest([again, filled_by_commands(context, again, latest.sums)])
         latest = fitted(context, again)
         yield latest

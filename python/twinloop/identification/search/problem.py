@@ -57,8 +57,8 @@ class Problem:
     def usable(self, terms: Sequence[int]) -> list[int]:
         """Terms whose values are finite on all rows, with the values; those of a hidden state only where one is."""
         new = [term for term in terms if term not in self._values]
-        if self.stages.start.shape[1] == self.pool.inputs:
-            new = [term for term in new if not self.pool.is_hidden(term)]
+        inputs = self.stages.start.shape[1]
+        new = [term for term in new if self.pool.reach(term) <= inputs]
         if new:
             stages = [
                 self.pool.values(new, s) for s in (self.stages.start, self.stages.middle, self.stages.end)

@@ -128,8 +128,12 @@ class Pool(Expressions, Recorded, kind="pool"):
 
     def is_hidden(self, number: int) -> bool:
         """Whether a node is made of a hidden state."""
+        return self.reach(number) > self.inputs
+
+    def reach(self, number: int) -> int:
+        """How many inputs, hidden states among them, a node needs at least; `inputs` where nothing is hidden in it."""
         parts = (self[part] for part in self.needed([number]))
-        return any(part.operation == INPUT and part.value >= self.inputs for part in parts)
+        return max((int(part.value) + 1 for part in parts if part.operation == INPUT), default=0)
 
     def product(self, *factors: int) -> int:
         """The node of a product of several nodes."""

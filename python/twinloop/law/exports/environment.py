@@ -116,13 +116,20 @@ def environment(
         def step(self, action: ArrayLike) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
             """One period; it terminates where the twin diverges, with the last state that did not."""
             command = np.clip(floats("step, action", action, (signals.n_u,)), low, high)
-            past = np.array(self.sent) if self.sent else None
-            following = twin.predict(self.state, command, past=past)
+            following = self._following(command)
             self.sent.append(command)
             lost = bool(not np.isfinite(following).all() or (np.abs(following) > limits).any())
             before, self.state = self.state, self.state if lost else following
             earned = self._reward(before, command, self.state)
             return self._seen(), earned, lost, len(self.sent) >= length, {"state": np.array(self.state)}
+
+        def _following(self, command: Floats) -> Floats:
+            if twin.law.actuation.stored:
+                # What motion has filled depends on the whole run.
+                run = twin.simulate_commands(self.begun, np.array([*self.sent, command]))
+                states = run.states if run.true_states is None else run.true_states
+                return states[-1] if run.steps > len(self.sent) else np.full(signals.n_x, np.nan)
+            return twin.predict(self.state, command, past=np.array(self.sent) if self.sent else None)
 
         def _reward(self, before: Floats, command: Floats, after: Floats) -> float:
             if reward is not None:

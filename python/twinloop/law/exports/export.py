@@ -163,6 +163,12 @@ def exported(source: Source, kind: str, name: str, precision: str = "double") ->
         if source.check:
             check_sympy(text, law, flights)
         return {".py": text}
+    if law.actuation.stored:
+        raise NotAvailable(
+            f"Export, {kind}: expected a law whose hidden states are filled by commands, found one that motion fills,"
+            " which is integrated with the states; export its equations ('sympy', 'latex') or the twin itself ('json'),"
+            " or learn without them: storage=False."
+        )
     if kind in MODULES:
         what, write, simulated = MODULES[kind]
         text = write(source)

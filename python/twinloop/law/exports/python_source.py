@@ -206,7 +206,7 @@ def layout(law: Law, actuated: bool) -> list[str]:
             f"LAGS = {tuple(actuator.lag for actuator in actuators)!r}  # s, of each command",
             f"DELAYS = {tuple(actuator.delay for actuator in actuators)!r}  # periods",
             f"RESTS = {tuple(actuator.rest for actuator in actuators)!r}  # at the start; None: the first one",
-            f"HIDDEN = {tuple(tuple(each) for each in law.actuation.hidden)!r}"
+            f"HIDDEN = {tuple(tuple(each[:4]) for each in law.actuation.hidden)!r}"
             "  # commands that fill it, whether squared, level at rest, time (s)",
         ]
     lines += [

@@ -10,13 +10,13 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop.errors import NotAvailable
 from twinloop.law.actuation import Actuation, Actuator
-from twinloop.law.forms import EULER
 from twinloop.law.law import Law
 from twinloop.law.linear.attitude import angles, quaternion, turning
 from twinloop.law.linear.dual import Dual
 from twinloop.law.linear.jacobian import jacobian
 from twinloop.law.linear.sensors import as_read
 from twinloop.law.linear.state_space import Linear
+from twinloop.law.linear.storage import filling, settled, times
 
 HALVINGS = 30
 """Times that a step to a command that holds a state is halved at most."""
@@ -25,7 +25,9 @@ CLOSE = 1e-12
 
 
 def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Linear:
-    """A law around a point, by exact derivatives; with actuators at rest under the command, hidden states at 0.
+    """A law around a point, by exact derivatives; with actuators at rest under the command.
+
+    Hidden states that commands fill are at 0 there, those that states fill where they settle.
 
     Args:
         law: of a twin.
@@ -41,7 +43,7 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
     """
     plain = _period(law, state, command) if discrete else _instant(law, state, command)
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
-    point = np.concatenate([state, factors * command, np.zeros(len(law.actuation.hidden))])
+    point = np.concatenate([state, factors * command, settled(law, state)])
     found = as_read(law, plain, _wrapped(law, point))
     if not (np.isfinite(found.A).all() and np.isfinite(found.B).all() and np.isfinite(found.drift).all()):
         raise NotAvailable(
@@ -62,7 +64,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
     lagging = [i for i, actuator in enumerate(law.actuation.actuators) if actuator.lag > 0.0]
     size = n_x + len(lagging) + len(hidden)
     factors = 1.0 / np.array([each.size for each in signals.commands])
-    point = np.concatenate([state, factors * command, np.zeros(len(hidden))])
+    point = np.concatenate([state, factors * command, settled(law, state)])
     values, slopes = jacobian(law.expressions, law.derivatives(), _wrapped(law, point))
     by_effect = slopes[:, n_x : n_x + n_u] * factors
     A, B, drift = np.zeros((size, size)), np.zeros((size, n_u)), np.zeros(size)
@@ -77,9 +79,14 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         lag = law.actuation.actuators[i].lag
         A[:n_x, place] = by_effect[:, i]
         A[place, place], B[place, i] = -1.0 / lag, 1.0 / lag
+    stored = filling(law, Dual(state, np.eye(n_x)))
+    A[size - len(stored.values) :, :n_x] = stored.slopes
     for place, h in enumerate(hidden, start=n_x + len(lagging)):
+        A[place, place] = -1.0 / h.time
+        if h.states:
+            continue
         level, slope = _level(h.commands, h.squared, factors * command, factors)
-        A[place, place], B[place] = -1.0 / h.time, slope
+        B[place] = slope
         drift[place] = 0.0 if h.rest is None else level - h.rest
     delays = signals.dt * np.array([float(actuator.delay) for actuator in law.actuation.actuators])
     names = [f"{signals.command_names[i]}_effect" for i in lagging]
@@ -88,7 +95,7 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         B,
         (*signals.state_names, *names, *law.hidden_symbols),
         signals.command_names,
-        np.concatenate([state, command[lagging], np.zeros(len(hidden))]),
+        np.concatenate([state, command[lagging], settled(law, state)]),
         command,
         drift,
         None,
@@ -148,7 +155,7 @@ class _Begun:
 
         x = taken(state)
         held = {i: taken(command[[i]]) for i, actuator in enumerate(actuators) if actuator.lag > 0.0}
-        hidden = taken(np.zeros(len(law.actuation.hidden)))
+        hidden = taken(settled(law, state))
         queues = [[taken(command[[i]]) for _ in range(a.delay)] for i, a in enumerate(actuators)]
         return _Begun(names, x, held, hidden, queues, Dual(command, identity[len(names) :]))
 
@@ -166,7 +173,9 @@ def _period(law: Law, state: Floats, command: Floats) -> Linear:
     inputs = [
         Dual.stacked([of_commands, hidden]) for of_commands, hidden in zip(effects, filled, strict=True)
     ]
-    ended = Dual.stacked([_stepped(law, begun.x, inputs), *held, filled[2], *waiting])
+    stored = begun.hidden.rows(range(len(filled[2].values), len(begun.hidden.values)))
+    x, stored = _stepped(law, begun.x, stored, inputs)
+    ended = Dual.stacked([x, *held, filled[2], stored, *waiting])
     before, size = begun.whole(), len(begun.names)
     return Linear(
         ended.slopes[:, :size],
@@ -202,10 +211,11 @@ def _effects(law: Law, begun: _Begun) -> tuple[list[Dual], list[Dual], list[Dual
 
 
 def _filled(law: Law, begun: _Begun) -> list[Dual]:
-    """Hidden states at the start, the middle and the end of a period."""
+    """Hidden states that commands fill at the start, the middle and the end of a period."""
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
     stages: list[list[Dual]] = [[], [], []]
-    for j, h in enumerate(law.actuation.hidden):
+    by_commands = [h for h in law.actuation.hidden if h.commands]
+    for j, h in enumerate(by_commands):
         kept = float(np.exp(-0.5 * law.signals.dt / h.time))
         level, slope = _level(h.commands, h.squared, factors * begun.sent.values, factors)
         over = 0.0 if h.rest is None else level - h.rest
@@ -214,50 +224,69 @@ def _filled(law: Law, begun: _Begun) -> list[Dual]:
         middle = start * kept + added
         for stage, value in zip(stages, (start, middle, middle * kept + added), strict=True):
             stage.append(value)
-    return [Dual.stacked(stage) if stage else begun.hidden for stage in stages]
+    return [Dual.stacked(stage) if stage else begun.hidden.rows([]) for stage in stages]
 
 
-def _stepped(law: Law, x: Dual, inputs: Sequence[Dual]) -> Dual:
-    """The next state under effects and hidden states at the start, the middle and the end of a period."""
+def _stepped(law: Law, x: Dual, stored: Dual, inputs: Sequence[Dual]) -> tuple[Dual, Dual]:
+    """The next state, and what motion has filled then.
 
-    def of(roots: Sequence[int], point: Dual, given: Dual) -> Dual:
-        whole = Dual.stacked([point, given])
-        values, slopes = jacobian(law.expressions, roots, _wrapped(law, whole.values))
-        return Dual(values, slopes @ whole.slopes)
-
-    dt = law.signals.dt
-    if law.form == "absolute":
-        return of(law.outputs, x, inputs[1])
-    if law.form == "increment":
-        return x + of(law.outputs, x, inputs[1])
-    if law.form in EULER:
-        return x + of(law.increments(), x, inputs[0])
+    Args:
+        law: of a twin.
+        x: the state at the start of a period.
+        stored: the hidden states that states fill, there.
+        inputs: effects and hidden states that commands fill, at the start, the middle and the end of the period.
+    """
+    if law.form != "acceleration":
+        after = _mapped(law, x, stored, inputs)
+        half, fading = 0.5 * law.signals.dt, 1.0 / times(law)
+        added = (filling(law, x) + filling(law, after) - stored * fading) * half
+        return after, (stored + added) * (1.0 / (1.0 + half * fading))
+    size, n_x = len(x.values) + len(stored.values), len(x.values)
     roots, body = law.derivatives(), law.signals.kinematics
 
     def slope(point: Dual, given: Dual) -> Dual:
-        if body is None:
-            return of(roots, point, given)
-        states = seen(point)
-        moved = of(roots, states, given)
-        still = Dual(np.zeros(3), np.zeros((3, moved.slopes.shape[1])))
-        turned = turning(point.rows(range(size, size + 4)), states.rows(rates))
-        return Dual.stacked([moved.put(turns, still), turned])
+        states, held = (seen(point) if body else point.rows(range(n_x))), point.rows(range(n_x, size))
+        moved = [_given(law, roots, states, Dual.stacked([given, held]))]
+        moved.append(filling(law, states) - held * (1.0 / times(law)))
+        if body is not None:
+            still = Dual(np.zeros(3), np.zeros((3, states.slopes.shape[1])))
+            moved[0] = moved[0].put(turns, still)
+            moved.append(turning(point.rows(range(size, size + 4)), states.rows(rates)))
+        return Dual.stacked(moved)
 
     def seen(point: Dual) -> Dual:
         """The states, with the angles of the quaternion behind them."""
         found = angles(point.rows(range(size, size + 4)), x.values[turns])
-        return point.rows(range(size)).put(turns, found)
+        return point.rows(range(n_x)).put(turns, found)
 
-    size, begun = len(x.values), x
+    begun = Dual.stacked([x, stored])
     if body is not None:
         place = law.signals.state_names.index
         turns, rates = [place(name) for name in body.angles], [place(name) for name in body.rates]
-        begun = Dual.stacked([x, quaternion(x.rows(turns))])
+        begun = Dual.stacked([begun, quaternion(x.rows(turns))])
     steps = law.signals.substeps
     for part in range(steps):
         given = [_between(inputs, (part + share) / steps) for share in (0.0, 0.5, 1.0)]
-        begun = _integrated(slope, begun, dt / steps, given)
-    return begun if body is None else seen(begun)
+        begun = _integrated(slope, begun, law.signals.dt / steps, given)
+    ended = seen(begun) if body is not None else begun.rows(range(n_x))
+    return ended, begun.rows(range(n_x, size))
+
+
+def _given(law: Law, roots: Sequence[int], states: Dual, given: Dual) -> Dual:
+    """Some expressions of the law at a state, under effects and hidden states."""
+    whole = Dual.stacked([states, given])
+    values, slopes = jacobian(law.expressions, roots, _wrapped(law, whole.values))
+    return Dual(values, slopes @ whole.slopes)
+
+
+def _mapped(law: Law, x: Dual, stored: Dual, inputs: Sequence[Dual]) -> Dual:
+    """The next state of a law that steps from period to period."""
+    start, middle, _ = (Dual.stacked([given, stored]) for given in inputs)
+    if law.form == "absolute":
+        return _given(law, law.outputs, x, middle)
+    if law.form == "increment":
+        return x + _given(law, law.outputs, x, middle)
+    return x + _given(law, law.increments(), x, start)
 
 
 def _integrated(slope: Callable[[Dual, Dual], Dual], begun: Dual, dt: float, inputs: Sequence[Dual]) -> Dual:

@@ -1,0 +1,60 @@
+"""Hidden states that no sum uses are none, and need not be paid for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.terms.pool import Pool
+from twinloop.law.expressions import INPUT, Node
+
+
+def without_unused(hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis without hidden states that no sum uses before one that some does; those after it are not seen.
+
+    Args:
+        hypothesis: with sums.
+    """
+    hidden, pool = hypothesis.actuation.hidden, hypothesis.pool
+    if len(hidden) < 2:
+        return hypothesis
+    used = sorted(
+        {number for found in hypothesis.sums for term in found.weights for number in _in(pool, term)}
+    )
+    if used == list(range(len(used))):
+        return hypothesis
+    candidates = hypothesis.candidates.growing()
+    places = {candidates.pool.hidden(old): candidates.pool.hidden(new) for new, old in enumerate(used)}
+    made = dict(places)
+    sums = tuple(
+        replace(
+            found,
+            weights={_moved(candidates.pool, term, made): weight for term, weight in found.weights.items()},
+            others=[],
+        )
+        for found in hypothesis.sums
+    )
+    terms = [term for found in sums for term in found.weights]
+    # A choice of a hidden state is a term of the first rung, as it was.
+    candidates = candidates.with_terms(term for term in terms if candidates.pool.is_hidden(term))
+    actuation = replace(hypothesis.actuation, hidden=tuple(hidden[number] for number in used))
+    return replace(hypothesis, actuation=actuation, candidates=candidates, sums=sums)
+
+
+def _in(pool: Pool, term: int) -> set[int]:
+    """Numbers of the hidden states in a term."""
+    parts = (pool[part] for part in pool.needed([term]))
+    return {
+        int(part.value) - pool.inputs
+        for part in parts
+        if part.operation == INPUT and part.value >= pool.inputs
+    }
+
+
+def _moved(pool: Pool, node: int, made: dict[int, int]) -> int:
+    """The node of the same expression of other hidden states; nodes that were made of others stand in `made`."""
+    if node not in made:
+        operation, operands, value = pool[node]
+        moved = tuple(_moved(pool, operand, made) for operand in operands)
+        made[node] = node if moved == operands else pool.enter(Node(operation, moved, value))
+    return made[node]

@@ -1,0 +1,214 @@
+"""Hidden states that motion fills: the twist of a joint, the heat of a wall, the pressure behind a piston.
+
+Looked for where a model leaves more than noise. One state fills such a storage or, beside it and with the same time, a
+group of commands or another state does: all that a first-order storage holds of them is a sum of the two. Which one
+shows by linear terms; what it moves is chosen among all terms, as for a hidden state that commands fill.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from twinloop._ground.streams import Unit
+from twinloop.identification.context import Context
+from twinloop.identification.evidence import strongest
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.fit.predictions import smoothed
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.proposals.hidden import filled, with_hidden
+from twinloop.identification.records import Stages, stages
+from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.structure import Sum, search
+from twinloop.identification.sensors.noise import calm
+from twinloop.law.actuation import Actuation, HiddenState, alike_commands
+from twinloop.law.forms import DERIVATIVES
+
+TIMES = (0.02, 0.1, 0.5)
+"""Times that are tried, in lengths of the longest run."""
+FINER = (2.0, 1.25)
+"""Factors between times that are tried where a storage has shown."""
+STEPS = 4
+"""Such factors at most, one after the other."""
+NEAR = 2
+"""Single states, the best ones, beside which another source is tried."""
+STORED = 50
+"""Number of the unit of work that looks for them."""
+
+Sources = tuple[HiddenState, ...]
+"""Hidden states of one time, those that commands fill first."""
+
+
+def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The hypothesis with the best hidden states that motion fills, fitted; none where only noise is left."""
+    if not context.may_store or hypothesis.fit is None or hypothesis.form not in DERIVATIVES:
+        return
+    problem = posed(context, hypothesis)
+    still = all(calm(problem, found.chain) is found.chain for found in hypothesis.sums)
+    # A storage would evade the bounds of what fills it.
+    if problem.priors.bounds or (still and hypothesis.fit.stable) or hypothesis.actuation.stored:
+        return
+    context.watch("hidden")
+    # Behind a short memory of noisy readings their noise would explain itself.
+    bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
+    for variant in (bare, *_at_once(context, bare)):
+        for found in filled_by_motion(context, variant):
+            yield fitted(context, from_both_sides(context, found, found.sums))
+
+
+def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The hypothesis, not fitted, with the best storage of each kind; none that does not pay at all.
+
+    Kinds are what one state fills, empty or settled at the start, and pairs of each time that is tried. A pair
+    describes what is linear whatever its time, which predictions alone tell.
+
+    Args:
+        context: of the identification.
+        hypothesis: with sums to begin with, and without such states.
+    """
+    screen = _Screen.of(context, hypothesis)
+    longest = context.signals.dt * max(len(run.commands) for run in hypothesis.runs)
+    times = [share * longest for share in TIMES]
+    singles = {
+        begins: [
+            strongest([screen(one) for one in _single(place, begins, times)]) for place in _sources(context)
+        ]
+        for begins in (False, True)
+    }
+    best = [strongest(pair) for pair in zip(*singles.values(), strict=True)]
+    near, without = sorted(best, key=lambda one: one.evidence.length)[:NEAR], screen(())
+    others = [one.actuation.hidden[0].states[0] for one in near]
+    kinds: list[tuple[list[Hypothesis], Sequence[float]]] = [(found, FINER) for found in singles.values()]
+    for time in times:
+        kinds.append(([screen(pair) for one in near for pair in _pairs(context, one, others, time)], ()))
+    showing = [
+        (found, factors)
+        for found, factors in ((strongest(several), factors) for several, factors in kinds if several)
+        if found.evidence.beats(without.evidence)
+    ]
+    # Which one shows on the terms that there are; whether there is one, when all may change.
+    bare = _with_all_terms(context, screen, without) if showing else without
+    for found, factors in showing:
+        grown = _with_all_terms(context, screen, _timed(screen, found, factors))
+        if grown.evidence.beats(bare.evidence):
+            yield grown
+
+
+def _at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The same with commands that act at once, if any do not: a lag may have stood in for what is stored."""
+    actuation, direct = hypothesis.actuation, Actuation.direct(context.signals)
+    if context.may_lag and actuation.actuators != direct.actuators:
+        yield replace(hypothesis, actuation=replace(actuation, actuators=direct.actuators))
+
+
+def _timed(screen: _Screen, best: Hypothesis, factors: Sequence[float]) -> Hypothesis:
+    """The hypothesis with hidden states of the time that is best near theirs."""
+    for factor in factors:
+        for _ in range(STEPS):
+            hidden = best.actuation.hidden
+            beside = [
+                screen(tuple(one._replace(time=one.time * by) for one in hidden))
+                for by in (1.0 / factor, factor)
+            ]
+            found = strongest([best, *beside])
+            if found is best:
+                break
+            best = found
+    return best
+
+
+def _with_all_terms(context: Context, screen: _Screen, found: Hypothesis) -> Hypothesis:
+    """The hypothesis with sums of all terms of the first rung, and of those of its hidden states."""
+    candidates = with_hidden(context, found.candidates, len(found.actuation.hidden))
+    starts = max(1, context.options.starts // 2)
+    unit = screen.unit.part(next(screen.numbers))
+    walks = context.walks(unit, context.options.moves, starts, "hidden_subsets")
+    grown = replace(found, candidates=candidates)
+    driven = [one.chain for one in found.sums]
+    sums = search(posed(context, grown), driven, candidates.ladder[0], found.sums, walks)
+    return replace(grown, sums=tuple(sums))
+
+
+@dataclass(frozen=True, eq=False)
+class _Screen:
+    """Tries hidden states by short searches among few terms: those that there are, and each hidden state alone.
+
+    Args:
+        context: of the identification.
+        hypothesis: with the hidden states' nodes in its pool.
+        terms: that were found without them.
+        inputs: of the law without hidden states.
+        unit: of work.
+        numbers: of the searches.
+    """
+
+    context: Context
+    hypothesis: Hypothesis
+    terms: Sequence[int]
+    inputs: Stages
+    unit: Unit
+    numbers: Iterator[int]
+
+    @staticmethod
+    def of(context: Context, hypothesis: Hypothesis) -> _Screen:
+        """What begins with the sums of a hypothesis, without terms of a hidden state that commands fill."""
+        candidates = hypothesis.candidates.growing()
+        pool = candidates.pool
+        filled(pool, 2)
+        used = [term for found in (*hypothesis.sums, *hypothesis.from_above) for term in found.weights]
+        linear = (pool.one, *range(pool.inputs))
+        terms = [term for term in dict.fromkeys([*linear, *used]) if not pool.is_hidden(term)]
+        bare = replace(
+            hypothesis,
+            candidates=candidates,
+            actuation=hypothesis.actuation.bare(),
+            sums=tuple(_without_hidden(found, hypothesis) for found in hypothesis.sums),
+        )
+        inputs = stages(bare.runs, context.signals, bare.actuation)
+        unit = context.unit.part(hypothesis.start + STORED)
+        return _Screen(context, bare, terms, inputs, unit, itertools.count(1))
+
+    def __call__(self, sources: Sources) -> Hypothesis:
+        """The hypothesis behind some hidden states, with the best sums of few terms."""
+        context, bare = self.context, self.hypothesis
+        tried = replace(bare, actuation=replace(bare.actuation, hidden=sources))
+        by_states = all(source.states for source in sources)
+        inputs = self.inputs.storing(sources, context.signals) if by_states else None
+        terms = [*self.terms, *(bare.pool.hidden(number) for number in range(len(sources)))]
+        walks = context.walks(
+            self.unit.part(next(self.numbers)), context.options.moves // 25, purpose="hidden_subsets"
+        )
+        driven = [found.chain for found in bare.sums]
+        sums = search(posed(context, tried, inputs), driven, terms, list(bare.sums), walks)
+        return replace(tried, sums=tuple(sums))
+
+
+def _single(place: int, settled: bool, times: Sequence[float]) -> Iterator[Sources]:
+    """One state that fills a storage, which is empty at the start or settled."""
+    for time in times:
+        yield (HiddenState((), False, 0.0, time, (place,), settled),)
+
+
+def _pairs(context: Context, alone: Hypothesis, others: Sequence[int], time: float) -> Iterator[Sources]:
+    """What one state fills, beside what a group of commands or another state does in the same time."""
+    (by_state,) = alone.actuation.hidden
+    # Empty at the start, or settled but for what the law's constants hold.
+    for settled, rest in ((False, 0.0), (True, None)):
+        first = by_state._replace(time=time, settled=settled)
+        for group in alike_commands(context.signals):
+            yield HiddenState(tuple(group), False, rest, time), first
+        for place in others:
+            if place > by_state.states[0]:
+                yield first, first._replace(states=(place,))
+
+
+def _sources(context: Context) -> list[int]:
+    """States that may fill a storage: not those that wrap, for a turn more is no other angle."""
+    return [i for i, state in enumerate(context.signals.states) if state.period is None]
+
+
+def _without_hidden(found: Sum, hypothesis: Hypothesis) -> Sum:
+    """A sum without terms of hidden states."""
+    weights = {term: weight for term, weight in found.weights.items() if not hypothesis.pool.is_hidden(term)}
+    return replace(found, weights=weights, others=[])

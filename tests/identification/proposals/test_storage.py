@@ -1,0 +1,183 @@
+"""Hidden states that motion fills are found where there are some, and nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from sameness import same, through_json
+from small_plants import gravity, lagging_motor, pendulum_like, swung
+from twinloop import _core
+from twinloop._ground.streams import Unit
+from twinloop.campaign.presets import options_of
+from twinloop.identification.context import Context
+from twinloop.identification.fit.fitting import fitted
+from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.identify import identify_runs
+from twinloop.identification.proposals.storage import storage
+from twinloop.identification.records import Run, stages
+from twinloop.identification.starts import starts
+from twinloop.law.actuation import Actuation, Actuator, HiddenState
+
+WORKERS = _core.Workers(2)
+QUICK = {"moves": 4000, "starts": 2, "generations": 2, "population": 30, "committee_size": 4}
+JOINT = tl.Signals(
+    [tl.State("angle", "rad", 3.0), tl.State("speed", "rad/s", 10.0, derivative_of="angle")],
+    [tl.Command("torque", "N m", (-1.0, 1.0))],
+    0.02,
+)
+ROOM = tl.Signals([tl.State("air", "K", 10.0)], [tl.Command("heater", "W", (0.0, 2000.0))], 60.0)
+
+
+def integrated(slope, start, commands, dt, steps=10):
+    """States of a plant in fine steps of Heun's rule, (n + 1, all of them)."""
+    x, states = np.array(start, dtype=float), [np.array(start, dtype=float)]
+    for u in commands:
+        for _ in range(steps):
+            first = slope(x, u)
+            second = slope(x + dt / steps * first, u)
+            x = x + 0.5 * dt / steps * (first + second)
+        states.append(x)
+    return np.array(states)
+
+
+def held(stream, steps, low, high, hold):
+    return np.repeat(stream.uniform(low, high, (steps // hold + 1, 1)), hold, axis=0)[:steps]
+
+
+def joint(seed, noise=1.0):
+    """A motor that turns a load of much friction and no mass by a spring: its twist is filled by the motor's speed."""
+    stream = np.random.default_rng(seed)
+    commands = held(stream, 160, -0.8, 0.8, 12)
+
+    def slope(x, u):
+        return np.array([x[1], 100.0 * u[0] - 200.0 * x[2] - 2.0 * x[1], x[1] - 5.0 * x[2]])
+
+    states = integrated(slope, [0.0, 0.0, 0.0], commands, JOINT.dt)[:, :2]
+    return Run.of(states + noise * np.array([5e-4, 5e-3]) * stream.normal(size=states.shape), commands)
+
+
+def room(seed, noise=0.01):
+    """Air that a heater warms, and walls that the air does; it began cold."""
+    stream = np.random.default_rng(seed)
+    commands = held(stream, 250, 0.0, 2000.0, 25)
+
+    def slope(x, u):
+        flow = 100.0 * (x[0] - x[1])
+        return np.array([(u[0] - flow - 20.0 * x[0]) / 6e4, (flow - 40.0 * x[1]) / 8e5])
+
+    states = integrated(slope, [0.0, 0.0], commands, ROOM.dt)[:, :1]
+    return Run.of(states + noise * stream.normal(size=states.shape), commands)
+
+
+def learnt(runs, signals, **changes):
+    return identify_runs(runs, signals, options_of("default", {**QUICK, **changes}), workers=WORKERS)
+
+
+def missed(found, signals, plant, seeds=(50, 51)):
+    """Largest error of free runs that were not learnt, in scales."""
+    twin, scales, errors = (
+        tl.Twin(found.model, signals),
+        np.array([state.scale for state in signals.states]),
+        [],
+    )
+    for seed in seeds:
+        run = plant(seed, noise=0.0)
+        states = twin.simulate_commands(run.states[0], run.commands).true_states
+        errors.append(
+            float(np.sqrt(np.square((states - run.states) / scales).mean()))
+            if len(states) == len(run.states)
+            else np.inf
+        )
+    return max(errors)
+
+
+@pytest.mark.parametrize(
+    ("plant", "signals", "time", "close"), [(joint, JOINT, 0.2, 0.01), (room, ROOM, 8e5 / 140.0, 0.05)]
+)
+def test_what_motion_fills_is_found_and_free_runs_miss_a_tenth_at_most(plant, signals, time, close):
+    runs = [plant(seed) for seed in range(3)]
+    blind, found = (learnt(runs, signals, storage=storage) for storage in (False, True))
+    assert not blind.actuation.stored
+    (stored,) = found.actuation.hidden
+    assert stored.states and not stored.commands
+    assert stored.time == pytest.approx(time, rel=close)
+    without, within = (missed(each, signals, plant) for each in (blind, found))
+    assert within < 1e-3 and within < 0.1 * without
+    twin = tl.Twin(found.model, signals, members=found.members)
+    assert "d hidden / dt = (" in twin.equations(3)
+    again = tl.Twin.from_record(through_json(twin.to_record()))
+    assert same(again.model.hidden, found.model.hidden) and again.equations(17) == twin.equations(17)
+
+
+def swinging(seed):
+    return swung(gravity, seed, noise=1e-3)
+
+
+def rubbing(seed):
+    return swung(lambda angle, rate, u: 5.0 * u - 0.4 * rate - 1.5 * np.tanh(rate / 0.02), seed, noise=1e-3)
+
+
+def lagging(seed):
+    stream = np.random.default_rng(seed)
+    commands = held(stream, 150, -2.0, 2.0, 8)
+    return lagging_motor(commands, 0.02, 0.06, lambda u: 3.0 * u, stream)
+
+
+MOTOR = tl.Signals([tl.State("speed", "rad/s", 5.0)], [tl.Command("volt", "V", (-2.0, 2.0))], 0.02)
+
+
+@pytest.mark.parametrize(
+    ("plant", "signals"), [(swinging, pendulum_like()), (rubbing, pendulum_like()), (lagging, MOTOR)]
+)
+def test_nothing_is_found_where_motion_fills_nothing(plant, signals):
+    for first in (0, 10):
+        assert not learnt([plant(first + i) for i in range(3)], signals).actuation.stored
+
+
+def test_one_run_shows_no_storage_and_neither_do_increments():
+    options = options_of("default", QUICK)
+    for runs, form in (([joint(0)], "acceleration"), ([joint(0), joint(1)], "increment")):
+        context = Context(runs, JOINT, options, Unit(0), WORKERS)
+        start = starts(context, form)[0]()
+        assert list(storage(context, fitted(context, start))) == []
+
+
+def test_an_angle_that_wraps_fills_nothing():
+    wrapping = tl.Signals(
+        [replace(JOINT.states[0], periodic=True), JOINT.states[1]], JOINT.commands, JOINT.dt
+    )
+    found = learnt([joint(seed) for seed in range(3)], wrapping)
+    assert all(0 not in one.states for one in found.actuation.hidden)
+
+
+def test_regressions_see_what_a_free_run_of_the_law_stores():
+    """h by the readings of a run without noise is h of the law that made it."""
+    for settled in (False, True):
+        stored = HiddenState((), False, 0.5, 0.3, (1,), settled)
+        text = "program inputs=4 outputs=1 registers=6\npage 1\nr4 = r3 * 1.0\n"
+        model = _core.Model(_core.Program.parse(text), "acceleration", JOINT.engine, [Actuator()], [stored])
+        # The speed that h drives tells what h was: it is its slope.
+        commands = np.zeros((400, 1))
+        states = tl.Twin(model, JOINT).simulate_commands([0.1, 3.0], commands).true_states
+        seen = stages([Run.of(states, commands)], JOINT, Actuation((Actuator(),), (stored,)))
+        kept, h = np.array([[0.0, 1.0], [0.1, -1.0 / 0.3]]), 0.3 * (0.3 - 0.5) * settled
+        # d (v, h) / dt = (h, v / 10 − 0.5 − h / 0.3), solved by its eigenvalues.
+        values, vectors = np.linalg.eig(np.array([[0.0, 1.0], [0.1, -1.0 / 0.3]]))
+        rest = -np.linalg.solve(kept, np.array([0.0, -0.5]))
+        weights = np.linalg.solve(vectors, np.array([3.0, h]) - rest)
+        times = np.arange(400) * JOINT.dt
+        exact = (rest[:, None] + vectors @ (weights[:, None] * np.exp(values[:, None] * times))).real
+        np.testing.assert_allclose(states[:-1, 1], exact[0], atol=2e-6)
+        np.testing.assert_allclose(seen.start[:, 3], exact[1], atol=2e-6)
+
+
+def test_a_hypothesis_with_storage_comes_back_from_its_record():
+    options = options_of("default", QUICK)
+    context = Context([joint(0), joint(1)], JOINT, options, Unit(0), WORKERS)
+    best = fitted(context, starts(context, "acceleration")[0]())
+    found = list(storage(context, best))
+    assert found and all(one.actuation.stored for one in found)
+    record = through_json(found[0].to_record())
+    assert same(Hypothesis.from_record(record, JOINT), found[0])

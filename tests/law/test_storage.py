@@ -1,0 +1,122 @@
+"""Hidden states that motion fills: simulated, linearised, printed, kept; exports that lack them say so."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import twinloop as tl
+from law_twins import BODY, SIGNALS, STORED, stored_twin, twin_of
+from sameness import same, through_json
+from twinloop.law.forms import DERIVATIVES
+from twinloop.law.law import Law
+
+LINEAR = ["r6 = r0 * -3.0", "r7 = r1 * 0.4", "r6 = r6 - r7", "r7 = r2 * 5.0", "r6 = r6 + r7", "r7 = r4 * 2.0",
+          "r6 = r6 + r7", "r7 = r5 * 14.0", "r6 = r6 - r7"]  # fmt: skip
+STEPPED = ["r6 = r1 * 0.05", "r6 = r6 + r5", "r7 = r0 * -0.2", "r8 = r5 * 0.3", "r7 = r7 - r8", "r8 = r2 * 0.2",
+           "r7 = r7 + r8"]  # fmt: skip
+RNG = np.random.default_rng(4)
+COMMANDS = RNG.uniform([-2.0, 0.0], [2.0, 5.0], (60, 2))
+
+
+def linear_twin(form="acceleration"):
+    lines = LINEAR if form in DERIVATIVES else STEPPED
+    return twin_of(lines, form, inputs=6, actuators=[(0.0, 0, None)] * 2, hidden=STORED)
+
+
+def test_a_free_run_is_the_solution_of_its_equations():
+    twin, dt = linear_twin(), SIGNALS.dt
+    angle_scale = 8.0
+
+    def slope(u):
+        def of(t, y):
+            angle, rate, twisted, filled = y
+            acceleration = -3.0 * angle - 0.4 * rate + 5.0 * u[0] / 2.0 + 2.0 * twisted - 14.0 * filled
+            return [rate, acceleration, u[0] / 2.0 - twisted / 0.4, rate / angle_scale - 0.25 - filled / 0.4]
+
+        return of
+
+    found = twin.simulate_commands([0.3, 2.0], COMMANDS).true_states
+    y = np.array([0.3, 2.0, 0.0, 0.4 * (2.0 / angle_scale - 0.25)])
+    for state, u in zip(found[1:], COMMANDS, strict=True):
+        y = solve_ivp(slope(u), (0.0, dt), y, rtol=1e-10, atol=1e-12).y[:, -1]
+        np.testing.assert_allclose(state, y[:2], atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    "form", ["acceleration", "explicit-euler", "semi-implicit-euler", "increment", "absolute"]
+)
+def test_of_a_linear_law_the_linearisation_flies_as_the_law_does(form):
+    twin = linear_twin(form)
+    at = np.array([0.2, -1.0])
+    plant = twin.linearise(at, COMMANDS[0], discrete=True)
+    assert plant.states[2:4] == ("hidden_1", "hidden_2")
+    flown = twin.simulate_commands(at, COMMANDS).true_states
+    x = plant.state.copy()
+    begun = x.copy()
+    for state, u in zip(flown[1:], COMMANDS, strict=True):
+        x = begun + plant.A @ (x - begun) + plant.B @ (u - COMMANDS[0]) + plant.drift
+        np.testing.assert_allclose(x[:2], state, rtol=1e-9, atol=1e-9)
+
+
+def test_at_an_instant_what_is_stored_is_filled_by_the_state_and_empties():
+    plant = linear_twin().linearise([0.2, -1.0], [0.5, 1.0])
+    np.testing.assert_allclose(plant.A[2:], [[0.0, 0.0, -2.5, 0.0], [0.0, 1.0 / 8.0, 0.0, -2.5]])
+    np.testing.assert_allclose(plant.A[1], [-3.0, -0.4, 2.0, -14.0])
+    np.testing.assert_allclose(plant.drift[3], 0.0, atol=1e-15)
+
+
+def test_a_body_that_turns_stores_as_well():
+    """With the attitude as a quaternion and in several steps a period, what is stored is integrated along."""
+    stored = [((), False, 0.0, 0.3, (3,), False)]
+    lines = ["r8 = r6 * 2.0", "r11 = r7 * -30.0", "r8 = r8 + r11"]
+    twin = twin_of(lines, signals=BODY, inputs=8, actuators=[(0.0, 0, None)], hidden=stored)
+    commands = RNG.uniform(-2.0, 2.0, (40, 1))
+    found = twin.simulate_commands(np.zeros(6), commands).true_states
+    y = np.zeros(2)
+    for state, u in zip(found[1:], commands, strict=True):
+        # p' = 2 u / 2 − 30 h, h' = p / 5 − h / 0.3; nothing else turns, and so roll is the integral of p.
+        y = solve_ivp(
+            lambda t, y, u=u: [u[0] - 30.0 * y[1], y[0] / 5.0 - y[1] / 0.3],
+            (0.0, 0.05),
+            y,
+            rtol=1e-10,
+            atol=1e-12,
+        ).y[:, -1]
+        np.testing.assert_allclose(state[3], y[0], atol=1e-5)
+
+
+def test_its_equations_say_what_fills_it_and_how_it_begins():
+    text = stored_twin().equations(3)
+    assert "d hidden_1 / dt = torque_scaled - 0 - hidden_1/0.4" in text
+    assert "d hidden_2 / dt = (rate/8) - 0.25 - hidden_2/0.4" in text
+    assert "as it settles under what fills it at the start" in text
+
+
+def test_a_law_and_a_record_give_it_back_to_the_bit():
+    twin = stored_twin()
+    law = Law.of(twin.model, SIGNALS)
+    assert same(Law.of(law.model(), SIGNALS).actuation, law.actuation)
+    again = tl.Twin.from_record(through_json(twin.to_record()))
+    run, other = (each.simulate_commands([0.1, 0.5], COMMANDS) for each in (twin, again))
+    assert same(run.true_states, other.true_states)
+
+
+@pytest.mark.parametrize("kind", ["python", "c", "casadi", "control", "gymnasium"])
+def test_an_export_that_lacks_it_says_so(kind):
+    with pytest.raises(tl.NotAvailable, match="motion fills"):
+        stored_twin().export(
+            kind if kind in ("python", "c") else "twin.py", kind=None if kind in ("python", "c") else kind
+        )
+    assert "hidden_2" in stored_twin().export("latex")
+    assert "hidden_2" in stored_twin().export("sympy")
+
+
+def test_a_step_knows_no_past_of_it_and_an_environment_does():
+    pytest.importorskip("gymnasium")
+    twin = stored_twin()
+    with pytest.raises(tl.NotAvailable, match="simulate_commands"):
+        twin.predict([0.1, 0.5], COMMANDS[1], past=COMMANDS[:1])
+    env = twin.env([0.1, 0.5], [0.0, 0.0], 10)
+    env.reset()
+    seen = [env.step(u)[0] for u in COMMANDS[:10]]
+    assert same(np.array(seen), twin.simulate_commands([0.1, 0.5], COMMANDS[:10]).true_states[1:])
