@@ -96,16 +96,6 @@ impl<'a> Model<'a> {
             Some(line) => [&line.effects[0][..], &line.effects[1][..], &line.effects[2][..]],
         };
         match self.frame.form {
-            form @ (Form::Absolute | Form::Increment) => {
-                let outputs = self.outputs(bank, storage, state, effects[1]);
-                if form == Form::Absolute {
-                    state.copy_from_slice(outputs);
-                } else {
-                    for (state, &output) in state.iter_mut().zip(outputs) {
-                        *state = *state + output;
-                    }
-                }
-            }
             Form::Acceleration => {
                 let field = Held { model: self, bank, storage, effects, stage: 0 };
                 match &self.frame.body {
@@ -113,9 +103,18 @@ impl<'a> Model<'a> {
                     Some(body) => turn(state, self.frame, stages, field, body, turned, seen),
                 }
             }
-            form @ (Form::ExplicitEuler | Form::SemiImplicitEuler) => {
-                let outputs = self.outputs(bank, storage, state, effects[0]);
-                euler(state, outputs, self.frame, form == Form::SemiImplicitEuler);
+            form => {
+                let stepped = matches!(form, Form::ExplicitEuler | Form::SemiImplicitEuler);
+                let outputs = self.outputs(bank, storage, state, effects[usize::from(!stepped)]);
+                match form {
+                    Form::Absolute => state.copy_from_slice(outputs),
+                    Form::Increment => {
+                        for (state, &output) in state.iter_mut().zip(outputs) {
+                            *state = *state + output;
+                        }
+                    }
+                    _ => euler(state, outputs, self.frame, form == Form::SemiImplicitEuler),
+                }
             }
         }
     }
