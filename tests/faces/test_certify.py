@@ -215,7 +215,7 @@ def test_margins_of_loops_that_are_unstable_or_around_a_twin_that_does_not_follo
 
 
 def test_nothing_told_is_no_certificate():
-    with pytest.raises(tl.NotAvailable, match="told"):
+    with pytest.raises(tl.NotAvailable, match="at least one recorded experiment"):
         rig_campaign().certificate()
 
 

@@ -10,6 +10,7 @@ Spong, Robot modeling and control, for equations of motion; Gauss's elimination 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -43,6 +44,8 @@ TURNS = 4
 """How often equations are searched at most, each time with the accelerations that the last ones give."""
 LIKELY = 5
 """Subsets of a short walk, the best ones, that tell whether joints may share a mass."""
+SLACK = 30.0
+"""By how much, in units of χ², an equation with a shared mass may be longer at first than what is known."""
 STARTS = 3
 """Walks among the terms of each equation."""
 STEPS = 12
@@ -126,6 +129,7 @@ class _Joints:
     def __init__(self, problem: Problem, signals: Signals, known: Sequence[Sum], walks: Walks) -> None:
         self.problem, self.pool, self.known = problem, problem.pool, list(known)
         self.walks, self.least, self.states = walks, walks.with_moves(LEAST), signals.n_x
+        self.numbers = itertools.count(FIRST + TURNS)
         rubbing = frictions_in(self.pool, (node for sum_ in known for node in sum_.weights))
         self.forces = problem.usable(list(dict.fromkeys([*forces(self.pool, signals), *rubbing])))
         self.masses = problem.usable(masses(self.pool, signals))
@@ -149,8 +153,9 @@ class _Joints:
     def judged(self, found: Sequence[Sum]) -> float:
         """Description length of the known sums, each under the noise of a found one if it is shorter there."""
         length = 0.0
-        for number, (known, new) in enumerate(zip(self.known, found, strict=True), FIRST + TURNS + MOST):
-            (again,) = search(self.problem, [new.chain], list(known.weights), [None], self.least.part(number))
+        for known, new in zip(self.known, found, strict=True):
+            walks = self.least.part(next(self.numbers))
+            (again,) = search(self.problem, [new.chain], list(known.weights), [None], walks)
             length += min(known.description_length, again.description_length)
         return length
 
@@ -225,9 +230,10 @@ class _Joints:
         own: list[tuple[int, ...]] = [()] * len(costs)
         best: list[tuple[float, _Part]] = [(np.inf, ([], []))] * len(costs)
         part = NOISE_ROUNDS + 2 + number * (OWN + 1) * len(self.masses)
+        offered = [self.pool.one]
         for round_ in range(OWN + 1):
             before = list(own)
-            for term in self.masses if round_ else [self.pool.one]:
+            for term in offered:
                 allowed = [(*terms, term) if round_ else () for terms in before]
                 limited = [self._restricted(i, costs[i], posed.pairs[i], allowed[i]) for i in joints]
                 walked = several.part(part).among(posed.grams, limited, self.problem.workers)
@@ -239,7 +245,24 @@ class _Joints:
                         best[i], own[i] = (length, found), allowed[i]
             if round_ and own == before:
                 break
+            offered = self._poses_shared(posed, [found for _, found in best]) if round_ == 0 else offered
         return [found for _, found in best]
+
+    def _poses_shared(self, posed: _Posed, parts: Sequence[_Part]) -> list[int]:
+        """Terms of the poses on which it depends what joints do to each other: on others their own masses do not."""
+        count = len(self.forces)
+        between = [
+            posed.pairs[i][place - count][1]
+            for i, (subset, _) in enumerate(parts)
+            for place in subset
+            if place >= count and posed.pairs[i][place - count][0] != i
+        ]
+        inputs = set(self.pool.needed(between)) & set(range(self.states))
+        return [
+            term
+            for term in self.masses
+            if term != self.pool.one and set(self.pool.needed([term])) & set(range(self.states)) <= inputs
+        ]
 
     def _restricted(self, joint: int, costs: Floats, pairs: _Pairs, allowed: Sequence[int]) -> Floats:
         """Prices under which a joint's own mass depends on some terms only."""
@@ -274,7 +297,10 @@ class _Joints:
         pairs: Sequence[_Pairs],
         walks: Walks,
     ) -> bool:
-        """Whether one short walk under the noise that is known comes upon a shared mass: without, no more is spent."""
+        """Whether a short walk under the noise that is known comes upon a shared mass that may pay.
+
+        Without, no more is spent.
+        """
         grams = [
             self.problem.regression(found.chain, own).gram(
                 found.chain.sensors, found.chain.motion, self.problem.workers
@@ -283,10 +309,19 @@ class _Joints:
         ]
         short = walks.with_moves(walks.moves // 2)
         return any(
-            self._couples(i, subset, pairs[i])
+            self._couples(i, subset, pairs[i]) and length < self._apart(known[i]) + SLACK
             for i, walked in enumerate(short.among(grams, costs, self.problem.workers))
-            for subset, _ in walked[:LIKELY]
+            for subset, length in walked[:LIKELY]
         )
+
+    def _apart(self, known: Sum) -> float:
+        """Description length of an acceleration by its known sum, under the noise that is known."""
+        chain, terms = known.chain, self.problem.usable(list(known.weights))
+        regression = self.problem.regression(chain, self.problem.values(terms))
+        gram = regression.gram(chain.sensors, chain.motion, self.problem.workers)
+        solved = gram.solve(list(range(len(terms))), RIDGE)
+        costs = prices(self.pool, terms, self.problem.readings(chain), len(self.problem.runs))
+        return np.inf if solved is None else solved[2] + float(costs.sum())
 
     def _couples(self, joint: int, subset: Sequence[int], pairs: _Pairs) -> bool:
         """Whether another joint's acceleration is among some columns of a joint's equation."""
@@ -363,17 +398,14 @@ class _Joints:
         matrix = [[equation.of_joint(j) for j in range(count)] for equation in equations]
         nodes = solution(self.pool, matrix, [equation.terms for equation in equations])
         found = []
-        for number, (node, sum_, cost) in enumerate(
-            zip(nodes, self.known, costs, strict=True), FIRST + TURNS
-        ):
+        for node, sum_, cost in zip(nodes, self.known, costs, strict=True):
             readings = self.problem.readings(sum_.chain)
             if node is None or not self.problem.usable([node[0]]):
                 return None
             self.pool.found[node[0]] = 0.5 * (cost - float(log(max(2, readings))))
             self.pool.rungs[node[0]] = 0
-            (best,) = search(
-                self.problem, [sum_.chain], [node[0]], [None], replace(self.least.part(number), largest=1)
-            )
+            walks = replace(self.least.part(next(self.numbers)), largest=1)
+            (best,) = search(self.problem, [sum_.chain], [node[0]], [None], walks)
             found.append(best)
         return found
 
