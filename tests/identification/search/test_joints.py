@@ -168,7 +168,7 @@ ARM = tl.Signals(
 )
 
 
-BRIEF = {"generations": 0, "committee_size": 2, "lags": False, "moves": 8000, "contacts": False}
+BRIEF = {"generations": 0, "committee_size": 2, "lags": False, "moves": 16000, "contacts": False}
 
 
 def moved(seed, rubs, steps=120):
