@@ -308,11 +308,17 @@ class _Joints:
             for found, own in zip(known, columns, strict=True)
         ]
         short = walks.with_moves(walks.moves // 2)
+        # A law of joints that was nearly right describes much with few terms beside it, and is to be found again.
+        again = any(self._solves(found) for found in known)
         return any(
-            self._couples(i, subset, pairs[i]) and length < self._apart(known[i]) + SLACK
+            self._couples(i, subset, pairs[i]) and (again or length < self._apart(known[i]) + SLACK)
             for i, walked in enumerate(short.among(grams, costs, self.problem.workers))
             for subset, length in walked[:LIKELY]
         )
+
+    def _solves(self, known: Sum) -> bool:
+        """Whether a sum has a term that was solved from equations of joints, or is a quotient of its own."""
+        return any(self.pool[node].operation == "/" for node in self.pool.needed(known.weights))
 
     def _apart(self, known: Sum) -> float:
         """Description length of an acceleration by its known sum, under the noise that is known."""
