@@ -163,21 +163,16 @@ class _Seen:
 
 def _cause(seen: Sequence[_Seen], state: int, place: int, limits: Limits) -> Cause:
     """The cause of what disturbs one chain, as flights tell it: from outside, where nothing speaks against that."""
-    signals = limits.signals
-    nearby = alike_nearby(
-        [
-            (
-                in_scales(flight.run.trajectory.states, flight.run.trajectory.commands, signals),
-                flight.gusts[1:, place],
-            )
-            for flight in seen
-        ]
-    )
     by_time = cause(_by_task(seen, place))
-    if by_time == "law" or _is_foretold(seen, state, place, signals):
+    if by_time == "law" or _is_foretold(seen, state, place, limits.signals):
         return "law"
-    unsure = not foreign(nearby) or comes_at_moments([flight.gusts[1:, place] for flight in seen])
-    return "undecided" if unsure or acts_in_motion(_sizes_and_speeds(seen, place, limits)) else by_time
+    unsure = (
+        by_time == "undecided"
+        or comes_at_moments([flight.gusts[1:, place] for flight in seen])
+        or acts_in_motion(_sizes_and_speeds(seen, place, limits))
+        or not foreign(_nearby(seen, place, limits.signals))
+    )
+    return "undecided" if unsure else "disturbance"
 
 
 def _by_task(seen: Sequence[_Seen], place: int) -> list[list[Floats]]:
@@ -206,6 +201,19 @@ def _is_foretold(seen: Sequence[_Seen], state: int, place: int, signals: Signals
         if flight.free is not None
     ]
     return foretold(frees).certain(SURE)
+
+
+def _nearby(seen: Sequence[_Seen], place: int, signals: Signals) -> Likeness:
+    """How alike what disturbs one chain is where flights are in the same states under the same commands."""
+    return alike_nearby(
+        [
+            (
+                in_scales(flight.run.trajectory.states, flight.run.trajectory.commands, signals),
+                flight.gusts[1:, place],
+            )
+            for flight in seen
+        ]
+    )
 
 
 def _sizes_and_speeds(seen: Sequence[_Seen], place: int, limits: Limits) -> list[tuple[Floats, Floats]]:
