@@ -12,7 +12,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.law.actuation import HiddenState
 from twinloop.objectives import normalised_error
-from twinloop.records import Record, Recorded
+from twinloop.records import Record, Recorded, with_names
 from twinloop.remarks import Remark
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -167,10 +167,6 @@ class Planned(Recorded, kind="planned"):
     flown: float | None = None
 
 
-def _of_four(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 4
-
-
 @dataclass(frozen=True)
 class Lesson(Recorded, kind="lesson"):
     """One identification of the preset `default`, and the tests planned after it.
@@ -226,12 +222,8 @@ class Lesson(Recorded, kind="lesson"):
     def renewed(cls, record: Record) -> Record:
         """A record of an earlier version, in which commands alone filled hidden states, that had no names."""
         found = super().renewed(record)
-        hidden = found.get("hidden")
-        if isinstance(hidden, list):
-            found["hidden"] = [
-                dict(zip(HiddenState._fields, [*one, [], False], strict=True)) if _of_four(one) else one
-                for one in hidden
-            ]
+        if "hidden" in found:
+            found["hidden"] = with_names(found["hidden"], HiddenState._fields, [], False)
         return found
 
     def cause(self, state: str) -> Cause:

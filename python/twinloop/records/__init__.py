@@ -1,6 +1,25 @@
 """The plain form of values: numbers, texts, lists and dicts that JSON holds without loss."""
 
 from twinloop.records.reading import from_text
-from twinloop.records.recorded import KINDS, Record, Recorded, checked_record, plain, read, to_text
+from twinloop.records.recorded import (
+    KINDS,
+    Record,
+    Recorded,
+    checked_record,
+    plain,
+    read,
+    to_text,
+    with_names,
+)
 
-__all__ = ["KINDS", "Record", "Recorded", "checked_record", "from_text", "plain", "read", "to_text"]
+__all__ = [
+    "KINDS",
+    "Record",
+    "Recorded",
+    "checked_record",
+    "from_text",
+    "plain",
+    "read",
+    "to_text",
+    "with_names",
+]

@@ -156,6 +156,25 @@ def checked_record(
     return rest
 
 
+def with_names(items: object, names: Sequence[str], *later: object) -> object:
+    """What an earlier version wrote as bare lists, as values with names.
+
+    Args:
+        items: of a record; what is no list of bare lists of the right length stays, for reading refuses it.
+        names: of the values.
+        later: the last values, which that version did not have.
+    """
+    if not isinstance(items, list):
+        return items
+    bare = len(names) - len(later)
+    return [
+        dict(zip(names, [*item, *later], strict=True))
+        if isinstance(item, list) and len(item) == bare
+        else item
+        for item in items
+    ]
+
+
 def plain(value: object) -> Any:
     """A value as numbers, texts, lists and dicts.
 

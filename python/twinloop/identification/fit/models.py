@@ -20,7 +20,7 @@ def model_of(context: Context, hypothesis: Hypothesis) -> _core.Model:
     """The model whose outputs are a hypothesis' sums; without the last hidden states that no sum uses."""
     pool, actuation = hypothesis.pool, hypothesis.actuation
     used = (pool.reach(term) - pool.inputs for found in hypothesis.sums for term in found.weights)
-    actuation = replace(actuation, hidden=actuation.hidden[: max(0, *used, 0)])
+    actuation = replace(actuation, hidden=actuation.hidden[: max(used, default=0)])
     outputs = [dict.fromkeys(_fixed(hypothesis, found), 1.0) | found.weights for found in hypothesis.sums]
     if hypothesis.form == "absolute":
         for i, terms in enumerate(outputs):

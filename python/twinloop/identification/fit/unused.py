@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.terms.pool import Pool
-from twinloop.law.expressions import INPUT, Node
+from twinloop.law.expressions import Node
 
 
 def without_unused(hypothesis: Hypothesis) -> Hypothesis:
@@ -19,7 +19,7 @@ def without_unused(hypothesis: Hypothesis) -> Hypothesis:
     if len(hidden) < 2:
         return hypothesis
     used = sorted(
-        {number for found in hypothesis.sums for term in found.weights for number in _in(pool, term)}
+        {number for found in hypothesis.sums for term in found.weights for number in pool.hidden_in(term)}
     )
     if used == list(range(len(used))):
         return hypothesis
@@ -39,16 +39,6 @@ def without_unused(hypothesis: Hypothesis) -> Hypothesis:
     candidates = candidates.with_terms(term for term in terms if candidates.pool.is_hidden(term))
     actuation = replace(hypothesis.actuation, hidden=tuple(hidden[number] for number in used))
     return replace(hypothesis, actuation=actuation, candidates=candidates, sums=sums)
-
-
-def _in(pool: Pool, term: int) -> set[int]:
-    """Numbers of the hidden states in a term."""
-    parts = (pool[part] for part in pool.needed([term]))
-    return {
-        int(part.value) - pool.inputs
-        for part in parts
-        if part.operation == INPUT and part.value >= pool.inputs
-    }
 
 
 def _moved(pool: Pool, node: int, made: dict[int, int]) -> int:

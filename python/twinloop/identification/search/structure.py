@@ -19,7 +19,7 @@ from twinloop.identification.search.walks import Subsets, Walks
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
 from twinloop.identification.terms.pool import Pool
-from twinloop.records import Record, Recorded
+from twinloop.records import Record, Recorded, with_names
 
 Weights = dict[int, float]
 """Coefficients of a sum, by node."""
@@ -82,16 +82,9 @@ class Sum(Recorded, kind="sum"):
     def renewed(cls, record: Record) -> Record:
         """A record of an earlier version, in which other subsets had no names."""
         found = super().renewed(record)
-        others = found.get("others")
-        if isinstance(others, list):
-            found["others"] = [
-                dict(zip(Other._fields, other, strict=True)) if _is_pair(other) else other for other in others
-            ]
+        if "others" in found:
+            found["others"] = with_names(found["others"], Other._fields)
         return found
-
-
-def _is_pair(value: object) -> bool:
-    return isinstance(value, list) and len(value) == len(Other._fields)
 
 
 def prices(

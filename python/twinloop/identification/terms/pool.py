@@ -128,12 +128,17 @@ class Pool(Expressions, Recorded, kind="pool"):
 
     def is_hidden(self, number: int) -> bool:
         """Whether a node is made of a hidden state."""
-        return self.reach(number) > self.inputs
+        return bool(self.hidden_in(number))
+
+    def hidden_in(self, number: int) -> set[int]:
+        """Numbers of the hidden states that a node is made of."""
+        parts = (self[part] for part in self.needed([number]))
+        places = (int(part.value) - self.inputs for part in parts if part.operation == INPUT)
+        return {place for place in places if place >= 0}
 
     def reach(self, number: int) -> int:
         """How many inputs, hidden states among them, a node needs at least; `inputs` where nothing is hidden in it."""
-        parts = (self[part] for part in self.needed([number]))
-        return max((int(part.value) + 1 for part in parts if part.operation == INPUT), default=0)
+        return self.inputs + max(self.hidden_in(number), default=-1) + 1
 
     def product(self, *factors: int) -> int:
         """The node of a product of several nodes."""
