@@ -13,8 +13,9 @@ import click
 
 from twinloop._ground.arrays import whole
 from twinloop.campaign.remaining import duration
-from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.errors import NotAvailable, unknown
 from twinloop.faces.files import write_text
+from twinloop.sweep.seeds import seeds_of
 from twinloop.sweep.workers import HERE, processes
 from twinloop_exam.kinds import Fitter, Tuner
 from twinloop_exam.learners import LEARNERS, for_smoke, learner
@@ -87,7 +88,7 @@ def power(
     names = _chosen("system of the exam", systems, SMOKE_SYSTEMS if smoke else list(SUBJECTS), SUBJECTS)
     known = [name for name in LEARNERS if not (smoke and _matches(name, SMOKE_LEFT_OUT))]
     chosen = [learner(name) for name in _chosen("learner", learners, known, LEARNERS)]
-    chosen_seeds = SMOKE_SEEDS if smoke and seeds is None else None if seeds is None else _seeds(seeds)
+    chosen_seeds = SMOKE_SEEDS if smoke and seeds is None else None if seeds is None else seeds_of(seeds)
     names, chosen = available(names, chosen, _say)
     source = learner("ours" if data is None else data)
     if smoke:
@@ -183,20 +184,6 @@ def _chosen(kind: str, asked: str | None, by_default: Sequence[str], known: Iter
 
 def _matches(name: str, patterns: Sequence[str]) -> bool:
     return any(fnmatch(name, pattern) for pattern in patterns)
-
-
-def _seeds(text: str) -> range:
-    first, separator, end = text.partition(":")
-    try:
-        low = int(first)
-        high = int(end) if separator else low + 1
-    except ValueError:
-        low, high = 0, 0
-    if not 0 <= low < high:
-        raise InvalidInput(
-            f"--seeds: expected FIRST:LAST+1, such as 10:35, found {text!r}; write both numbers."
-        )
-    return range(low, high)
 
 
 def _say(sentence: str) -> None:

@@ -14,6 +14,7 @@ from twinloop.sweep.campaigns import Outcome
 from twinloop.sweep.campaigns import sweep as fly_all
 from twinloop.sweep.jobs import Job, crossed
 from twinloop.sweep.progress import JobBar
+from twinloop.sweep.seeds import seeds_of
 from twinloop.sweep.summary import as_text, summarised
 from twinloop.sweep.workers import HERE
 
@@ -57,7 +58,7 @@ def sweep(
     """
     jobs = crossed(
         systems,
-        _seeds(seeds),
+        list(seeds_of(seeds)),
         presets=[name.strip() for name in presets.split(",")],
         options=_varied(vary),
         experiments=experiments,
@@ -80,15 +81,6 @@ def _work(jobs: list[Job], store: str, cluster: str, outcomes: list[Outcome]) ->
         for outcome in fly_all(jobs, store if is_address(store) else Path(store), cluster):
             outcomes.append(outcome)
             bar.advance(outcome.job.name, outcome.failure, known=outcome.seconds is None)
-
-
-def _seeds(text: str) -> list[int]:
-    first, colon, last = text.partition(":")
-    if not first.isdecimal() or (colon and not last.isdecimal()):
-        raise InvalidInput(
-            f"--seeds: expected FIRST:LAST+1 or one seed, found {text!r}; such as --seeds 0:10."
-        )
-    return list(range(int(first), int(last))) if colon else [int(first)]
 
 
 def _varied(changes: tuple[str, ...]) -> dict[str, list[str]]:

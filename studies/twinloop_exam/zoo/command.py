@@ -11,8 +11,9 @@ from pathlib import Path
 import click
 
 from twinloop._ground.arrays import whole
-from twinloop.errors import InvalidInput, unknown
+from twinloop.errors import unknown
 from twinloop.sweep.progress import JobBar
+from twinloop.sweep.seeds import seeds_of
 from twinloop.sweep.workers import HERE, finished, processes
 from twinloop_exam.ablations import ABLATIONS, SMOKE_OPTIONS, ablation
 from twinloop_exam.tables import as_markdown, as_text
@@ -89,7 +90,7 @@ def zoo(
 
 
 def _jobs(names: Sequence[str], seeds: str, flights: int) -> list[Job]:
-    return [Job(name, seed, flights) for seed in _seeds(seeds) for name in names]
+    return [Job(name, seed, flights) for seed in seeds_of(seeds) for name in names]
 
 
 def _smoke_jobs(names: Sequence[str]) -> list[Job]:
@@ -179,15 +180,6 @@ def _ablations(text: str | None) -> list[str]:
     for name in names:
         ablation(name)
     return list(dict.fromkeys(names))
-
-
-def _seeds(text: str) -> range:
-    first, colon, last = text.partition(":")
-    if not first.isdecimal() or (colon and not last.isdecimal()):
-        raise InvalidInput(
-            f"--seeds: expected FIRST:LAST+1 or one seed, found {text!r}; such as --seeds 0:5."
-        )
-    return range(int(first), int(last)) if colon else range(int(first), int(first) + 1)
 
 
 def _say(sentence: str) -> None:
