@@ -56,14 +56,11 @@ WORTH = 20.0
 """What equations must gain together, in units of χ², beside their price: as much as a rung of the ladder."""
 RIDGE = 1e-12
 """Added to the columns' unit lengths."""
-
 OWN = 3
 """Terms at most that the mass of a joint itself depends on."""
 
 _Pairs = Sequence[tuple[int, int]]
 """Joints with the terms that stand before their accelerations."""
-
-
 _Part = tuple[list[int], list[float]]
 """Columns of an equation, and their weights."""
 
@@ -176,7 +173,7 @@ class _Joints:
         return shortest(several, total) if several else None
 
     def _posed(self, known: Sequence[Sum], walks: Walks) -> _Posed | None:
-        """What equations are chosen from; None where a short walk comes upon no shared mass."""
+        """What equations are chosen from; None where a short walk comes upon no shared mass that may pay."""
         accelerations = [driving(self.problem, sum_) for sum_ in known]
         pairs = [
             [
@@ -225,16 +222,22 @@ class _Joints:
 
         What its own mass depends on enters one term at a time: several of them together are next to nothing on flights
         in which poses vary little, and such a mass times the acceleration is explained by no force at all.
+
+        Args:
+            posed: what is chosen from.
+            costs: of the columns of each joint, infinite where one may not be chosen.
+            walks: of the turn.
+            number: of the choice in the turn, by which its walks are told from those of others.
         """
         several, joints = replace(walks, starts=STARTS), range(len(costs))
         own: list[tuple[int, ...]] = [()] * len(costs)
         best: list[tuple[float, _Part]] = [(np.inf, ([], []))] * len(costs)
         part = NOISE_ROUNDS + 2 + number * (OWN + 1) * len(self.masses)
-        offered = [self.pool.one]
+        offered: list[int | None] = [None]
         for round_ in range(OWN + 1):
             before = list(own)
             for term in offered:
-                allowed = [(*terms, term) if round_ else () for terms in before]
+                allowed = [terms if term is None else (*terms, term) for terms in before]
                 limited = [self._restricted(i, costs[i], posed.pairs[i], allowed[i]) for i in joints]
                 walked = several.part(part).among(posed.grams, limited, self.problem.workers)
                 part += 1
@@ -245,11 +248,12 @@ class _Joints:
                         best[i], own[i] = (length, found), allowed[i]
             if round_ and own == before:
                 break
-            offered = self._poses_shared(posed, [found for _, found in best]) if round_ == 0 else offered
+            if round_ == 0:
+                offered = [*self._poses_shared(posed, [found for _, found in best])]
         return [found for _, found in best]
 
     def _poses_shared(self, posed: _Posed, parts: Sequence[_Part]) -> list[int]:
-        """Terms of the poses on which it depends what joints do to each other: on others their own masses do not."""
+        """Terms of those angles on which the masses between joints depend; their own masses depend on no others."""
         count = len(self.forces)
         between = [
             posed.pairs[i][place - count][1]
@@ -309,15 +313,15 @@ class _Joints:
         ]
         short = walks.with_moves(walks.moves // 2)
         # A law of joints that was nearly right describes much with few terms beside it, and is to be found again.
-        again = any(self._solves(found) for found in known)
+        again = any(self._divides(found) for found in known)
         return any(
             self._couples(i, subset, pairs[i]) and (again or length < self._apart(known[i]) + SLACK)
             for i, walked in enumerate(short.among(grams, costs, self.problem.workers))
             for subset, length in walked[:LIKELY]
         )
 
-    def _solves(self, known: Sum) -> bool:
-        """Whether a sum has a term that was solved from equations of joints, or is a quotient of its own."""
+    def _divides(self, known: Sum) -> bool:
+        """Whether there is a quotient in a sum, as there is where it was solved from equations of joints."""
         return any(self.pool[node].operation == "/" for node in self.pool.needed(known.weights))
 
     def _apart(self, known: Sum) -> float:
