@@ -49,8 +49,9 @@ import sys, twinloop as tl
 campaign = tl.Campaign.load("hover.db", read_only=True)
 cells = [campaign._repr_html_(), campaign.plot.step()._repr_svg_()]
 open("notebook.html", "w", encoding="utf-8").write("<!doctype html><meta charset=utf-8>" + "<hr>".join(cells))
+campaign.plot.unseen().save("unseen.svg")
 """
-"""What two cells of a notebook give: the campaign, and one of its figures."""
+"""What two cells of a notebook give, the campaign and one of its figures; and the figure of the README."""
 PAGES = {
     "report-good": ("hover.html", 1280, 900),
     "report-twin": ("hover.html#unseen", 1280, 1000),
@@ -87,6 +88,7 @@ def main() -> int:
         twinloop(room, COMMANDS[-2])
         example = ROOT / "examples" / "end_stop.py"
         subprocess.run([sys.executable, example, "end_stop.html"], cwd=room, check=True)
+        shutil.copy(room / "unseen.svg", PICTURES)
         take(room)
     MADE.write_text(json.dumps({"commands": COMMANDS, "sources": digest()}, indent=1) + "\n")
     return 0
