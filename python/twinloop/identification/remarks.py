@@ -187,5 +187,8 @@ def remarks(
         )
     said += [remark for found in sums for remark in identities(found, pool, signals)]
     if ignored:
-        said.append(note("outliers", f"{ignored} reading{'s' if ignored > 1 else ''} ignored as outliers."))
+        several = (
+            f"{ignored} readings ignored as outliers." if ignored > 1 else "1 reading ignored as an outlier."
+        )
+        said.append(note("outliers", several))
     return said

@@ -36,16 +36,16 @@ class Actuator(NamedTuple):
 class HiddenState(NamedTuple):
     """An unmeasured state h that commands or states drive: dh/dt = level − rest − h / time.
 
-    The level is the mean over its sources of what each gives, in units of its scale. h is 0 at the start of a run, or
-    what it settles at under the first level.
+    The level is the mean over its sources of what each gives, in units of its scale. At the start of a run h is 0, or
+    in steady state under the first level.
 
     Args:
-        commands: places of those that fill it; none where states do.
-        squared: whether its sources fill it with their squares.
-        rest: level at which it neither fills nor empties; None, of commands alone: that of the first period.
+        commands: places of those that drive it; none where states do.
+        squared: whether its sources drive it with their squares.
+        rest: level that does not drive it; None, of commands alone: that of the first period.
         time: after which 1/e of it is left, s.
-        states: places of the states that fill it; none where commands do.
-        settled: whether a run begins with it settled at what fills it then; only where states fill it.
+        states: places of the states that drive it; none where commands do.
+        settled: whether a run begins with it in steady state; only where states drive it.
     """
 
     commands: tuple[int, ...]
@@ -65,9 +65,10 @@ class Actuation(Recorded, kind="actuation"):
         hidden: states that commands drive, then those that other states drive.
     """
 
-    VERSION = 2
     actuators: tuple[Actuator, ...]
     hidden: tuple[HiddenState, ...] = ()
+
+    VERSION = 2
 
     @staticmethod
     def direct(signals: Signals) -> Actuation:

@@ -334,7 +334,8 @@ class Twin(Shown, Recorded, kind="twin"):
 
         Raises:
             InvalidInput: shapes that do not fit.
-            NotAvailable: a past of a law whose hidden states are filled by motion, which commands do not tell.
+            NotAvailable: a past of a law with hidden states that measured states drive: earlier commands do not give
+                them.
         """
         if past is not None and self.law.actuation.stored:
             raise NotAvailable(
