@@ -23,7 +23,7 @@ pub struct Start<'a, V> {
     pub disturbance: &'a [V],
 }
 
-/// The two sources of commands. Both are in the same loop, for each copy of it takes its time to compile.
+/// The two sources of commands, laws and records. Both are in the same loop, for each copy of it takes its time to compile.
 #[derive(Clone, Copy)]
 pub enum Commands<'a, V> {
     /// Controllers that answer what they read.
@@ -37,8 +37,10 @@ pub enum Commands<'a, V> {
         /// What is added to the commands before they are clipped to their bounds.
         excitation: Excitation<'a, V>,
     },
-    /// A record, n × n_u, sent as it is.
-    Record(&'a [V]),
+    /// Records, n × n_u, one a lane, sent as they are.
+    Records(&'a [V]),
+    /// One record, n × n_u, sent to all lanes.
+    Record(&'a [f64]),
 }
 
 /// One step of the loops, as it is shown to a watcher.
@@ -57,6 +59,11 @@ pub struct Seen<'a, V> {
 
 /// What looks on. A trait and not a closure, because only a named function can be made to be inlined.
 pub trait Watch<V> {
+    /// May correct the states (n_x) that a run has come to, by what was read of them: an observer does. It is asked at each
+    /// of the n + 1 states in turn, before anything is sent.
+    #[inline(always)]
+    fn correct(&mut self, _at: usize, _state: &mut [V]) {}
+
     /// Is shown each step in turn.
     fn see(&mut self, seen: Seen<'_, V>);
 }
@@ -82,7 +89,7 @@ pub(crate) struct Midway<W, V> {
     pub controllers: Option<Controllers<V>>,
 }
 
-/// The same from the midst of a run; targets and excitation are those from there on.
+/// The same with a workspace of one's own, such as one in the midst of a run; targets and excitation are those from there on.
 #[inline(always)]
 pub(crate) fn resumed<'a, V: Vector>(
     dynamics: AnyDynamics<'a>,
@@ -133,6 +140,7 @@ fn looped<D: Dynamics, V: Vector>(
     let states = initial.len();
     let width = match commands {
         Commands::Law { family, .. } => family.commands(),
+        Commands::Records(rows) => rows.len() / steps,
         Commands::Record(rows) => rows.len() / steps,
     };
     let Midway { mut workspace, mut controllers } = match (midway, commands) {
@@ -140,7 +148,7 @@ fn looped<D: Dynamics, V: Vector>(
         (None, Commands::Law { family, parameters, .. }) => {
             Midway { workspace: dynamics.workspace(), controllers: Some(family.start(parameters)) }
         }
-        (None, Commands::Record(_)) => Midway { workspace: dynamics.workspace(), controllers: None },
+        (None, _) => Midway { workspace: dynamics.workspace(), controllers: None },
     };
     let mut state = initial.to_vec();
     let mut reading = initial.to_vec();
@@ -153,6 +161,7 @@ fn looped<D: Dynamics, V: Vector>(
     let mut alive = V::splat(1.0);
     let mut lasted = vec![steps; V::LANES];
     for step in 0..steps {
+        watch.correct(step, &mut state);
         reading.copy_from_slice(if late.is_empty() { &state } else { &late });
         if !noise.is_empty() {
             add(&mut reading, &noise[step * states..]);
@@ -185,10 +194,11 @@ fn looped<D: Dynamics, V: Vector>(
                 }
             }
             if !V::splat(0.0).any_less(alive) {
-                break;
+                return lasted;
             }
         }
     }
+    watch.correct(steps, &mut state);
     lasted
 }
 
@@ -211,9 +221,15 @@ impl<V: Vector> Apart for Send<'_, V> {
                 family.command(controllers, self.reading, target, self.command);
                 excitation.add(family, self.step, self.reading, self.command);
             }
-            (Commands::Record(rows), _) => {
+            (Commands::Records(rows), _) => {
                 let width = self.command.len();
                 self.command.copy_from_slice(&rows[self.step * width..][..width]);
+            }
+            (Commands::Record(rows), _) => {
+                let sent = &rows[self.step * self.command.len()..];
+                for (command, &sent) in self.command.iter_mut().zip(sent) {
+                    *command = V::splat(sent);
+                }
             }
             (Commands::Law { .. }, None) => unreachable!("a law has its controllers"),
         }

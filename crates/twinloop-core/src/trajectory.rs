@@ -167,19 +167,19 @@ impl<'a> Runs<'a> {
         read: Vec<f64>,
         fly: impl FnOnce(&Start<'_, V>, &mut Recorder<'_>) -> Vec<usize>,
     ) -> Vec<Trajectory> {
-        let (parameters, shared): (&[&[f64]], _) = match self.source {
+        let (parameters, target): (&[&[f64]], &[f64]) = match self.source {
             Source::Law { parameters, target, .. } => (parameters, target),
-            Source::Record(commands) => (&[], commands),
+            Source::Record(_) => (&[], &[]),
         };
-        let (parameters, shared) = (pack::<V>(parameters), pack::<V>(&[shared]));
+        let (parameters, target) = (pack::<V>(parameters), pack::<V>(&[target]));
         let rows = pack::<V>(self.influences.excitation);
         let hold_back = self.influences.hold_back.map_or_else(Vec::new, |found| pack::<V>(&[found.lines()]));
         let excitation = Excitation { rows: &rows, hold_back: &hold_back };
         let commands = match self.source {
             Source::Law { family, .. } => {
-                Commands::Law { family, parameters: &parameters, target: &shared, excitation }
+                Commands::Law { family, parameters: &parameters, target: &target, excitation }
             }
-            Source::Record(_) => Commands::Record(&shared),
+            Source::Record(commands) => Commands::Record(commands),
         };
         let start = Start {
             commands,

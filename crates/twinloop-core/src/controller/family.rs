@@ -139,7 +139,7 @@ impl Family {
     }
 
     /// Controllers of these parameters (size) at the start of a run.
-    #[inline(always)]
+    #[inline(never)]
     pub fn start<V: Vector>(&self, parameters: &[V]) -> Controllers<V> {
         let mut parameters = parameters.iter();
         let mut gains = Vec::with_capacity(self.gains.len());

@@ -43,7 +43,7 @@ impl ClosedLoop<'_> {
             excitation: Excitation { rows: &rows, hold_back: &hold_back },
         };
         let start = Start {
-            commands: if sent.is_empty() { law } else { Commands::Record(&sent) },
+            commands: if sent.is_empty() { law } else { Commands::Records(&sent) },
             initial: &self.model.state_of(&vectors::<V>(&loops.initial)),
             steps: loops.steps.iter().copied().max().unwrap_or(0),
             limits: self.selected.setting().limits(),

@@ -2,10 +2,12 @@
 
 use super::variant::Variant;
 use super::{Observed, Recorded, Tuning};
-use crate::dynamics::step_apart;
+use crate::any_dynamics::AnyWorkspace;
+use crate::difference::Periods;
 use crate::lanes::{Isa, Kernel, Vector, dispatch, pack, with_flight_lanes};
 use crate::model::Model;
 use crate::regression::{LONGEST, Record, Whitening};
+use crate::rollout::{Commands, Midway, Seen, Start, Watch, resumed};
 use crate::workers::Workers;
 
 /// What an observer makes of a record of n + 1 readings, row by row.
@@ -143,79 +145,111 @@ impl Part<'_> {
     fn lanes<V: Vector>(&self) -> Run {
         let Tuning { code, frame, observer, records, limits, .. } = *self.tuning;
         let record = &records[self.record];
-        let (n_x, n_u) = (limits.signals().states(), frame.commands());
+        let count = self.variants.len();
         let constants: Vec<&[f64]> = self.variants.iter().map(|variant| &variant.constants[..]).collect();
         let lags: Vec<&[f64]> = self.variants.iter().map(|variant| &variant.lags[..]).collect();
         let model = Model { code, frame };
-        let mut workspace = model.variants::<V>(&pack(&constants), &pack(&lags));
-        let mut state: Vec<V> = record.states[..n_x].iter().map(|&x| V::splat(x)).collect();
-        let mut command = vec![V::splat(0.0); n_u];
-        let mut gusts = vec![V::splat(0.0); observer.len()];
-        let (mut innovation, mut white) = ([V::splat(0.0); LONGEST], [V::splat(0.0); LONGEST]);
-        let mut correction = [V::splat(0.0); LONGEST + 1];
-        let mut squares = V::splat(0.0);
-        let mut alive = V::splat(1.0);
-        let count = self.variants.len();
-        let mut errors = vec![Vec::with_capacity(if self.keep { record.states.len() } else { 0 }); count];
-        let mut states = Vec::with_capacity(if self.keep { record.states.len() } else { 0 });
-        let mut kept_gusts = Vec::new();
-        let steps = record.commands.len() / n_u;
-        for k in 0..=steps {
-            for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
-                let d = observed.states.len();
-                for (innovation, &at) in innovation.iter_mut().zip(&observed.states) {
-                    let reading = V::splat(record.states[k * n_x + at]);
-                    *innovation = frame.periods().difference(at, reading, state[at]);
-                }
-                let inner = &mut correction[..whitening.inner];
-                whitening.reading(k, d).observe(&innovation[..d], &mut white, inner);
-                for ((&at, &white), &by) in observed.states.iter().zip(&white).zip(&correction) {
-                    squares = squares + white * white;
-                    state[at] = state[at] + by;
-                    if self.keep {
-                        for (lane, errors) in errors.iter_mut().enumerate() {
-                            errors.push(white.lane(lane));
-                        }
-                    }
-                }
-                if whitening.inner > d {
-                    *gust = *gust + correction[d];
-                }
-            }
-            if self.keep {
-                states.extend(state.iter().map(|value| value.lane(0)));
-                kept_gusts.extend(gusts.iter().map(|gust| gust.lane(0)));
-            }
-            if k == steps {
-                break;
-            }
-            for (command, &value) in command.iter_mut().zip(&record.commands[k * n_u..]) {
-                *command = V::splat(value);
-            }
-            step_apart(&model, &mut workspace, &mut state, &command);
-            for ((observed, whitening), gust) in observer.iter().zip(self.whitenings).zip(&mut gusts) {
-                if whitening.inner > observed.states.len() {
-                    for (&at, reach) in observed.states.iter().zip(observed.chain.motion().reach) {
-                        state[at] = state[at] + *gust * reach;
-                    }
-                    *gust = *gust * whitening.correlation;
-                }
-            }
-            for (state, &limit) in state.iter().zip(limits.magnitudes()) {
-                alive = state.abs().select_less(V::splat(limit), alive, V::splat(0.0));
-            }
-            if !V::splat(0.0).any_less(alive) {
-                break;
-            }
-        }
+        let workspace = AnyWorkspace::Model(model.variants::<V>(&pack(&constants), &pack(&lags)));
+        let start = Start {
+            commands: Commands::Record(&record.commands),
+            initial: &pack(&[&record.states[..limits.signals().states()]]),
+            steps: record.commands.len() / frame.commands(),
+            limits: limits.magnitudes(),
+            noise: &[],
+            disturbance: &[],
+        };
+        let room = if self.keep { record.states.len() } else { 0 };
+        let mut filters = Filters {
+            observer,
+            record,
+            whitenings: self.whitenings,
+            periods: frame.periods(),
+            keep: self.keep,
+            gusts: vec![V::splat(0.0); observer.len()],
+            squares: V::splat(0.0),
+            run: Run {
+                errors: vec![Vec::with_capacity(room); count],
+                states: Vec::with_capacity(room),
+                ..Run::default()
+            },
+        };
+        let midway = Midway { workspace, controllers: None };
+        let lasted = resumed(model.into(), midway, &start, &mut filters);
+        let Filters { squares, run, .. } = filters;
         Run {
             squares: (0..count).map(|lane| squares.lane(lane)).collect(),
             diverged: (0..count)
-                .map(|lane| alive.lane(lane) == 0.0 || !squares.lane(lane).is_finite())
+                .map(|lane| lasted[lane] < start.steps || !squares.lane(lane).is_finite())
                 .collect(),
-            errors,
-            states,
-            gusts: kept_gusts,
+            ..run
+        }
+    }
+}
+
+/// Filters, one a chain, that correct a model's states by each reading of a record.
+struct Filters<'a, V> {
+    observer: &'a [Observed],
+    record: &'a Recorded,
+    whitenings: &'a [Whitening],
+    periods: &'a Periods,
+    keep: bool,
+    /// Correlated disturbances, one a chain.
+    gusts: Vec<V>,
+    /// χ² of each lane.
+    squares: V,
+    run: Run,
+}
+
+impl<V: Vector> Watch<V> for Filters<'_, V> {
+    #[inline(always)]
+    fn correct(&mut self, at: usize, state: &mut [V]) {
+        if at > 0 {
+            self.disturb(state);
+        }
+        let (mut innovation, mut white) = ([V::splat(0.0); LONGEST], [V::splat(0.0); LONGEST]);
+        let mut correction = [V::splat(0.0); LONGEST + 1];
+        let read = &self.record.states[at * state.len()..];
+        for ((observed, whitening), gust) in self.observer.iter().zip(self.whitenings).zip(&mut self.gusts) {
+            let d = observed.states.len();
+            for (innovation, &i) in innovation.iter_mut().zip(&observed.states) {
+                *innovation = self.periods.difference(i, V::splat(read[i]), state[i]);
+            }
+            let inner = &mut correction[..whitening.inner];
+            whitening.reading(at, d).observe(&innovation[..d], &mut white, inner);
+            for ((&i, &white), &by) in observed.states.iter().zip(&white).zip(&correction) {
+                self.squares = self.squares + white * white;
+                state[i] = state[i] + by;
+                if self.keep {
+                    for (lane, errors) in self.run.errors.iter_mut().enumerate() {
+                        errors.push(white.lane(lane));
+                    }
+                }
+            }
+            if whitening.inner > d {
+                *gust = *gust + correction[d];
+            }
+        }
+        if self.keep {
+            self.run.states.extend(state.iter().map(|value| value.lane(0)));
+            self.run.gusts.extend(self.gusts.iter().map(|gust| gust.lane(0)));
+        }
+    }
+
+    #[inline(always)]
+    fn see(&mut self, _seen: Seen<'_, V>) {}
+}
+
+impl<V: Vector> Filters<'_, V> {
+    /// Moves the states on by what disturbed them in the period before, and the disturbances themselves.
+    #[inline(always)]
+    fn disturb(&mut self, state: &mut [V]) {
+        for ((observed, whitening), gust) in self.observer.iter().zip(self.whitenings).zip(&mut self.gusts) {
+            if whitening.inner > observed.states.len() {
+                for (&i, reach) in observed.states.iter().zip(observed.chain.motion().reach) {
+                    state[i] = state[i] + *gust * reach;
+                }
+                *gust = *gust * whitening.correlation;
+            }
         }
     }
 }
