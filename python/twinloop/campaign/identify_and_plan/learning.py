@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -11,13 +11,15 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch
-from twinloop.campaign.history import Lesson
+from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.identify_and_plan.sent import other_commands
+from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
+from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -86,8 +88,12 @@ class Learner:
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
+        laws = () if asked is None else asked.two_laws
         if not answer.explained and self.options.plain != self.options:
-            answer = or_rough(answer, partial(identify, self.options.plain, iteration=PLAIN + told), answered)
+            rough = identify(self.options.plain, iteration=PLAIN + told)
+            answer, laws = self._of_two(
+                answer, answered(with_remark(rough, ROUGH), number=2), laws, book.experiments
+            )
         identified, lesson = answer.identified, self._lesson(answer, book)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -100,8 +106,17 @@ class Learner:
             needed,
             (*before, lesson),
             models=(*models, identified.model),
+            two_laws=laws,
         )
         return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
+
+    def _of_two(
+        self, answer: Answer, rough: Answer, earlier: Sequence[TwoLaws], flights: Sequence[Experiment]
+    ) -> tuple[Answer, tuple[TwoLaws, ...]]:
+        """Of two laws that do not explain the flights the one to believe, and the two laws of all lessons."""
+        laws = (*earlier, TwoLaws(len(flights), answer.identified.model, rough.identified.model))
+        foretold = better_foretold(laws, flights, self.setup.limits, self.workers)
+        return better_of(answer, rough, foretold), laws
 
     def _identification(self, book: Logbook) -> partial[Identified]:
         """Identification of the flights that are learnt from; what it lacks are options and a number."""
@@ -130,6 +145,8 @@ class Learner:
             tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
             for kind in ("law", "undecided")
         )
+        late = identified.actuation, self.setup.signals, answer.explained
+        actuators = claimed(*late)
         return Lesson(
             iteration=len(book.experiments),
             tests=tuple(run.number for run in book.experiments),
@@ -139,8 +156,8 @@ class Learner:
             readings=identified.readings,
             ignored=identified.outliers,
             sensors=tuple(identified.sensors(self.setup.signals.n_x).tolist()),
-            lags=tuple(actuator.lag for actuator in identified.actuation.actuators),
-            delays=tuple(actuator.delay for actuator in identified.actuation.actuators),
+            lags=tuple(actuator.lag for actuator in actuators),
+            delays=tuple(actuator.delay for actuator in actuators),
             hidden=identified.actuation.hidden,
             offsets=tuple(identified.offsets.tolist()),
             closed_loop=tuple(free),
@@ -150,6 +167,7 @@ class Learner:
             follows=follows,
             remarks=(
                 *identified.remarks,
+                *stand_ins(*late),
                 *diagnostics_of(
                     book.experiments,
                     self.setup.signals,
@@ -179,21 +197,25 @@ def or_known_before(answer: Answer, earlier: Identified, answered: Callable[...,
     return known if known.explained else answer
 
 
-def or_rough(answer: Answer, identify: Callable[[], Identified], answered: Callable[..., Answer]) -> Answer:
-    """What a law of linear terms makes of the flights, where it follows them better than the answer does.
+def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
+    """Of two laws that do not explain the flights the one to believe, with the other one beside it.
 
-    What is too coarse for a simulator may still tell better gains from worse. Where it follows less well it sits beside
-    the answer: gains have to be good on both.
+    The one to believe follows the flights, and lasts on each of them. Where that is so of both, or of neither, it is
+    the one that has foretold flights better which it had not learnt; as long as there are none, the one that misses
+    less of those that it has. Gains have to be good on both: a linear law may rank them even where it follows badly.
+    But one that diverges where a flight did not says nothing of gains.
 
     Args:
-        answer: that does not explain all flights.
-        identify: such a law.
-        answered: holds what was identified against all flights.
+        answer: what all terms make of the flights.
+        rough: what linear terms make of them.
+        foretold: which kind has foretold flights better; None where no flight tells.
     """
-    rough = answered(with_remark(identify(), ROUGH), number=2)
-    if rough.follows and (not answer.follows or rough.worst < answer.worst):
-        return rough
-    return replace(answer, rough=rough.identified.model) if rough.follows else answer
+    rank, of_rough = (answer.follows, answer.lasts), (rough.follows, rough.lasts)
+    if foretold is None:
+        foretold = "linear" if rough.worst < answer.worst else "nonlinear"
+    if of_rough > rank or (of_rough == rank and rough.follows and foretold == "linear"):
+        return replace(rough, beside=answer.identified.model) if answer.follows and answer.lasts else rough
+    return replace(answer, beside=rough.identified.model) if rough.lasts else answer
 
 
 def as_known_before(identified: Identified) -> Identified:
