@@ -62,6 +62,11 @@ class Answer:
         return bool(np.isfinite(self.followed.free[0]).all())
 
     @property
+    def believable(self) -> bool:
+        """Whether it follows the flights, and its best member lasts on each of them."""
+        return self.follows and self.lasts
+
+    @property
     def explained(self) -> bool:
         """Whether it follows the flights, and noise and whatever may disturb explain what its free runs miss."""
         return self.follows and not self.missed

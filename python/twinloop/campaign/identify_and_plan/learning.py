@@ -43,6 +43,25 @@ BEFORE = note(
     " misses none. The earlier twin is kept.",
 )
 """What is said of a twin that has not learnt all flights and follows them, where the one that has does not."""
+LASTED = note(
+    "lasted-before",
+    "The law learnt from all flights diverges on one of them in free run, or does not follow them; that of before the"
+    " last flight does. The earlier law is kept.",
+)
+"""What is said of a law that has not learnt all flights and lasts on them, where the one that has does not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Two:
+    """What is remembered of two kinds of law where none explains the flights.
+
+    Args:
+        laws: both best models of each such lesson.
+        rough: the last law of linear terms.
+    """
+
+    laws: tuple[TwoLaws, ...] = ()
+    rough: Identified | None = None
 
 
 @dataclass(frozen=True)
@@ -88,12 +107,10 @@ class Learner:
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
-        laws = () if asked is None else asked.two_laws
+        two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if not answer.explained and self.options.plain != self.options:
-            rough = identify(self.options.plain, iteration=PLAIN + told)
-            answer, laws = self._of_two(
-                answer, answered(with_remark(rough, ROUGH), number=2), laws, book.experiments
-            )
+            rough = with_remark(identify(self.options.plain, iteration=PLAIN + told), ROUGH)
+            answer, two = self._of_two(answer, answered(rough, number=2), two, answered, book.experiments)
         identified, lesson = answer.identified, self._lesson(answer, book)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -106,17 +123,26 @@ class Learner:
             needed,
             (*before, lesson),
             models=(*models, identified.model),
-            two_laws=laws,
+            two_laws=two.laws,
+            rough=two.rough,
         )
         return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
 
     def _of_two(
-        self, answer: Answer, rough: Answer, earlier: Sequence[TwoLaws], flights: Sequence[Experiment]
-    ) -> tuple[Answer, tuple[TwoLaws, ...]]:
-        """Of two laws that do not explain the flights the one to believe, and the two laws of all lessons."""
-        laws = (*earlier, TwoLaws(len(flights), answer.identified.model, rough.identified.model))
-        foretold = better_foretold(laws, flights, self.setup.limits, self.workers)
-        return better_of(answer, rough, foretold), laws
+        self,
+        answer: Answer,
+        rough: Answer,
+        before: Two,
+        answered: Callable[..., Answer],
+        flights: Sequence[Experiment],
+    ) -> tuple[Answer, Two]:
+        """Of two laws that do not explain the flights the one to believe, and what is remembered of both kinds."""
+        if self.options.earlier_twin and before.rough is not None:
+            rough = or_known_before(rough, before.rough, answered, number=3)
+        both = TwoLaws(len(flights), answer.identified.model, rough.identified.model)
+        now = Two((*before.laws, both), rough.identified)
+        foretold = better_foretold(now.laws, flights, self.setup.limits, self.workers)
+        return better_of(answer, rough, foretold), now
 
     def _identification(self, book: Logbook) -> partial[Identified]:
         """Identification of the flights that are learnt from; what it lacks are options and a number."""
@@ -145,7 +171,9 @@ class Learner:
             tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
             for kind in ("law", "undecided")
         )
-        late = identified.actuation, self.setup.signals, answer.explained
+        misses = answer.misses(book.experiments, self.setup, self.workers)
+        explained = follows and not misses and not is_rough(identified)
+        late = identified.actuation, self.setup.signals, explained
         actuators = claimed(*late)
         return Lesson(
             iteration=len(book.experiments),
@@ -174,7 +202,7 @@ class Learner:
                     follows
                     or not np.isfinite(identified.chi_squared),  # of one that diverges it is said already
                     self.setup.steps,
-                    answer.misses(book.experiments, self.setup, self.workers),
+                    misses,
                     () if follows else other_commands(book.experiments),
                     recurring,
                     [names[state] for state in answer.unmoved],
@@ -185,16 +213,25 @@ class Learner:
         )
 
 
-def or_known_before(answer: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:
+def or_known_before(
+    answer: Answer, earlier: Identified, answered: Callable[..., Answer], number: int = 1
+) -> Answer:
     """What was known before the last flights, where it explains all of them: it has not learnt the last.
 
+    It is also kept where it only follows them and lasts on each, and the answer diverges on one.
+
     Args:
-        answer: of what all flights teach, which does not.
+        answer: of what all flights teach, which does not explain them.
         earlier: what was known before the last of them.
         answered: holds what was identified against all flights.
+        number: of that, which tells its draws from those of others.
     """
-    known = answered(as_known_before(earlier), number=1)
-    return known if known.explained else answer
+    known = answered(as_known_before(earlier, BEFORE), number=number)
+    if known.explained:
+        return known
+    if answer.believable or not known.believable or is_rough(earlier) != is_rough(answer.identified):
+        return answer
+    return replace(known, identified=as_known_before(earlier, LASTED))
 
 
 def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
@@ -214,14 +251,19 @@ def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
     if foretold is None:
         foretold = "linear" if rough.worst < answer.worst else "nonlinear"
     if of_rough > rank or (of_rough == rank and rough.follows and foretold == "linear"):
-        return replace(rough, beside=answer.identified.model) if answer.follows and answer.lasts else rough
+        return replace(rough, beside=answer.identified.model) if answer.believable else rough
     return replace(answer, beside=rough.identified.model) if rough.lasts else answer
 
 
-def as_known_before(identified: Identified) -> Identified:
+def is_rough(identified: Identified) -> bool:
+    """Whether it is a law of linear terms beside one that does not explain the flights."""
+    return any(remark.code == ROUGH.code for remark in identified.remarks)
+
+
+def as_known_before(identified: Identified, said: Remark) -> Identified:
     """What was known before the last flights, which says so."""
-    known = replace(identified, remarks=[each for each in identified.remarks if each.code != BEFORE.code])
-    return with_remark(known, BEFORE)
+    others = [each for each in identified.remarks if each.code not in (BEFORE.code, LASTED.code)]
+    return with_remark(replace(identified, remarks=others), said)
 
 
 def with_remark(identified: Identified, remark: Remark) -> Identified:

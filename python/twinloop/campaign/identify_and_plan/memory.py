@@ -48,6 +48,7 @@ class Learnt(Recorded, kind="learnt"):
         models: the best model of each identification, as `lessons`; what an older version wrote has none.
         ensembles: what the bands of those twins are made of; what an older version wrote has none.
         two_laws: of those identifications whose flights no law explains, the best model of either kind.
+        rough: the law of linear terms that was held last beside one that does not explain the flights; None: none was.
     """
 
     experiments: int
@@ -60,6 +61,7 @@ class Learnt(Recorded, kind="learnt"):
     models: tuple[_core.Model, ...] = ()
     ensembles: tuple[Ensemble, ...] = ()
     two_laws: tuple[TwoLaws, ...] = ()
+    rough: Identified | None = None
 
     VERSION = 2
     RENAMED: ClassVar[Mapping[str, str]] = {"told": "experiments"}
