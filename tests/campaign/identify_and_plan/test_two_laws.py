@@ -1,6 +1,6 @@
 """Of two laws that explain nothing the one is believed that foretells flights, and gains have to be good on both."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,7 +16,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.following import Following
-from twinloop.campaign.identify_and_plan.learning import better_of
+from twinloop.campaign.identify_and_plan.learning import ROUGH, better_of, is_rough, or_lasted_before
 from twinloop.campaign.identify_and_plan.two_laws import TwoLaws, better_foretold, compared
 
 INF = float("inf")
@@ -40,12 +40,25 @@ def flight(drag, steps=40):
     return SimpleNamespace(replayed=Replay(SIGNALS, [0.0], commands), trajectory=run, number=None, test=None)
 
 
+@dataclass(frozen=True)
+class Known:
+    """What little of an identification is looked at here."""
+
+    model: str
+    members: list
+    remarks: list
+
+
+def identified_as(name):
+    """A linear law."""
+    return Known(name, [name], [ROUGH])
+
+
 def answer(free, frozen=1.0, follows=True, name="a"):
     """Of one member with such free runs."""
     rows = np.atleast_2d(free)
     followed = Following(rows, np.ones_like(rows), np.full(rows.shape[1], frozen))
-    identified = SimpleNamespace(members=[name], model=name)
-    return Answer(identified, followed, follows, {}, (), True)
+    return Answer(identified_as(name), followed, follows, {}, (), True)
 
 
 RATIOS = arrays(
@@ -120,3 +133,26 @@ def test_two_laws_survive_their_record():
     both = TwoLaws(3, law(1.0), law(2.0))
     again = TwoLaws.from_record(both.to_record(), SIGNALS)
     assert again.to_record() == both.to_record() and again.experiments == 3
+
+
+@given(free=st.floats(0.01, 0.5), less=st.floats(0.01, 0.5))
+def test_a_nonlinear_law_that_misses_more_than_a_linear_one_sits_nowhere(free, less):
+    nonlinear, rough = answer([[max(free, less)]], name="n"), answer([[min(free, less)]], name="r")
+    if nonlinear.worst > rough.worst:
+        found = better_of(nonlinear, rough, "linear")
+        assert found.identified.model == "r" and found.beside is None
+
+
+def test_the_linear_law_of_before_is_kept_where_it_lasts_and_the_new_one_does_not():
+    lasts, diverges = answer([[0.3, 0.4]], name="before"), answer([[0.1, INF]], name="now")
+    earlier = identified_as("before")
+    kept = or_lasted_before(diverges, earlier, lambda found, number: replace(lasts, identified=found))
+    assert kept.identified.model == "before" and is_rough(kept.identified)
+    assert [remark.code for remark in kept.identified.remarks] == ["rough", "lasted-before"]
+    neither = or_lasted_before(diverges, earlier, lambda found, number: replace(diverges, identified=found))
+    assert neither is diverges
+
+
+def test_the_linear_law_of_before_is_not_even_looked_at_where_the_new_one_lasts():
+    now = answer([[0.3, 0.4]], name="now")
+    assert or_lasted_before(now, identified_as("before"), lambda *_, **__: pytest.fail("looked at")) is now

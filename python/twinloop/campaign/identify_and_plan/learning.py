@@ -45,10 +45,10 @@ BEFORE = note(
 """What is said of a twin that has not learnt all flights and follows them, where the one that has does not."""
 LASTED = note(
     "lasted-before",
-    "The law learnt from all flights diverges on one of them in free run, or does not follow them; that of before the"
-    " last flight does. The earlier law is kept.",
+    "The linear law learnt from all flights diverges on one of them in free run, or does not follow them. The one of"
+    " before the last flight lasts on all, and is kept.",
 )
-"""What is said of a law that has not learnt all flights and lasts on them, where the one that has does not."""
+"""What is said of a linear law that has not learnt all flights and follows them, where the one that has does not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ class Learner:
     ) -> tuple[Answer, Two]:
         """Of two laws that do not explain the flights the one to believe, and what is remembered of both kinds."""
         if self.options.earlier_twin and before.rough is not None:
-            rough = or_known_before(rough, before.rough, answered, number=3)
+            rough = or_lasted_before(rough, before.rough, answered)
         both = TwoLaws(len(flights), answer.identified.model, rough.identified.model)
         now = Two((*before.laws, both), rough.identified)
         foretold = better_foretold(now.laws, flights, self.setup.limits, self.workers)
@@ -213,25 +213,30 @@ class Learner:
         )
 
 
-def or_known_before(
-    answer: Answer, earlier: Identified, answered: Callable[..., Answer], number: int = 1
-) -> Answer:
+def or_known_before(answer: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:
     """What was known before the last flights, where it explains all of them: it has not learnt the last.
 
-    It is also kept where it only follows them and lasts on each, and the answer diverges on one.
-
     Args:
-        answer: of what all flights teach, which does not explain them.
+        answer: of what all flights teach, which does not.
         earlier: what was known before the last of them.
         answered: holds what was identified against all flights.
-        number: of that, which tells its draws from those of others.
     """
-    known = answered(as_known_before(earlier, BEFORE), number=number)
-    if known.explained:
-        return known
-    if answer.believable or not known.believable or is_rough(earlier) != is_rough(answer.identified):
-        return answer
-    return replace(known, identified=as_known_before(earlier, LASTED))
+    known = answered(as_known_before(earlier, BEFORE), number=1)
+    return known if known.explained else answer
+
+
+def or_lasted_before(rough: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:
+    """The linear law of before the last flights, where it follows all and lasts on each, and the present one does not.
+
+    Args:
+        rough: linear law learnt from all flights.
+        earlier: the one of before the last of them.
+        answered: holds what was identified against all flights.
+    """
+    if rough.believable:
+        return rough
+    known = answered(as_known_before(earlier, LASTED), number=3)
+    return known if known.believable else rough
 
 
 def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
@@ -240,7 +245,8 @@ def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
     The one to believe follows the flights, and lasts on each of them. Where that is so of both, or of neither, it is
     the one that has foretold flights better which it had not learnt; as long as there are none, the one that misses
     less of those that it has. Gains have to be good on both: a linear law may rank them even where it follows badly.
-    But one that diverges where a flight did not says nothing of gains.
+    But one that diverges where a flight did not says nothing of gains, nor does a nonlinear one that even misses more
+    of the flights that it was learnt from than a linear one.
 
     Args:
         answer: what all terms make of the flights.
@@ -251,7 +257,8 @@ def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
     if foretold is None:
         foretold = "linear" if rough.worst < answer.worst else "nonlinear"
     if of_rough > rank or (of_rough == rank and rough.follows and foretold == "linear"):
-        return replace(rough, beside=answer.identified.model) if answer.believable else rough
+        worth = answer.believable and answer.worst < rough.worst
+        return replace(rough, beside=answer.identified.model) if worth else rough
     return replace(answer, beside=rough.identified.model) if rough.lasts else answer
 
 

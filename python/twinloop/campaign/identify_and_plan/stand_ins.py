@@ -40,8 +40,8 @@ def stand_ins(actuation: Actuation, signals: Signals, explained: bool) -> Iterat
     if late and not explained:
         yield note(
             "stand-in",
-            f"The law filters or delays {', '.join(late)}, but no law explains the flights: what looks like a slow"
-            " actuator may be a state that is not logged. No actuator was identified.",
+            f"The law filters or delays {', '.join(late)}, but no law explains the flights so far: what looks like a"
+            " slow actuator may be a state that is not logged. No actuator was identified.",
         )
 
 
