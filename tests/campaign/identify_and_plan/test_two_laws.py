@@ -16,8 +16,15 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.following import Following
-from twinloop.campaign.identify_and_plan.learning import ROUGH, better_of, is_rough, or_lasted_before
+from twinloop.campaign.identify_and_plan.learning import (
+    ROUGH,
+    better_of,
+    is_rough,
+    or_lasted_before,
+    stands_in,
+)
 from twinloop.campaign.identify_and_plan.two_laws import TwoLaws, better_foretold, compared
+from twinloop.law.actuation import Actuation, Actuator
 
 INF = float("inf")
 WORKERS = _core.Workers(1)
@@ -47,11 +54,15 @@ class Known:
     model: str
     members: list
     remarks: list
+    actuation: Actuation
 
 
-def identified_as(name):
+AT_ONCE = Actuator()
+
+
+def identified_as(name, actuator=AT_ONCE, remarks=(ROUGH,)):
     """A linear law."""
-    return Known(name, [name], [ROUGH])
+    return Known(name, [name], list(remarks), Actuation((actuator,)))
 
 
 def answer(free, frozen=1.0, follows=True, name="a"):
@@ -156,3 +167,10 @@ def test_the_linear_law_of_before_is_kept_where_it_lasts_and_the_new_one_does_no
 def test_the_linear_law_of_before_is_not_even_looked_at_where_the_new_one_lasts():
     now = answer([[0.3, 0.4]], name="now")
     assert or_lasted_before(now, identified_as("before"), lambda *_, **__: pytest.fail("looked at")) is now
+
+
+@pytest.mark.parametrize("late", [Actuator(0.02, 0), Actuator(0.0, 1)])
+def test_only_a_linear_law_that_is_late_stands_in_for_what_no_law_explains(late):
+    assert stands_in(identified_as("r", late))
+    assert not stands_in(identified_as("r"))
+    assert not stands_in(identified_as("n", late, remarks=()))

@@ -267,6 +267,11 @@ def is_rough(identified: Identified) -> bool:
     return any(remark.code == ROUGH.code for remark in identified.remarks)
 
 
+def stands_in(identified: Identified) -> bool:
+    """Whether it is such a linear law, with a lag or a delay that stands for what no law explains."""
+    return is_rough(identified) and not all(actuator.direct for actuator in identified.actuation.actuators)
+
+
 def as_known_before(identified: Identified, said: Remark) -> Identified:
     """What was known before the last flights, which says so."""
     others = [each for each in identified.remarks if each.code not in (BEFORE.code, LASTED.code)]
