@@ -80,7 +80,7 @@ ABLATIONS: dict[str, Ablation] = {
     "earlier-twin": Ablation(
         "the earlier twin kept where the new one explains less", {"earlier_twin": False}
     ),
-    "rough": Ablation("a linear law if no other follows the flights", {"rough": False}),
+    "rough": Ablation("a linear law beside one that does not explain the flights", {"rough": False}),
     "causes": Ablation("disturbances separated from model errors", {"causes": False}),
     "exactness": Ablation("the inaccuracy of a law separated from disturbances", {"exactness": False}),
     # How tests are chosen and gains tuned

@@ -1,11 +1,13 @@
 """Where no law follows the flights, one with linear terms does, and better gains are found on it."""
 
+import json
 import warnings
 
 import pytest
 
 import twinloop as tl
 from twinloop.campaign.presets import options_of
+from twinloop.faces.result import summary
 from twinloop_exam.zoo.plants import plant
 
 
@@ -44,3 +46,33 @@ def test_where_it_is_not_asked_for_none_is_learnt():
     asked, not_asked = (options_of("default", {"rough": rough}) for rough in (True, False))
     assert asked.plain != asked and asked.plain.libraries == ("linear",)
     assert not_asked.plain == not_asked
+
+
+def test_both_laws_survive_a_resume_and_what_is_learnt_next_has_the_same_bits(learnt):
+    motor, campaign, _ = learnt
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", tl.RemarkWarning)
+        uncut = tl.Campaign.from_record(campaign.to_record(), threads=1)
+        resumed = tl.Campaign.from_record(through_json(campaign), threads=1)
+        for each in (uncut, resumed):
+            test = each.ask()
+            each.tell(test, motor.make(7).run(test))
+        assert uncut.twin.equations(17) == resumed.twin.equations(17)
+    first, second = (through_json(each)["memory"] for each in (uncut, resumed))
+    assert len(first["asked"]["two_laws"]) == 1 and first["asked"]["rough"] is not None
+    assert first["latest"] == second["latest"]
+
+
+def through_json(campaign):
+    return json.loads(json.dumps(campaign.to_record()))
+
+
+def test_its_lag_is_not_taken_for_an_actuator(learnt):
+    _, campaign, _ = learnt
+    lesson = campaign.history[0]
+    (actuator,) = campaign.twin.law.actuation.actuators
+    assert not actuator.direct and lesson.lags == (0.0,) and lesson.delays == (0,)
+    (said,) = (remark for remark in lesson.remarks if remark.code == "stand-in")
+    assert "torque" in said.sentence
+    (shown,) = summary(campaign, {}, {})["twin"]["actuators"]
+    assert (shown["lag"], shown["delay"]) == (actuator.lag, actuator.delay) and not shown["identified"]

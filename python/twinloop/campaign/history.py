@@ -180,8 +180,9 @@ class Lesson(Recorded, kind="lesson"):
         readings: number of readings that counted.
         ignored: number of outliers.
         sensors: standard deviation of each state's sensor, estimated, in its unit.
-        lags: time constant of each command's actuator, s.
-        delays: of each command's actuator, periods.
+        lags: time constant of each command's actuator, s; 0 where none was identified, as where the law does not
+            explain the flights: a lag in it may stand for a state that is not logged.
+        delays: of each command's actuator, periods; 0 as with `lags`.
         hidden: unmeasured states: which commands or states drive each, whether squared, the mean at rest in units of
             their scale (None: that of the first period), the time constant in s, and how it begins.
         offsets: delay of each state's readings against those of the driven states, s.

@@ -226,8 +226,18 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) 
             )
         ],
         "actuators": [
-            {"name": command.name, "lag": lag, "delay": delay}
-            for command, lag, delay in zip(campaign.signals.commands, lesson.lags, lesson.delays, strict=True)
+            {
+                "name": command.name,
+                "lag": actuator.lag,
+                "delay": actuator.delay,
+                "identified": (actuator.lag, actuator.delay) == found,
+            }
+            for command, actuator, found in zip(
+                campaign.signals.commands,
+                twin.law.actuation.actuators,
+                zip(lesson.lags, lesson.delays, strict=True),
+                strict=True,
+            )
         ],
         "hidden": [
             {

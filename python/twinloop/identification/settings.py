@@ -79,7 +79,7 @@ class IdentificationOptions:
         parts: whether, as long as there is one run, models of its parts are members too.
         earlier_twin: whether the earlier twin is kept if it follows all flights and the new
             one does not.
-        rough: whether a linear law is learnt if no other law follows the flights.
+        rough: whether a linear law is learnt beside one that does not explain the flights.
         causes: whether slow disturbances are separated into external ones and model errors; otherwise
             all count as external.
         exactness: whether a disturbance within the inaccuracy of the law may be a model error.

@@ -40,8 +40,7 @@ class Answer:
         causes: of the correlated disturbances, by the state that each drives.
         unmoved: states that move, and nothing moves them by the law.
         missed: whether the best one misses a flight by more than noise and whatever may disturb explains.
-        rough: a model of linear terms that follows the flights where the best one does not explain them; it sits in
-            the committee, too.
+        beside: the best model of the other kind, where none explains the flights; it sits in the committee, too.
     """
 
     identified: Identified
@@ -50,12 +49,22 @@ class Answer:
     causes: Mapping[int, Cause]
     unmoved: Sequence[int]
     missed: bool
-    rough: _core.Model | None = None
+    beside: _core.Model | None = None
 
     @property
     def worst(self) -> float:
         """Mean square of the best member on the flight that it misses most, over that of the model that never moves."""
         return self.followed.worst(0)
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the best member lasts on each flight that it was learnt from."""
+        return bool(np.isfinite(self.followed.free[0]).all())
+
+    @property
+    def believable(self) -> bool:
+        """Whether it follows the flights, and its best member lasts on each of them."""
+        return self.follows and self.lasts
 
     @property
     def explained(self) -> bool:
@@ -124,7 +133,7 @@ class Answer:
         kept = sorted(believed | set(others[: max(0, FEWEST - len(believed))]))
         members = [self.identified.members[i] for i in kept]
         # Gains are tuned on the first few members.
-        return members if self.rough is None else [members[0], self.rough, *members[1:]]
+        return members if self.beside is None else [members[0], self.beside, *members[1:]]
 
 
 def _lost(

@@ -37,14 +37,16 @@ class Following:
 
     def order(self) -> list[int]:
         """Models, the one that goes wrong least on its worst flight first; of the diverging, what lasts longest."""
-        numbers: list[int] = np.lexsort((-self.lasted.min(axis=1), self._ratios().max(axis=1))).tolist()
+        numbers: list[int] = np.lexsort((-self.lasted.min(axis=1), self.ratios.max(axis=1))).tolist()
         return numbers
 
     def worst(self, model: int) -> float:
         """Of a model, on the flight that it misses most: its mean square over that of the model that never moves."""
-        return float(self._ratios()[model].max())
+        return float(self.ratios[model].max())
 
-    def _ratios(self) -> Floats:
+    @property
+    def ratios(self) -> Floats:
+        """Mean squares over those of the model that never moves (m, N); infinite where a run diverges."""
         still = self.frozen == 0.0
         return np.where(
             still, np.where(self.free == 0.0, 1.0, np.inf), self.free / np.where(still, 1.0, self.frozen)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -11,13 +11,15 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch
-from twinloop.campaign.history import Lesson
+from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.identify_and_plan.sent import other_commands
+from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
+from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -41,6 +43,25 @@ BEFORE = note(
     " misses none. The earlier twin is kept.",
 )
 """What is said of a twin that has not learnt all flights and follows them, where the one that has does not."""
+LASTED = note(
+    "lasted-before",
+    "The linear law learnt from all flights diverges on one of them in free run, or does not follow them. The one of"
+    " before the last flight lasts on all, and is kept.",
+)
+"""What is said of a linear law that has not learnt all flights and follows them, where the one that has does not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Two:
+    """What is remembered of two kinds of law where none explains the flights.
+
+    Args:
+        laws: both best models of each such lesson.
+        rough: the last law of linear terms.
+    """
+
+    laws: tuple[TwoLaws, ...] = ()
+    rough: Identified | None = None
 
 
 @dataclass(frozen=True)
@@ -86,8 +107,10 @@ class Learner:
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
+        two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if not answer.explained and self.options.plain != self.options:
-            answer = or_rough(answer, partial(identify, self.options.plain, iteration=PLAIN + told), answered)
+            rough = with_remark(identify(self.options.plain, iteration=PLAIN + told), ROUGH)
+            answer, two = self._of_two(answer, answered(rough, number=2), two, answered, book.experiments)
         identified, lesson = answer.identified, self._lesson(answer, book)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
@@ -100,8 +123,26 @@ class Learner:
             needed,
             (*before, lesson),
             models=(*models, identified.model),
+            two_laws=two.laws,
+            rough=two.rough,
         )
         return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
+
+    def _of_two(
+        self,
+        answer: Answer,
+        rough: Answer,
+        before: Two,
+        answered: Callable[..., Answer],
+        flights: Sequence[Experiment],
+    ) -> tuple[Answer, Two]:
+        """Of two laws that do not explain the flights the one to believe, and what is remembered of both kinds."""
+        if self.options.earlier_twin and before.rough is not None:
+            rough = or_lasted_before(rough, before.rough, answered)
+        both = TwoLaws(len(flights), answer.identified.model, rough.identified.model)
+        now = Two((*before.laws, both), rough.identified)
+        foretold = better_foretold(now.laws, flights, self.setup.limits, self.workers)
+        return better_of(answer, rough, foretold), now
 
     def _identification(self, book: Logbook) -> partial[Identified]:
         """Identification of the flights that are learnt from; what it lacks are options and a number."""
@@ -130,6 +171,10 @@ class Learner:
             tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
             for kind in ("law", "undecided")
         )
+        misses = answer.misses(book.experiments, self.setup, self.workers)
+        explained = follows and not misses and not is_rough(identified)
+        late = identified.actuation, self.setup.signals, explained
+        actuators = claimed(*late)
         return Lesson(
             iteration=len(book.experiments),
             tests=tuple(run.number for run in book.experiments),
@@ -139,8 +184,8 @@ class Learner:
             readings=identified.readings,
             ignored=identified.outliers,
             sensors=tuple(identified.sensors(self.setup.signals.n_x).tolist()),
-            lags=tuple(actuator.lag for actuator in identified.actuation.actuators),
-            delays=tuple(actuator.delay for actuator in identified.actuation.actuators),
+            lags=tuple(actuator.lag for actuator in actuators),
+            delays=tuple(actuator.delay for actuator in actuators),
             hidden=identified.actuation.hidden,
             offsets=tuple(identified.offsets.tolist()),
             closed_loop=tuple(free),
@@ -150,13 +195,14 @@ class Learner:
             follows=follows,
             remarks=(
                 *identified.remarks,
+                *stand_ins(*late),
                 *diagnostics_of(
                     book.experiments,
                     self.setup.signals,
                     follows
                     or not np.isfinite(identified.chi_squared),  # of one that diverges it is said already
                     self.setup.steps,
-                    answer.misses(book.experiments, self.setup, self.workers),
+                    misses,
                     () if follows else other_commands(book.experiments),
                     recurring,
                     [names[state] for state in answer.unmoved],
@@ -175,31 +221,61 @@ def or_known_before(answer: Answer, earlier: Identified, answered: Callable[...,
         earlier: what was known before the last of them.
         answered: holds what was identified against all flights.
     """
-    known = answered(as_known_before(earlier), number=1)
+    known = answered(as_known_before(earlier, BEFORE), number=1)
     return known if known.explained else answer
 
 
-def or_rough(answer: Answer, identify: Callable[[], Identified], answered: Callable[..., Answer]) -> Answer:
-    """What a law of linear terms makes of the flights, where it follows them better than the answer does.
-
-    What is too coarse for a simulator may still tell better gains from worse. Where it follows less well it sits beside
-    the answer: gains have to be good on both.
+def or_lasted_before(rough: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:
+    """The linear law of before the last flights, where it follows all and lasts on each, and the present one does not.
 
     Args:
-        answer: that does not explain all flights.
-        identify: such a law.
+        rough: linear law learnt from all flights.
+        earlier: the one of before the last of them.
         answered: holds what was identified against all flights.
     """
-    rough = answered(with_remark(identify(), ROUGH), number=2)
-    if rough.follows and (not answer.follows or rough.worst < answer.worst):
+    if rough.believable:
         return rough
-    return replace(answer, rough=rough.identified.model) if rough.follows else answer
+    known = answered(as_known_before(earlier, LASTED), number=3)
+    return known if known.believable else rough
 
 
-def as_known_before(identified: Identified) -> Identified:
+def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
+    """Of two laws that do not explain the flights the one to believe, with the other one beside it.
+
+    The one to believe follows the flights, and lasts on each of them. Where that is so of both, or of neither, it is
+    the one that has foretold flights better which it had not learnt; as long as there are none, the one that misses
+    less of those that it has. Gains have to be good on both: a linear law may rank them even where it follows badly.
+    But one that diverges where a flight did not says nothing of gains, nor does a nonlinear one that even misses more
+    of the flights that it was learnt from than a linear one.
+
+    Args:
+        answer: what all terms make of the flights.
+        rough: what linear terms make of them.
+        foretold: which kind has foretold flights better; None where no flight tells.
+    """
+    rank, of_rough = (answer.follows, answer.lasts), (rough.follows, rough.lasts)
+    if foretold is None:
+        foretold = "linear" if rough.worst < answer.worst else "nonlinear"
+    if of_rough > rank or (of_rough == rank and rough.follows and foretold == "linear"):
+        worth = answer.believable and answer.worst < rough.worst
+        return replace(rough, beside=answer.identified.model) if worth else rough
+    return replace(answer, beside=rough.identified.model) if rough.lasts else answer
+
+
+def is_rough(identified: Identified) -> bool:
+    """Whether it is a law of linear terms beside one that does not explain the flights."""
+    return any(remark.code == ROUGH.code for remark in identified.remarks)
+
+
+def stands_in(identified: Identified) -> bool:
+    """Whether it is such a linear law, with a lag or a delay that stands for what no law explains."""
+    return is_rough(identified) and not all(actuator.direct for actuator in identified.actuation.actuators)
+
+
+def as_known_before(identified: Identified, said: Remark) -> Identified:
     """What was known before the last flights, which says so."""
-    known = replace(identified, remarks=[each for each in identified.remarks if each.code != BEFORE.code])
-    return with_remark(known, BEFORE)
+    others = [each for each in identified.remarks if each.code not in (BEFORE.code, LASTED.code)]
+    return with_remark(replace(identified, remarks=others), said)
 
 
 def with_remark(identified: Identified, remark: Remark) -> Identified:

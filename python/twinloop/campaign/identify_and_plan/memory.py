@@ -9,6 +9,7 @@ from typing import ClassVar
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Lesson
+from twinloop.campaign.identify_and_plan.two_laws import TwoLaws
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay
 from twinloop.law.noise import Noise
@@ -46,6 +47,8 @@ class Learnt(Recorded, kind="learnt"):
         gains: that were tuned on the committee when a test was asked for; None: none were.
         models: the best model of each identification, as `lessons`; what an older version wrote has none.
         ensembles: what the bands of those twins are made of; what an older version wrote has none.
+        two_laws: of those identifications whose flights no law explains, the best model of either kind.
+        rough: the law of linear terms that was held last beside one that does not explain the flights; None: none was.
     """
 
     experiments: int
@@ -57,6 +60,8 @@ class Learnt(Recorded, kind="learnt"):
     gains: Floats | None = None
     models: tuple[_core.Model, ...] = ()
     ensembles: tuple[Ensemble, ...] = ()
+    two_laws: tuple[TwoLaws, ...] = ()
+    rough: Identified | None = None
 
     VERSION = 2
     RENAMED: ClassVar[Mapping[str, str]] = {"told": "experiments"}

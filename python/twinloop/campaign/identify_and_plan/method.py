@@ -23,7 +23,7 @@ from twinloop.campaign.identify_and_plan.calibration import (
 )
 from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
-from twinloop.campaign.identify_and_plan.learning import Learner
+from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
 from twinloop.campaign.identify_and_plan.starts import first_genes, known_gains, starts_of
 from twinloop.campaign.logbook import Logbook
@@ -246,7 +246,12 @@ class IdentifyAndPlan:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
         confirmed = not self.options.delay_margin or nearly_confirmed(book.experiments)
-        slower = [] if confirmed else [delayed(latest.believed[0], self.setup.signals)]
+        # The lag of a linear twin that stands for what no law explains is such a margin already.
+        slower = (
+            []
+            if confirmed or stands_in(latest.identified)
+            else [delayed(latest.believed[0], self.setup.signals)]
+        )
         return Committee(latest.believed, sensors, latest.follows, delayed=slower)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:

@@ -9,6 +9,8 @@ from twinloop.faces.text.table import cell, table
 
 A_DAY = 86_400.0
 """Seconds: what takes longer to fade does not fade within a flight."""
+STAND_IN = "not identified: the law does not explain the flights"
+"""What is said of a lag that may stand for something else."""
 CAUSES = {
     "disturbance": "",
     "law": ", a model error",
@@ -90,16 +92,17 @@ def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
 
 def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
     """Lags and delays in words; commands that have the same are named together."""
-    groups: dict[tuple[float, int], list[str]] = {}
+    groups: dict[tuple[float, int, bool], list[str]] = {}
     for actuator in actuators:
-        groups.setdefault((actuator["lag"], actuator["delay"]), []).append(actuator["name"])
-    if list(groups) == [(0.0, 0)]:
+        kind = actuator["lag"], actuator["delay"], actuator.get("identified", True)
+        groups.setdefault(kind, []).append(actuator["name"])
+    if list(groups) == [(0.0, 0, True)]:
         return "Actuators: no lag and no delay found."
     words = []
-    for (lag, delay), names in groups.items():
+    for (lag, delay, identified), names in groups.items():
         slow = f"lag {lag:.3g} s" if lag else "no lag"
         late = f"delay {delay} period{'s' if delay != 1 else ''}" if delay else "no delay"
-        words.append(f"{', '.join(names)}: {slow}, {late}")
+        words.append(f"{', '.join(names)}: {slow}, {late}{'' if identified else f' ({STAND_IN})'}")
     return f"Actuators: {'; '.join(words)}."
 
 

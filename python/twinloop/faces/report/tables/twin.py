@@ -11,6 +11,7 @@ from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.examination.poles import Pole
 from twinloop.faces.figures.units import shown_unit, words
 from twinloop.faces.report.tables.table import Table, shown_value, table_of
+from twinloop.faces.text.twin import STAND_IN
 
 RIVALS = 3
 """Rivals of each equation that are shown."""
@@ -75,8 +76,13 @@ def actuators(result: Mapping[str, Any]) -> Table | None:
     found = result["twin"].get("actuators")
     if not found:
         return None
-    rows = [[words(each["name"]), each["lag"], each["delay"]] for each in found]
-    return table_of("actuators", "Actuators", ["command", "lag (s)", "delay (periods)"], rows)
+    head = ["command", "lag (s)", "delay (periods)", "identified"]
+    # Results of earlier versions do not say so: what they name was identified.
+    rows = [
+        [words(each["name"]), each["lag"], each["delay"], "yes" if each.get("identified", True) else STAND_IN]
+        for each in found
+    ]
+    return table_of("actuators", "Actuators", head, rows)
 
 
 def rivals(found: Examination) -> Table | None:
