@@ -14,7 +14,7 @@ from twinloop.campaign.identify_and_plan.choice import (
     SURE,
     Choice,
     confirmed,
-    nearly_confirmed,
+    nearly_confirmed_in_a_row,
     over_promised,
 )
 from twinloop.campaign.identify_and_plan.starts import linear_gains
@@ -228,9 +228,11 @@ def test_no_other_family_has_starts_by_lqr():
 )
 def test_a_prediction_comes_true_within_two_spreads_or_a_tenth(predicted, spread, quality, true):
     run = SimpleNamespace(test=SimpleNamespace(predicted=predicted, spread=spread), quality=quality)
-    assert nearly_confirmed([run]) is true
-    assert nearly_confirmed([SimpleNamespace(test=None, quality=1.0), run]) is true
+    assert nearly_confirmed_in_a_row([run]) == true
+    assert nearly_confirmed_in_a_row([SimpleNamespace(test=None, quality=1.0), run]) == true
     came_true = SimpleNamespace(test=SimpleNamespace(predicted=1.0, spread=0.1), quality=1.0)
     unasked = SimpleNamespace(test=None, quality=5.0)
-    assert nearly_confirmed([came_true, run, unasked]) is (true or predicted is None)
-    assert nearly_confirmed([run, came_true]) is True
+    # One that missed ends the row; of what was not predicted nothing is said.
+    in_a_row = 2 if true else int(predicted is None)
+    assert nearly_confirmed_in_a_row([came_true, run, unasked]) == in_a_row
+    assert nearly_confirmed_in_a_row([run, came_true]) == 1 + true

@@ -242,16 +242,16 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
     return run is None or _came_true(run, 0.0)
 
 
-def nearly_confirmed(experiments: Sequence[Experiment]) -> bool:
-    """Whether the last flight that something was predicted of came within two spreads of it, or a tenth of itself.
+def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
+    """How many of the last flights in a row came within two spreads of what was predicted, or a tenth of themselves.
 
     Where nothing was predicted yet, nothing is confirmed.
 
     Args:
         experiments: in the order of `tell`.
     """
-    run = _last_predicted(experiments)
-    return run is not None and _came_true(run, NEARLY)
+    missed = [not _came_true(run, NEARLY) for run, _ in reversed(_predicted(experiments))]
+    return missed.index(True) if True in missed else len(missed)
 
 
 def _predicted(experiments: Sequence[Experiment]) -> list[tuple[Experiment, float]]:
