@@ -46,7 +46,7 @@ class PlanningOptions:
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
         delay_margin: whether gains are tuned on, and must tolerate, one more period of delay, and half of that for each
-            of the last predictions in a row that came true.
+            of the last predictions of new gains in a row that came true.
         confidence: share of members and draws that must find new gains better than the best flown ones.
         track_record: whether new gains must also be better by the error of earlier predictions.
         alone: whether flown gains are compared without the effect of their excitation.
