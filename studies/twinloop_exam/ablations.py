@@ -94,11 +94,12 @@ ABLATIONS: dict[str, Ablation] = {
     },
     "worth": Ablation("a limit on the cost of information", {"worth": False}),
     "backtracking": Ablation("candidates on the way to the tuned gains", {"backtracking": False}),
+    "within": Ablation("gains tuned under the limits of the next flight", {"within": False}),
     "noise-draws": Ablation("sensor noise while gains are tuned", {"draws": 1}),
     "members": Ablation("gains tuned on several members", {"tuning_members": 1}),
     "starts": Ablation("several starts of the tuning of gains", {"tuning_starts": 1}),
     "delay-margin": Ablation(
-        "one more period of delay until a prediction has come true", {"delay_margin": False}
+        "more delay, the less of it the more predictions have come true", {"delay_margin": False}
     ),
     "track-record": Ablation(
         "earlier predictions counted where a controller is chosen", {"track_record": False}

@@ -9,8 +9,9 @@ import twinloop as tl
 from committees import MOTORS, STEPS, TASK, TUNED, committee_of, member, planner_of, signals
 from oracles import rk4, same_bits
 from twinloop.planning.candidates import candidates
-from twinloop.planning.comparison import Comparison, around
+from twinloop.planning.comparison import Comparison
 from twinloop.planning.proposal import Flown, Wanted
+from twinloop.planning.reach import around
 
 KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
 DRAWS = 3

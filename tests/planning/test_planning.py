@@ -14,7 +14,7 @@ from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Experiment
 from twinloop.flights import candidates, qualities
-from twinloop.law.actuation import delayed
+from twinloop.law.actuation import Actuation, Actuator, delayed
 from twinloop.planning.candidates import candidates as drawn
 from twinloop.planning.excitation import SHARE, answered, binary, chirps, first_chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
@@ -419,7 +419,7 @@ def test_no_flight_is_planned_that_is_worse_than_the_best_one_flown():
 
 def test_where_the_tuned_gains_go_further_than_is_believed_some_on_the_way_to_them_fly():
     known = signals(rate=(-1.0, 1.0))
-    planner, committee = planner_of(known, candidates=256), committee_of(known)
+    planner, committee = planner_of(known, candidates=256, within=False), committee_of(known)
     far, near = np.array([9.0, 0.0, 0.5]), np.array([0.3, 0.0, 1.0])
     both = planner.judge(committee.members, np.stack([far, near]), committee.sds, 1)
     slow = float(both.mean[1])
@@ -427,7 +427,7 @@ def test_where_the_tuned_gains_go_further_than_is_believed_some_on_the_way_to_th
     found = proposed(planner, committee, far, best=near, good=slow, usages=[0.3])
     assert found.safe and found.predicted < 0.8 * slow
     assert usages(planner, committee, found).max() <= planner.options.reach_first
-    straight = planner_of(known, candidates=256, nearness=0.01, backtracking=False)
+    straight = planner_of(known, candidates=256, nearness=0.01, backtracking=False, within=False)
     found = proposed(straight, committee, far, best=near, good=slow, usages=[0.3])
     assert "again" in found.reason and found.genes.tobytes() == near.tobytes()
 
@@ -448,6 +448,15 @@ def test_gains_that_fly_again_are_excited_more_each_time_up_to_a_limit():
         drafts = drawn(planner, options, TUNED, flown, "both", 3, trusted=False)
         first.append(float(np.abs(drafts.excitation[drafts.repeats :]).max()))
     assert first == pytest.approx([0.04, 0.02], rel=0.05)
+
+
+def test_more_delay_is_whole_periods_of_delay_and_a_lag_of_what_is_left():
+    known = signals()
+    model = member(known, 2.0)
+    late = _core.Model(model.program, model.form, known.engine, [Actuator(0.02, 1)], [], model.offsets)
+    for periods, lag, delay in ((1.0, 0.02, 2), (0.5, 0.045, 1), (1.25, 0.0325, 2)):
+        (actuator,) = Actuation.of(delayed(late, known, periods), known).actuators
+        assert actuator.delay == delay and actuator.lag == pytest.approx(lag)
 
 
 def test_gains_bear_a_period_more_of_delay_as_long_as_no_prediction_has_come_true():

@@ -131,13 +131,18 @@ def alike_commands(signals: Signals, known: Actuation | None = None) -> tuple[tu
     return tuple(tuple(group) for group in found.values())
 
 
-def delayed(model: _core.Model, signals: Signals) -> _core.Model:
-    """The same model with commands that act one period later.
+def delayed(model: _core.Model, signals: Signals, periods: float = 1.0) -> _core.Model:
+    """The same model with commands that act later, by a delay of whole periods and a lag of what is left.
 
     Args:
         model: of these signals.
         signals: of the system.
+        periods: by how many.
     """
-    actuation = Actuation.of(model, signals)
-    late = [actuator._replace(delay=actuator.delay + 1) for actuator in actuation.actuators]
+    actuation, whole = Actuation.of(model, signals), int(periods)
+    lag = (periods - whole) * signals.dt
+    late = [
+        actuator._replace(delay=actuator.delay + whole, lag=actuator.lag + lag)
+        for actuator in actuation.actuators
+    ]
     return _core.Model(model.program, model.form, signals.engine, late, list(actuation.hidden), model.offsets)

@@ -15,18 +15,16 @@ from twinloop.planning.candidates import Candidates
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
 from twinloop.planning.proposal import Flown, Proposal, Wanted
+from twinloop.planning.reach import around, reach_of
 from twinloop.planning.reasons import Why, reason
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.worth import apart, gain, limit
-from twinloop.signals import Signals
 
 Flags = NDArray[np.bool_]
 TRIED = 128
 """Candidates at most that are flown under noise before the safest one is taken."""
 TOGETHER = 4
 """Of them at once."""
-HARDLY = 0.02
-"""Share of its scale by which a state is taken to have moved at least."""
 ANYWHERE = 64
 """Flights by which it is asked how much of the twin is unknown."""
 
@@ -67,7 +65,7 @@ class Comparison:
             workers=judge.workers,
         )
         self.possible = self._possible()
-        within = self.quiet.worst_usage <= self._reach()
+        within = self.quiet.worst_usage <= reach_of(flown, wanted.goal, options)
         self.keeps = self.possible & within & self._bears_delay() & self._near_what_was_seen()
         self.promised = float(self.quiet.mean[0])
 
@@ -162,20 +160,9 @@ class Comparison:
             return np.ones_like(self.possible)
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
         bounds = around(seen, reach, self.judge.signals)
-        near = ~outside(self.judge.usages_within(bounds, self.members, genes, excitation, ends).max(axis=0))
+        near = ~outside(self.judge.judge_within(bounds, self.members, genes, excitation, ends).worst_usage)
         near[drafts.repeats :] |= self.flown.flies
         return near if near[: drafts.repeats].any() else np.ones_like(near)
-
-    def _reach(self) -> float:
-        """Usage of the envelope that a proposal may have, where that of each flight so far is known."""
-        options, used = self.options, self.flown.usages
-        first, most = used[0] if used else 0.0, max(used, default=0.0)
-        # A model is believed near what was flown: each flight may go somewhat further than those before it.
-        near = max(options.reach_first, options.reach_growth * most)
-        # With gains far from any that were flown it may be wrong in ways that no member shows, and the more so the
-        # further a flight goes: what is small on the first flight, and in no term, is not small then.
-        far = max(min(options.reach_far, options.reach_growth * first), options.reach_least, most)
-        return min(1.0 - options.margin, far if self.wanted.goal == "model" else near)
 
     def _most(self) -> float:
         """Predicted quality that any flight may have at most; one for the model may cost as much again."""
@@ -233,18 +220,6 @@ class Comparison:
             state=state,
             members=(high, low),
         )
-
-
-def around(seen: Floats, reach: float, signals: Signals) -> Floats:
-    """Bounds of states (2, n_x) that are wider than those seen by some times as far as each has moved.
-
-    Args:
-        seen: smallest and largest reading of each state (2, n_x).
-        reach: how many times; what has hardly moved is taken to have moved by a share of its scale.
-        signals: of the system.
-    """
-    moved = np.maximum(seen[1] - seen[0], HARDLY * np.array([state.scale for state in signals.states]))
-    return np.stack([seen[0] - reach * moved, seen[1] + reach * moved])
 
 
 def _in_order(those: Flags, cost: Floats) -> list[int]:

@@ -163,23 +163,22 @@ class Judge:
         )  # fmt: skip
         return Judged(values, usages)
 
-    def usages_within(
+    def judge_within(
         self,
         bounds: Floats,
         members: Sequence[_core.Model],
         genes: Floats,
         excitation: Floats | None = None,
         ends: Ends | None = None,
-    ) -> Floats:
-        """Usage of bounds of the states (2, n_x) in quiet flights of candidates (members, K), 1 at a bound."""
+    ) -> Judged:
+        """Quiet flights of candidates, with usages of bounds of the states (2, n_x), infinite where there is none."""
         states = [
-            replace(state, envelope=(float(low), float(high)))
-            for state, low, high in zip(self.signals.states, *bounds, strict=True)
+            replace(state, envelope=(low, high) if np.isfinite([low, high]).all() else None)
+            for state, (low, high) in zip(self.signals.states, bounds.T.tolist(), strict=True)
         ]
         bounded = replace(self.signals, states=states)
         flights = self.flights(genes, excitation, ends)
-        _, usages = qualities(members, flights, self.quality.engine, bounded, workers=self.workers)
-        return usages[:, 0]
+        return Judged(*qualities(members, flights, self.quality.engine, bounded, workers=self.workers))
 
     def stable_members(
         self,

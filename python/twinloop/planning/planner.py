@@ -21,8 +21,10 @@ from twinloop.planning.gains import tune_gains
 from twinloop.planning.judging import Committee, Judge, Task
 from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.quality import Quality
+from twinloop.planning.reach import bounds_of
 from twinloop.planning.scored import Scored
 from twinloop.planning.settings import PlanningOptions
+from twinloop.planning.within import tune_within
 
 GOALS = ("both", "model", "control")
 
@@ -170,11 +172,31 @@ class Planner(Judge):
         Returns:
             The proposal; not `safe` where no candidate keeps the margin on every member.
         """
-        drafts = candidates(self, self.options, tuned, flown, goal, number, committee.trusted)
-        self.watch("candidates")
         wanted = Wanted(goal, number, exploit)
-        found = Comparison(self, self.options, committee, drafts, flown, wanted).proposal()
-        if last and found.genes.tobytes() != tuned.tobytes():
-            plain = replace(wanted, plain=True)
-            return Comparison(self, self.options, committee, drafts.quiet(), flown, plain).proposal()
-        return found
+        found = self._compared(committee, tuned, flown, wanted)
+        self.watch("candidates")
+        if self.options.within and committee.trusted and found.possible[0] and not found.keeps[0]:
+            found = self._within(found)
+        proposal = found.proposal()
+        if last and not found.wanted.plain and proposal.genes.tobytes() != tuned.tobytes():
+            return self._compared(committee, tuned, flown, replace(wanted, plain=True)).proposal()
+        return proposal
+
+    def _compared(self, committee: Committee, genes: Floats, flown: Flown, wanted: Wanted) -> Comparison:
+        """Candidates around some genes, without excitation where the one that promises most is wanted."""
+        drafts = candidates(self, self.options, genes, flown, wanted.goal, wanted.number, committee.trusted)
+        drafts = drafts.quiet() if wanted.plain else drafts
+        return Comparison(self, self.options, committee, drafts, flown, wanted)
+
+    def _within(self, far: Comparison) -> Comparison:
+        """Candidates around the best gains within the limits of the next flight; those that there are if none are."""
+        committee, flown, wanted = far.committee, far.flown, far.wanted
+        bounds = bounds_of(flown, wanted.goal, self.signals, self.options)
+        promising = np.where(far.keeps, far.quiet.mean, np.inf)
+        starts = [flown.best, far.drafts.genes[int(np.argmin(promising))]]
+        genes = tune_within(
+            self, self.options, committee, far.members, bounds, starts, wanted.number,
+            lambda: self.watch("candidates"),
+        )  # fmt: skip
+        found = self._compared(committee, genes, flown, replace(wanted, exploit=False, plain=wanted.exploit))
+        return found if found.keeps[0] else far

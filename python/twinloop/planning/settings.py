@@ -25,6 +25,7 @@ class PlanningOptions:
         candidates: number of flights that are compared for each proposal.
         backtracking: whether some candidates are on the way from the best gains flown to the tuned ones; not with the
             goal "model".
+        within: whether gains are tuned once more, under the limits of the next flight, where those tuned lead too far.
         nearness: standard deviation of the candidates' gains around the tuned ones, in ranges of the gains.
         worth: whether the value of its information limits how much worse a test may be predicted; otherwise the
             share `worse` does.
@@ -44,8 +45,8 @@ class PlanningOptions:
         evaluations: number of flights on which gains are tuned, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
-        delay_margin: whether gains are tuned on, and must tolerate, one more period of delay until a prediction
-            has come true.
+        delay_margin: whether gains are tuned on, and must tolerate, one more period of delay, and half of that for each
+            of the last predictions of new gains in a row that came true.
         confidence: share of members and draws that must find new gains better than the best flown ones.
         track_record: whether new gains must also be better by the error of earlier predictions.
         alone: whether flown gains are compared without the effect of their excitation.
@@ -64,6 +65,7 @@ class PlanningOptions:
     target_range: tuple[float, ...] = ()
     candidates: int = 1024
     backtracking: bool = True
+    within: bool = True
     nearness: float = 0.1
     worth: bool = True
     worse: float = 0.05

@@ -14,7 +14,7 @@ from twinloop.campaign.identify_and_plan.choice import (
     SURE,
     Choice,
     confirmed,
-    nearly_confirmed,
+    nearly_confirmed_in_a_row,
     over_promised,
 )
 from twinloop.campaign.identify_and_plan.starts import linear_gains
@@ -227,10 +227,19 @@ def test_no_other_family_has_starts_by_lqr():
     [(1.0, 0.1, 1.19, True), (1.0, 0.1, 1.3, False), (1.0, 0.0, 1.05, True), (None, None, 1.0, False)],
 )
 def test_a_prediction_comes_true_within_two_spreads_or_a_tenth(predicted, spread, quality, true):
-    run = SimpleNamespace(test=SimpleNamespace(predicted=predicted, spread=spread), quality=quality)
-    assert nearly_confirmed([run]) is true
-    assert nearly_confirmed([SimpleNamespace(test=None, quality=1.0), run]) is true
-    came_true = SimpleNamespace(test=SimpleNamespace(predicted=1.0, spread=0.1), quality=1.0)
+    def flight(predicted, spread, quality, gain):
+        test = SimpleNamespace(predicted=predicted, spread=spread, genes=np.array([gain]))
+        return SimpleNamespace(test=test, quality=quality)
+
+    run = flight(predicted, spread, quality, 1.0)
     unasked = SimpleNamespace(test=None, quality=5.0)
-    assert nearly_confirmed([came_true, run, unasked]) is (true or predicted is None)
-    assert nearly_confirmed([run, came_true]) is True
+    assert nearly_confirmed_in_a_row([run]) == nearly_confirmed_in_a_row([unasked, run]) == true
+    # One that missed ends the row; of what was not predicted nothing is said.
+    came_true = flight(1.0, 0.1, 1.0, 2.0)
+    in_a_row = 2 if true else int(predicted is None)
+    assert nearly_confirmed_in_a_row([came_true, run, unasked]) == in_a_row
+    assert nearly_confirmed_in_a_row([run, came_true]) == 1 + true
+    # Of gains that flew before the twin knows how they fly: that they do so again says nothing of others.
+    again, missed = flight(1.0, 0.1, 1.0, 1.0), flight(1.0, 0.1, 2.0, 1.0)
+    assert nearly_confirmed_in_a_row([run, again]) == true
+    assert nearly_confirmed_in_a_row([run, came_true, missed]) == 0

@@ -1,6 +1,7 @@
 """Whole campaigns of the preset `default`: same bits, interruption, cut runs, and data that nobody would wish for."""
 
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from twinloop import _core
 from twinloop.campaign import controller_to_fly, standing
 from twinloop.campaign.entering import check_first_reading
 from twinloop.campaign.identify_and_plan import learning
+from twinloop.campaign.identify_and_plan import method as method_of_default
 from twinloop.faces.result import summary
+from twinloop.law.actuation import Actuation
 from twinloop.law.noise import Noise
 
 
@@ -366,6 +369,23 @@ def test_gains_must_bear_more_delay_until_a_prediction_has_come_true(begin, pend
     campaign = told(begin(options={"delay_margin": bears}), pendulum)
     _ = campaign.twin
     assert len(campaign._method._committee(campaign._book).delayed) == bears
+
+
+def test_the_delay_that_gains_must_bear_halves_with_each_prediction_that_comes_true(begin, pendulum):
+    campaign = told(begin(), pendulum)
+    _ = campaign.twin
+    method, book = campaign._method, campaign._book
+
+    def later():
+        """By how many periods the slower model acts later, as a delay and as a lag."""
+        quick, slow = method._latest().believed[0], method._committee(book).delayed[0]
+        (before,), (after,) = (Actuation.of(model, SIGNALS).actuators for model in (quick, slow))
+        return after.delay - before.delay, (after.lag - before.lag) / SIGNALS.dt
+
+    assert later() == (1, 0.0)
+    for came_true, delay, lag in ((1, 0, 0.5), (2, 0, 0.25), (4, 0, 0.0625)):
+        with mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=came_true):
+            assert later() == (delay, pytest.approx(lag))
 
 
 def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committee_with_parts(

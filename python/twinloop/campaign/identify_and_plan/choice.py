@@ -242,16 +242,26 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
     return run is None or _came_true(run, 0.0)
 
 
-def nearly_confirmed(experiments: Sequence[Experiment]) -> bool:
-    """Whether the last flight that something was predicted of came within two spreads of it, or a tenth of itself.
+def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
+    """How many of the last flights in a row came within two spreads of what was predicted, or a tenth of themselves.
 
-    Where nothing was predicted yet, nothing is confirmed.
+    Where nothing was predicted yet, nothing is confirmed. Gains that had flown before count only where they miss: the
+    twin has learnt how they fly, and what it says of others is not put to the test.
 
     Args:
         experiments: in the order of `tell`.
     """
-    run = _last_predicted(experiments)
-    return run is not None and _came_true(run, NEARLY)
+    flown, count = set[bytes](), 0
+    for run in experiments:
+        if run.test is None:
+            continue
+        genes, predicted = run.test.genes.tobytes(), _predicted([run])
+        if predicted and not _came_true(run, NEARLY):
+            count = 0
+        elif predicted and genes not in flown:
+            count += 1
+        flown.add(genes)
+    return count
 
 
 def _predicted(experiments: Sequence[Experiment]) -> list[tuple[Experiment, float]]:

@@ -21,7 +21,7 @@ from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import (
     calibrated,
 )
-from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed
+from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed_in_a_row
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -40,6 +40,9 @@ from twinloop.planning.proposal import Flown, Proposal
 from twinloop.planning.scored import Scored
 from twinloop.records import Record
 from twinloop.test import Test
+
+TOLERATED = 0.5
+"""Share of the delay that gains have to bear that is left of it after a prediction that came true."""
 
 
 class IdentifyAndPlan:
@@ -175,7 +178,7 @@ class IdentifyAndPlan:
             float("inf") if good is None else good,
             standing.unfit(book),
             1 if best is None else standing.times_flown(book, best.genes),
-            None if nearly_confirmed(book.experiments) else self._seen(book),
+            None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
         )
 
     def _seen(self, book: Logbook) -> Floats:
@@ -245,13 +248,11 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        confirmed = not self.options.delay_margin or nearly_confirmed(book.experiments)
+        # Gains that bear a delay and fly as predicted say little of gains that do not: half of it has to be borne next.
+        periods = TOLERATED ** nearly_confirmed_in_a_row(book.experiments)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
-        slower = (
-            []
-            if confirmed or stands_in(latest.identified)
-            else [delayed(latest.believed[0], self.setup.signals)]
-        )
+        wanted = self.options.delay_margin and not stands_in(latest.identified)
+        slower = [delayed(latest.believed[0], self.setup.signals, periods)] if wanted else []
         return Committee(latest.believed, sensors, latest.follows, delayed=slower)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:

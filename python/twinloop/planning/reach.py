@@ -1,0 +1,64 @@
+"""Reach: how far beyond the flights so far the next one may lead, as bounds of the states."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twinloop._ground.arrays import Floats
+from twinloop.planning.proposal import Flown
+from twinloop.planning.settings import PlanningOptions
+from twinloop.signals import Signals
+
+HARDLY = 0.02
+"""Share of its scale by which a state is taken to have moved at least."""
+
+
+def reach_of(flown: Flown, goal: str, options: PlanningOptions) -> float:
+    """Usage of the envelope that a proposal may have, where that of each flight so far is known.
+
+    Args:
+        flown: so far.
+        goal: "both", "model" or "control".
+        options: of the planning.
+    """
+    used = flown.usages
+    first, most = used[0] if used else 0.0, max(used, default=0.0)
+    # A model is believed near what was flown: each flight may go somewhat further than those before it.
+    near = max(options.reach_first, options.reach_growth * most)
+    # With gains far from any that were flown it may be wrong in ways that no member shows, and the more so the
+    # further a flight goes: what is small on the first flight, and in no term, is not small then.
+    far = max(min(options.reach_far, options.reach_growth * first), options.reach_least, most)
+    return min(1.0 - options.margin, far if goal == "model" else near)
+
+
+def around(seen: Floats, reach: float, signals: Signals) -> Floats:
+    """Bounds of states (2, n_x) that are wider than those seen by some times as far as each has moved.
+
+    Args:
+        seen: smallest and largest reading of each state (2, n_x).
+        reach: how many times; what has hardly moved is taken to have moved by a share of its scale.
+        signals: of the system.
+    """
+    moved = np.maximum(seen[1] - seen[0], HARDLY * np.array([state.scale for state in signals.states]))
+    return np.stack([seen[0] - reach * moved, seen[1] + reach * moved])
+
+
+def bounds_of(flown: Flown, goal: str, signals: Signals, options: PlanningOptions) -> Floats:
+    """Bounds of the states (2, n_x) that no member may leave in the next flight; infinite where there is none.
+
+    Args:
+        flown: so far.
+        goal: "both", "model" or "control".
+        signals: of the system.
+        options: of the planning.
+    """
+    reach, bounds = reach_of(flown, goal, options), np.tile([[-np.inf], [np.inf]], len(signals.states))
+    for i, state in enumerate(signals.states):
+        if state.envelope is not None:
+            low, high = state.envelope
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            bounds[:, i] = middle - reach * half, middle + reach * half
+    if flown.seen is None or options.reach_seen <= 0.0:
+        return bounds
+    near = around(flown.seen, options.reach_seen, signals)
+    return np.stack([np.maximum(bounds[0], near[0]), np.minimum(bounds[1], near[1])])

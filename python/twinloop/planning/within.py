@@ -1,0 +1,65 @@
+"""Within: the best gains of those that may be flown next, where those tuned on the committee lead too far.
+
+What is promised of gains that may not be flown is of no use, and candidates beside them that may be flown are there by
+chance, far from the best ones. So the gains are tuned once more, under the limits of the next flight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop._ground.arrays import Floats
+from twinloop.planning.gains import tune_gains
+from twinloop.planning.judging import Committee, Judge
+from twinloop.planning.settings import PlanningOptions
+
+SPREAD = 0.1
+"""Standard deviation of the first steps of a search, in ranges of the gains."""
+
+
+def tune_within(
+    judge: Judge,
+    options: PlanningOptions,
+    committee: Committee,
+    members: Sequence[_core.Model],
+    bounds: Floats,
+    starts: Sequence[Floats],
+    number: int,
+    watch: Callable[[], None],
+) -> Floats:
+    """Genes (size,) of the best mean quality of those whose quiet flights stay within bounds, with the margin.
+
+    Args:
+        judge: of the campaign.
+        options: of the planning.
+        committee: whose models with more delay have to keep the envelope.
+        members: of it that judge, and may not leave the bounds.
+        bounds: of the states (2, n_x).
+        starts: genes to start from.
+        number: of the test, for its streams.
+        watch: called after every generation.
+
+    Returns:
+        Those of the least excess where none stays within.
+    """
+    most, nothing = 1.0 - options.margin, np.zeros(judge.signals.n_x)
+    first = judge.judge_within(bounds, members, starts[0][np.newaxis]).finite.qualities
+    unit = float(first.mean())
+
+    def score(genes: Floats) -> Floats:
+        near = judge.judge_within(bounds, members, genes)
+        lost, excess = near.lost, np.maximum(0.0, near.finite.worst_usage - most)
+        if committee.delayed:
+            late = judge.judge(committee.delayed, genes, nothing, 1)
+            lost = lost + late.lost
+            excess = excess + np.maximum(0.0, late.finite.worst_usage - most)
+        mean = near.finite.qualities.mean(axis=(0, 1))
+        return np.stack([lost, mean + excess * (10.0 * mean + unit)], axis=1)
+
+    return tune_gains(
+        judge.family, score, starts, evaluations=options.evaluations // 2, spread=SPREAD,
+        unit=judge.unit.part(number, 0, 1), purpose="gains", watch=watch,
+    )  # fmt: skip

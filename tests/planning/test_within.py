@@ -1,0 +1,93 @@
+"""Gains tuned within the limits of the next flight, beside a dense sample of all gains and the rules in words."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from committees import TASK, committee_of, member, planner_of, signals
+from oracles import same_bits
+from twinloop._ground.streams import Unit
+from twinloop.planning.proposal import Flown
+from twinloop.planning.reach import around, bounds_of, reach_of
+from twinloop.planning.within import tune_within
+
+KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
+PLANNER = planner_of(KNOWN, candidates=64, evaluations=4096)
+COMMITTEE = committee_of(KNOWN)
+GENTLE = np.array([0.3, 0.0, 1.5])
+SLOW = np.array([[-0.9, -0.4], [0.9, 0.4]])
+"""Bounds in which the motor may turn at 0.4 rad/s at most."""
+
+
+def within(bounds=SLOW, committee=COMMITTEE, planner=PLANNER):
+    return tune_within(
+        planner, planner.options, committee, committee.members, bounds, [GENTLE], 3, lambda: None
+    )
+
+
+def quality_and_usage(genes, bounds=SLOW, members=COMMITTEE.members):
+    judged = PLANNER.judge_within(bounds, members, genes)
+    return judged.mean, judged.worst_usage
+
+
+def test_they_are_as_good_as_the_best_of_all_gains_that_stay_within():
+    genes = PLANNER.family.from_unit(Unit(1).part(1).stream("candidates").uniforms(20_000, 3))
+    quality, usage = quality_and_usage(genes)
+    most = 1.0 - PLANNER.options.margin
+    best = quality[usage <= most].min()
+    (found,), (used,) = quality_and_usage(within()[np.newaxis])
+    assert used <= 1.001 * most and found <= 1.01 * best
+    # The bounds are what holds them back.
+    assert quality.min() < 0.8 * best
+
+
+def test_a_bound_that_is_infinite_holds_nothing_back():
+    anywhere = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
+    genes = within(anywhere)
+    assert quality_and_usage(genes[np.newaxis])[1][0] > 1.0
+    assert quality_and_usage(genes[np.newaxis], anywhere)[1][0] == 0.0
+
+
+def test_they_keep_the_envelope_on_a_model_with_more_delay():
+    slow = [member(KNOWN, 40.0, 0.0)]
+    free, held = within(), within(committee=replace(COMMITTEE, delayed=slow))
+
+    def usage(genes):
+        return PLANNER.judge(slow, genes[np.newaxis], np.zeros(2), 1).worst_usage[0]
+
+    assert usage(held) <= 1.0 < usage(free)
+
+
+@pytest.mark.parametrize("exploit", [False, True])
+def test_where_the_tuned_gains_lead_too_far_the_best_within_the_limits_fly(exploit):
+    quick = np.array([9.0, 0.0, 1.0])
+    seen = np.array([[0.4, -0.05], [0.5, 0.02]])
+    flown = Flown(best=GENTLE, flies=True, usages=[0.56], good=1.0, seen=seen)
+    bounds = bounds_of(flown, "both", KNOWN, PLANNER.options)
+    promised = {}
+    for switched in (True, False):
+        planner = planner_of(KNOWN, candidates=64, evaluations=4096, within=switched)
+        found = planner.propose(COMMITTEE, quick, flown, "both", 3, exploit)
+        promised[switched] = found.predicted
+        assert not same_bits(found.genes, quick)
+        assert exploit == (found.excitation is None) or not switched
+    genes = np.stack([quick, found.genes])
+    assert quality_and_usage(genes, bounds)[1][0] > 1.0
+    assert promised[True] < 0.95 * promised[False]
+
+
+def test_the_next_flight_keeps_both_the_reach_in_the_envelope_and_the_states_near_those_seen():
+    seen = np.array([[0.0, -0.1], [0.5, 0.1]])
+    flown = Flown(best=GENTLE, flies=True, usages=[0.6], good=1.0, seen=seen)
+    options = replace(PLANNER.options, reach_seen=1.0)
+    reach, near = reach_of(flown, "both", options), around(seen, 1.0, KNOWN)
+    low, high = bounds_of(flown, "both", KNOWN, options)
+    assert reach == pytest.approx(0.75)
+    np.testing.assert_allclose(low, [max(-0.9 * reach, near[0, 0]), max(-1.5 * reach, near[0, 1])])
+    np.testing.assert_allclose(high, [min(0.9 * reach, near[1, 0]), min(1.5 * reach, near[1, 1])])
+    # Once a prediction has come true the envelope alone counts.
+    low, high = bounds_of(replace(flown, seen=None), "both", KNOWN, options)
+    np.testing.assert_allclose(high, [0.9 * reach, 1.5 * reach])
+    np.testing.assert_allclose(low, -high)
+    assert TASK.initial_state[0] <= high[0]
