@@ -88,6 +88,24 @@ def test_an_angle_wraps_after_a_turn_or_after_the_period_that_is_given(periodic,
     assert tl.State("a", "rad", 1.0, periodic=periodic).period == period
 
 
+@pytest.mark.parametrize(
+    ("envelope", "periodic", "kept"),
+    [
+        ((-180.0, 180.0), 360.0, None),
+        ((0.0, 720.0), 360.0, None),
+        ((-1.0, 5.0), 360.0, (-1.0, 5.0)),
+        ((-180.0, 180.0), False, (-180.0, 180.0)),
+    ],
+)
+def test_an_envelope_of_a_whole_turn_bounds_no_angle_that_wraps(envelope, periodic, kept):
+    assert tl.State("a", "deg", 60.0, envelope=envelope, periodic=periodic).envelope == kept
+
+
+def test_a_whole_turn_may_be_written_with_two_decimals():
+    assert tl.State("a", "rad", 1.0, envelope=(-3.14, 3.14), periodic=True).envelope is None
+    assert tl.State("a", "rad", 1.0, envelope=(-3.0, 3.0), periodic=True).envelope == (-3.0, 3.0)
+
+
 PERIODIC = tl.Signals([state("a", periodic=360.0), state("x"), state("b", periodic=5.0)], [COMMAND], 0.1)
 PERIODS = {0: 360.0, 2: 5.0}
 

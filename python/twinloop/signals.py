@@ -17,6 +17,8 @@ from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.records import Recorded
 
 Bounds = tuple[float, float]
+WHOLE_TURN = 0.99
+"""Share of its period that the envelope of an angle spans if it bounds nothing: -3.14 to 3.14 is a whole turn."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class State(Recorded, kind="state"):
         unit: SI, radians for angles.
         scale: its usual size, in its unit; a run that leaves ten times this has diverged.
         derivative_of: name of the state whose time derivative this state is, if there is one.
-        envelope: smallest and largest safe value, in its unit.
+        envelope: smallest and largest safe value, in its unit. Of an angle that wraps, one that spans the whole
+            period bounds nothing and is None.
         noise: standard deviation of its sensor, in its unit, if it is known; the preset `default` starts its own
             estimate there, and a remark says if the two differ much.
         periodic: whether it is an angle that wraps: True for an angle in rad, or its period in its unit, such as
@@ -61,6 +64,16 @@ class State(Recorded, kind="state"):
         if not isinstance(self.periodic, bool):
             period = number(f"State {self.name!r}, periodic", self.periodic, above=0.0)
             object.__setattr__(self, "periodic", period)
+        if self._turns_freely:
+            object.__setattr__(self, "envelope", None)
+
+    @property
+    def _turns_freely(self) -> bool:
+        """Whether the envelope spans the period, up to how people round it, so that a full turn stays inside."""
+        if self.envelope is None or self.period is None:
+            return False
+        low, high = self.envelope
+        return high - low >= WHOLE_TURN * self.period
 
     @property
     def period(self) -> float | None:

@@ -382,6 +382,15 @@ def test_constants_inside_functions_and_lags_have_theirs():
     assert f"a lag of 0.05 ± {np.std(lags, ddof=1):.2g} s" in text
 
 
+def test_a_constant_that_all_members_have_alike_does_not_differ_by_the_rounding_of_a_mean():
+    # The mean of six numbers 0.1 is not 0.1.
+    assert np.std([0.1] * 6, ddof=1) > 0.0
+    members = [member(drag, inside=0.1) for drag in (-0.5, -0.52, -0.47, -0.51, -0.49, -0.48)]
+    text = equations(members[0], members)
+    (line,) = (line for line in text.splitlines() if "sin(0.1*x)" in line)
+    assert line.endswith("# ± 0")
+
+
 def test_terms_that_share_a_constant_share_a_line_and_its_deviation():
     def pair(weight):
         lines = ["r5 = r2 * r2", "r6 = r3 * r3", "r5 = r5 - r6", f"r4 = r5 * {weight}"]

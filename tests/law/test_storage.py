@@ -87,7 +87,7 @@ def test_a_body_that_turns_stores_as_well():
 
 def test_its_equations_say_what_fills_it_and_how_it_begins():
     text = stored_twin().equations(3)
-    assert "d hidden_1 / dt = torque_scaled - 0 - hidden_1/0.4" in text
+    assert "d hidden_1 / dt = torque_scaled - hidden_1/0.4" in text
     assert "d hidden_2 / dt = (rate/8) - 0.25 - hidden_2/0.4" in text
     assert "as it settles under what fills it at the start" in text
 

@@ -44,6 +44,8 @@ LEAST = 1e-6
 """The least share of a reading that is left in a residual."""
 LATE = 18.0
 """What late sensors must gain over a step of Euler, each: an offset, and that of all offsets it is half a period."""
+AS_LONG = 0.05
+"""Description length by which two forms are not said to differ: it is written with no digit that counts."""
 HALF_A_PERIOD = (
     "Between a state and its derivative a sensor that is late or early by half a period shows the same; what drives"
     " them decides."
@@ -182,7 +184,7 @@ def _said(context: Context, best: Hypothesis, other: Hypothesis) -> Remark:
         for look in (best, other)
     )
     gain = other_length - best_length
-    than = "longer" if gain > 0.0 else "shorter"
+    size = f"{abs(gain):.3g} {'longer' if gain > 0.0 else 'shorter'}" if abs(gain) > AS_LONG else "as long"
     decided = f", where {STEPPING:g} would decide. The option form fixes it."
     if step:
         decided = (
@@ -192,5 +194,5 @@ def _said(context: Context, best: Hypothesis, other: Hypothesis) -> Remark:
         "form",
         f"The form of the law was searched. The readings are described as {MEANINGS[best.form]}"
         f" (form {best.form!r}): as {MEANINGS[other.form]} (form {other.form!r}) their description is"
-        f" {abs(gain):.3g} {than}{decided}",
+        f" {size}{decided}",
     )

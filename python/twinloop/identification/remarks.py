@@ -29,15 +29,22 @@ def symbols_of(signals: Signals, pool: Pool, sums: Sequence[Sum]) -> list[str]:
 
 
 def identities(found: Sum, pool: Pool, signals: Signals) -> list[Remark]:
-    """The nearest other law that the runs cannot tell from this one: an identity that held on them."""
+    """The nearest other law that the runs cannot tell from this one: an identity that held on them.
+
+    It is one of library terms: what evolved resembles a law somewhere, and tells a reader nothing.
+    """
     symbols = symbols_of(signals, pool, [found])
     driven = signals.state_names[found.chain.states[0]]
     ours = set(found.weights)
     for subset, above in found.others:
         out, into = ours - set(subset), set(subset) - ours
-        if above < TWINS and out and into and len(out) + len(into) <= 6:
+        plain = all(node in pool.rungs for node in into)
+        if above < TWINS and out and into and plain and len(out) + len(into) <= 6:
             gone, come = (
-                ", ".join(sorted(pool.text(node, symbols) for node in terms)) for terms in (out, into)
+                ", ".join(
+                    sorted("a constant" if node == pool.one else pool.text(node, symbols) for node in terms)
+                )
+                for terms in (out, into)
             )
             return [
                 note(

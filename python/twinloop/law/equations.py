@@ -241,7 +241,7 @@ class _Page:
         times = [member.actuation.hidden[number].time for member in self.members if self._alike(member)]
         deviation = self._deviation(times)
         note = f"{start}; its time {self.writer.number(hidden.time)}{deviation} s" if deviation else start
-        emptied = [] if hidden.states and hidden.rest == 0.0 else [("-", rest)]
+        emptied = [] if hidden.rest == 0.0 else [("-", rest)]
         terms = [*given, *emptied, ("-", f"{name}/{self.writer.number(hidden.time)}")]
         return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twinloop._ground.arrays import Floats
 from twinloop.law.expansion import Monomial, Polynomial, ordered
 from twinloop.law.expressions import CONSTANT, Expressions
 
@@ -105,10 +106,16 @@ def spreads(
         alike = [member[shape] for member in found if len(member.get(shape, ())) == len(terms)]
         for place, term in enumerate(terms):
             values = np.array([member[place].values for member in alike])
-            sds = values.std(axis=0, ddof=1).tolist() if len(alike) > 1 else [None] * (1 + len(term.paths))
+            sds = _deviations(values) if len(alike) > 1 else [None] * (1 + len(term.paths))
             inside = tuple(Inside(sd, path) for sd, path in zip(sds[1:], term.paths, strict=True))
             result[term.monomial] = Spread(sds[0], inside, len(alike), len(members))
     return result
+
+
+def _deviations(values: Floats) -> list[float]:
+    """Standard deviations of constants over members (members, constants); 0 of those that are equal, not rounding."""
+    found: list[float] = np.where(np.ptp(values, axis=0) > 0.0, values.std(axis=0, ddof=1), 0.0).tolist()
+    return found
 
 
 @dataclass(frozen=True)

@@ -174,6 +174,15 @@ def test_what_comes_to_rest_or_is_rounded_is_not_frozen():
     assert not froze(stream.normal(size=STEPS + 1))
 
 
+def test_a_coarse_encoder_that_creeps_to_rest_count_by_count_is_not_frozen_but_one_that_stops_at_once_is():
+    t = DT * np.arange(STEPS + 1)
+    count = 2e-3
+    creeps = 1.0 - np.exp(-8.0 * t / t[-1])
+    assert not froze(count * np.round(creeps / count))
+    turns = np.sin(3.0 * np.minimum(t, 0.7 * t[-1]) / t[-1])
+    assert froze(count * np.round(turns / count))
+
+
 @pytest.mark.parametrize("value", [0.0, 0.7])
 def test_a_command_that_never_changes_is_named(value):
     constant = np.full((STEPS, 1), value)

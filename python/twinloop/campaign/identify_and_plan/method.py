@@ -13,15 +13,15 @@ from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop._ground.steps import STEPS, Step
+from twinloop._ground.streams import Unit
 from twinloop.campaign import standing
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
-from twinloop.campaign.identify_and_plan.calibration import (
-    calibrated,
-)
+from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed_in_a_row
+from twinloop.campaign.identify_and_plan.gusts import moved_by_gusts
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -132,7 +132,8 @@ class IdentifyAndPlan:
             self._exploits(book, tuned, last),
             last and self.options.exploit_last,
         )
-        found = replace(found, spread=calibrated(found.spread, found.predicted, book.experiments))
+        spread = float(np.sqrt(found.spread**2 + self._moved_by_gusts(book, found) ** 2))
+        found = replace(found, spread=calibrated(spread, found.predicted, book.experiments))
         test = book.new_test(
             found.genes,
             excitation=found.excitation,
@@ -147,6 +148,26 @@ class IdentifyAndPlan:
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
         return test
+
+    def _moved_by_gusts(self, book: Logbook, found: Proposal) -> float:
+        """What disturbances add to the spread of a proposal's quality; none that are known to be a model error."""
+        latest, setup = self._latest(), self.setup
+        lesson, noise = latest.lessons[-1], latest.identified.noise(setup.signals)
+        errors = [i for i, name in enumerate(setup.signals.state_names) if lesson.cause(name) == "law"]
+        flight = replace(
+            book.of_task(found.genes, len(book.tests)),
+            initial_state=found.initial_state, target_state=found.target_state, excitation=found.excitation,
+        )  # fmt: skip
+        unit = Unit(setup.seed).part(len(book.experiments), 3)
+        return moved_by_gusts(
+            latest.identified.model,
+            noise.without(errors),
+            flight,
+            setup.quality,
+            unit,
+            setup.limits,
+            self.workers,
+        )
 
     def _held_back(self, found: Proposal) -> HoldBack | None:
         """What holds back an excitation of which no model can say where it leads, as in a first flight."""

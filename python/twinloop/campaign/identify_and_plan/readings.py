@@ -17,6 +17,8 @@ FEWEST = 10
 """Readings of such a stretch at least."""
 AT_ONCE = 0.1
 """Times its usual step that a sensor moved last before it froze: what comes to rest by itself moves less and less."""
+COUNTS = 1.5
+"""Counts of a rounded sensor that it moved last before it froze: by one of them it also comes to rest by itself."""
 WHITE = 1.5
 """Von Neumann's ratio, 2 for white noise and near 0 for what moves smoothly, above which nothing else is seen."""
 
@@ -71,7 +73,8 @@ def froze(readings: Floats) -> bool:
     usual = float(np.median(others))
     # A reading that is rounded stands still now and then; one of a system at rest moves less and less before.
     beside = [steps[k] for k in (first - 1, last - 1) if 0 <= k < len(steps)]
-    return bool(usual > 0.0 and beside and min(beside) > AT_ONCE * usual)
+    at_once = max(AT_ONCE * usual, COUNTS * float(np.diff(np.unique(readings)).min()))
+    return bool(usual > 0.0 and beside and min(beside) > at_once)
 
 
 def ratio(records: Sequence[Floats]) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
+from twinloop.identification.search.poles import vanishes_nowhere
 from twinloop.identification.search.problem import Columns, Problem
 from twinloop.identification.search.structure import Sum, prices
 from twinloop.identification.search.walks import Walks
@@ -139,11 +140,15 @@ def driving(problem: Problem, found: Sum) -> Floats:
 
 
 def matters(problem: Problem, denominator: Denominator) -> bool:
-    """Whether a denominator stays away from 0 wherever the runs were, and makes a difference there."""
+    """Whether a denominator stays away from 0 wherever the runs were, and makes a difference there.
+
+    Elsewhere in the envelope it must not vanish.
+    """
     values = problem.values([node for node, _ in denominator])
     total = 1.0 + (values * np.array([weight for _, weight in denominator])).sum(axis=2)
     least, most = float(total.min()), float(total.max())
-    return least > max(NEAREST * most, SINGULAR) and most > VARIES * least and least < LARGE
+    differs = least > max(NEAREST * most, SINGULAR) and most > VARIES * least and least < LARGE
+    return differs and vanishes_nowhere(problem.pool, denominator, problem.room)
 
 
 def _masks(pool: Pool, signals: Signals, lower: Sequence[int]) -> list[Floats]:

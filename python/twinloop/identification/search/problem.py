@@ -31,6 +31,7 @@ class Problem:
         priors: what is known of the law.
         as_integrated: whether chains that step bear what integration leaves, too: where forms are compared, what a
             derivative could not show is no evidence for them.
+        room: bounds of each state within which a denominator must not vanish; empty: wherever the runs were.
     """
 
     def __init__(
@@ -42,9 +43,11 @@ class Problem:
         workers: _core.Workers,
         priors: Priors,
         as_integrated: bool = False,
+        room: Sequence[Bounds] = (),
     ) -> None:
         self.priors = priors
         self.as_integrated = as_integrated
+        self.room = room
         self.pool = pool
         self.runs = runs
         self.stages = stages

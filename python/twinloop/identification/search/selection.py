@@ -13,6 +13,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.joints import with_joints
+from twinloop.identification.search.poles import room
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.structure import Sum, search
@@ -34,7 +35,7 @@ def posed(context: Context, hypothesis: Hypothesis, inputs: Stages | None = None
         inputs = stages(hypothesis.runs, context.signals, hypothesis.actuation)
     return Problem(
         hypothesis.pool, hypothesis.runs, inputs, context.signals.dt, context.workers, hypothesis.candidates.priors,
-        context.as_integrated,
+        context.as_integrated, room(context.signals, inputs.start[:, : context.signals.n_x]),
     )  # fmt: skip
 
 

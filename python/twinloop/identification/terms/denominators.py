@@ -12,6 +12,7 @@ from twinloop.identification.terms.libraries import (
     quadratic,
     rates,
     trigonometric,
+    turn,
 )
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.expressions import CONSTANT
@@ -34,7 +35,7 @@ def below(pool: Pool, signals: Signals) -> list[int]:
     found = [power_of(pool, i, power) for i in rest for power in range(1, HIGHEST + 1)]
     found += [pool.product(i, j) for i, j in combinations(rest, 2)]
     for i in sorted(angles(signals)) if signals.kinematics is None else ():
-        wave = pool.wave("cos", i, signals.states[i].period)
+        wave = pool.wave("cos", i, turn(signals.states[i]))
         found += [wave, pool.product(wave, wave)]
     return list(dict.fromkeys(found))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import combinations, combinations_with_replacement
 
-from twinloop.identification.terms.libraries import angles
+from twinloop.identification.terms.libraries import angles, turn
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals
 
@@ -119,9 +119,9 @@ def _places(signals: Signals) -> list[int]:
 def _poses(pool: Pool, signals: Signals) -> list[tuple[int, int]]:
     """Sine and cosine of every angle, and of the difference and the sum of every two."""
     turning = sorted(angles(signals))
-    nodes = [(i, signals.states[i].period) for i in turning]
+    nodes = [(i, turn(signals.states[i])) for i in turning]
     for i, j in combinations(turning, 2):
-        period = signals.states[i].period
-        if period == signals.states[j].period:
+        period = turn(signals.states[i])
+        if period == turn(signals.states[j]):
             nodes += [(pool.add("-", i, j), period), (pool.add("+", i, j), period)]
     return [(pool.wave("sin", node, period), pool.wave("cos", node, period)) for node, period in nodes]

@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from itertools import combinations, combinations_with_replacement
 
 from twinloop.identification.terms.pool import Pool
-from twinloop.signals import Signals
+from twinloop.signals import Signals, State
 
 Terms = list[int]
 FRICTION = 30.0
 """Steepness of dry friction at rest, in units of a speed's scale."""
 LIKELIER = 1.0
 """Nats by which |x| x of a rate or a command is shorter than its square."""
+DEGREES = ("deg", "°", "degree", "degrees")
+"""Units of angles of which a turn is 360."""
 CUBIC_INPUTS = 13
 """States and commands, together, of which there are products of three: 455."""
 
@@ -93,7 +95,7 @@ def trigonometric(pool: Pool, signals: Signals) -> Terms:
         if i in angles(signals):
             others = [j for j in range(pool.inputs) if j != i and j not in periodic(signals)]
             for function in ("sin", "cos"):
-                wave = pool.wave(function, i, signals.states[i].period)
+                wave = pool.wave(function, i, turn(signals.states[i]))
                 terms += [wave, *(pool.product(j, wave) for j in others)]
     return terms
 
@@ -144,8 +146,14 @@ def periodic(signals: Signals) -> set[int]:
 
 
 def angles(signals: Signals) -> set[int]:
-    """States that are measured in rad, or wrap."""
-    return {i for i, state in enumerate(signals.states) if state.unit == "rad"} | periodic(signals)
+    """States that are measured in rad or degrees, or wrap."""
+    units = ("rad", *DEGREES)
+    return {i for i, state in enumerate(signals.states) if state.unit in units} | periodic(signals)
+
+
+def turn(state: State) -> float | None:
+    """A whole turn of an angle in its unit: what it wraps by, or 360 in degrees; None: 2π, in rad."""
+    return 360.0 if state.period is None and state.unit in DEGREES else state.period
 
 
 def rates(signals: Signals) -> set[int]:

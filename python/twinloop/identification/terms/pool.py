@@ -156,9 +156,12 @@ class Pool(Expressions, Recorded, kind="pool"):
         return number if parts == operands else super().add(operation, *parts)
 
     def wave(self, function: str, number: int, period: float | None) -> int:
-        """The node of the sine or cosine of a node, over a period of it; None: over 2π."""
+        """The node of the sine or cosine of a node, over a period of it; None: over 2π.
+
+        The period is a unit, and no constant that tuning may change.
+        """
         if period is not None and period != 2.0 * math.pi:
-            number = self.add("*", number, 2.0 * math.pi / period)
+            number = self.share(number, period / (2.0 * math.pi))
         return self.add(function, number)
 
     def leaves(self, number: int) -> list[int | None]:

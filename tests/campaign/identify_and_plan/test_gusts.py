@@ -1,0 +1,49 @@
+"""Gusts: a predicted quality spreads by what disturbances do to the flight, beside what members and sensors do."""
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from strategies import program_text
+from twinloop import _core
+from twinloop._experiment.limits import Limits
+from twinloop._ground.streams import Unit
+from twinloop.campaign.identify_and_plan.gusts import moved_by_gusts
+from twinloop.law.noise import CorrelatedDisturbance, Noise
+from twinloop.planning.quality import quality_of
+
+DT, STEPS, KICK = 0.1, 60, 0.01
+SIGNALS = tl.Signals([tl.State("x", "m", 2.0)], [tl.Command("u", "N", (-1.0, 1.0))], DT)
+FAMILY = tl.controllers.PID(axes=[("x", None)], gains={"x.kp": (0.0, 1.0), "x.ki": 0.0, "x.kd": 0.0}).bind(
+    SIGNALS
+)
+WORKERS = _core.Workers(1)
+
+
+def moved(noise, growth=0.0, start=5.0):
+    """Of x' = growth x, which no command drives, so that it stays far from its target at 0."""
+    lines = [[f"r2 = r0 * {growth!r}"]]
+    model = _core.Model(_core.Program.parse(program_text(2, 1, 3, lines)), "acceleration", SIGNALS.engine)
+    test = tl.Test(FAMILY, FAMILY.genes({"x.kp": 0.0}), [start], [0.0], STEPS)
+    return moved_by_gusts(
+        model, noise, test, quality_of("iae", SIGNALS, [1.0]), Unit(3).part(0), Limits(SIGNALS), WORKERS
+    )
+
+
+def test_kicks_add_up_to_what_a_random_walk_adds_to_an_integrated_error():
+    # |x| = x, so that the error's integral moves by DT Σ of the walk, of which kick j is in all readings after it.
+    expected = DT * KICK * np.sqrt(np.square(np.arange(1, STEPS + 1)).sum())
+    assert moved(Noise(np.zeros(1), np.array([KICK]), dt=DT)) == pytest.approx(expected, rel=0.35)
+
+
+def test_a_gust_that_is_forgotten_slowly_moves_it_more_than_one_that_is_forgotten_at_once():
+    slow, quick = (
+        moved(Noise(np.zeros(1), np.zeros(1), (CorrelatedDisturbance((0,), "acceleration", 0.1, time),), DT))
+        for time in (5.0, 0.05)
+    )
+    assert slow > 3.0 * quick > 0.0
+
+
+def test_sensors_alone_and_flights_that_diverge_add_nothing():
+    assert moved(Noise(np.array([0.1]), np.zeros(1), dt=DT)) == 0.0
+    assert moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), growth=4.0) == 0.0
