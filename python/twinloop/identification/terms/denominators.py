@@ -79,6 +79,9 @@ def quotient(pool: Pool, number: int) -> tuple[int, Denominator] | None:
     lower = pool[operands[1]] if operation == "/" else None
     if lower is None or lower.operation != "-" or lower.operands[0] != pool.one:
         return None
+    if any(pool[node].operation == CONSTANT for node in pool.needed([operands[0]])):
+        # What joints that share masses are solved to has such a form, too, and is priced as a whole.
+        return None
     parts, waiting = [], [lower.operands[1]]
     while waiting:
         node = pool[waiting.pop()]
