@@ -364,6 +364,20 @@ def test_the_last_experiment_of_a_budget_flies_the_best_gains_as_they_are(begin,
     assert not explored.experiments[1].test.reason.startswith("The best gains")
 
 
+def test_until_a_prediction_has_come_true_the_controller_to_fly_leads_no_further_than_the_next_flight(
+    begin, pendulum
+):
+    limits = {"reach_seen": 0.1}
+    campaign = told(begin(options=limits), pendulum)
+    best, tuned = campaign.best_test, campaign._method._gains(campaign._book)
+    assert best.reason.startswith("Tuned on the twin") and not same_bits(best.genes, tuned)
+    assert same_bits(best.genes, told(begin(options=limits), pendulum).ask(last=True).genes)
+    confirmed = mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=1)
+    with confirmed:
+        campaign = told(begin(options=limits), pendulum)
+        assert same_bits(campaign.best_test.genes, campaign._method._gains(campaign._book))
+
+
 @pytest.mark.parametrize("bears", [True, False])
 def test_gains_must_bear_more_delay_until_a_prediction_has_come_true(begin, pendulum, bears):
     campaign = told(begin(options={"delay_margin": bears}), pendulum)

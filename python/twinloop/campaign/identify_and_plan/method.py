@@ -221,9 +221,17 @@ class IdentifyAndPlan:
             tuned, note = known_gains(self.memory, best)
             found = choice.between(tuned, best)
             return replace(found, reason=f"{found.reason}{note}")
-        answer = choice.between(self._gains(book), best)
+        answer = choice.between(self._within_reach(committee, self._gains(book), book), best)
         self.memory = replace(self.memory, best=(book.revision, answer))
         return answer
+
+    def _within_reach(self, committee: Committee, tuned: Floats, book: Logbook) -> Floats:
+        """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with."""
+        flown = self._flown(book, standing.best_flown(book), tuned)
+        if flown.seen is None or not committee.trusted:
+            return tuned
+        found = self.planner.propose(committee, tuned, flown, self.setup.goal, len(book.tests), True, True)
+        return found.genes if found.safe else tuned
 
     def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
         """A gentle chirp that fades out, held back by what the states do."""
