@@ -12,6 +12,13 @@ def test_a_term_over_a_denominator_is_taken_apart_as_it_was_made() -> None:
     assert quotient(pool, made) == (1, tuple(sorted(((2, 0.5), (square, -0.25)))))
 
 
+def test_one_over_a_denominator_is_a_quotient_and_so_is_a_quotient_over_another() -> None:
+    pool = Pool(3)
+    one = over(pool, pool.one, ((2, 0.5),))
+    assert quotient(pool, one) == (pool.one, ((2, 0.5),))
+    assert quotient(pool, over(pool, one, ((0, -0.25),))) == (one, ((0, -0.25),))
+
+
 def test_accelerations_that_equations_of_joints_are_solved_to_are_no_quotients() -> None:
     """They are over 1 + Σ w φ as well; priced as such, each cost the whole length of its numerator."""
     pool = Pool(4)

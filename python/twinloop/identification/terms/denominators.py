@@ -79,7 +79,7 @@ def quotient(pool: Pool, number: int) -> tuple[int, Denominator] | None:
     lower = pool[operands[1]] if operation == "/" else None
     if lower is None or lower.operation != "-" or lower.operands[0] != pool.one:
         return None
-    if any(pool[node].operation == CONSTANT for node in pool.needed([operands[0]])):
+    if _is_weighted(pool, operands[0]):
         # What joints that share masses are solved to has such a form, too, and is priced as a whole.
         return None
     parts, waiting = [], [lower.operands[1]]
@@ -94,6 +94,13 @@ def quotient(pool: Pool, number: int) -> tuple[int, Denominator] | None:
         (term,) = (i for i in node.operands if i != constants[0])
         parts.append((term, -pool[constants[0]].value))
     return operands[0], tuple(sorted(parts))
+
+
+def _is_weighted(pool: Pool, number: int) -> bool:
+    """Whether a node is a sum, or a term with a weight: above the line there are terms alone."""
+    operation, operands, _ = pool[number]
+    weighted = any(i != pool.one and pool[i].operation == CONSTANT for i in operands)
+    return operation in ("+", "-") or (operation == "*" and weighted)
 
 
 def denominators(pool: Pool, terms: Iterable[int]) -> list[Denominator]:
