@@ -91,3 +91,13 @@ def test_the_next_flight_keeps_both_the_reach_in_the_envelope_and_the_states_nea
     np.testing.assert_allclose(high, [0.9 * reach, 1.5 * reach])
     np.testing.assert_allclose(low, -high)
     assert TASK.initial_state[0] <= high[0]
+
+
+def test_on_a_twin_that_explains_no_flight_nothing_is_tuned_under_limits():
+    quick, seen = np.array([9.0, 0.0, 1.0]), np.array([[0.4, -0.05], [0.5, 0.02]])
+    flown = Flown(best=GENTLE, flies=True, usages=[0.56], good=1.0, seen=seen)
+    unexplained = replace(COMMITTEE, explains=False)
+    without = planner_of(KNOWN, candidates=64, evaluations=4096, within=False)
+    expected = without.propose(COMMITTEE, quick, flown, "both", 3, False)
+    assert same_bits(PLANNER.propose(unexplained, quick, flown, "both", 3, False).genes, expected.genes)
+    assert not same_bits(PLANNER.propose(COMMITTEE, quick, flown, "both", 3, False).genes, expected.genes)

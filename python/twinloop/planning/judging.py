@@ -39,12 +39,15 @@ class Committee:
         sds: of each state's sensor (n_x,).
         trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
         delayed: models with more delay than was seen; gains have to bear it until the last prediction came true.
+        explains: whether the best one explains the runs; what is best within limits on one that does not is best by
+            its errors.
     """
 
     members: Sequence[_core.Model]
     sds: Floats
     trusted: bool
     delayed: Sequence[_core.Model] = ()
+    explains: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -175,7 +175,8 @@ class Planner(Judge):
         wanted = Wanted(goal, number, exploit)
         found = self._compared(committee, tuned, flown, wanted)
         self.watch("candidates")
-        if self.options.within and committee.trusted and found.possible[0] and not found.keeps[0]:
+        believed = committee.trusted and committee.explains
+        if self.options.within and believed and found.possible[0] and not found.keeps[0]:
             found = self._within(found)
         proposal = found.proposal()
         if last and not found.wanted.plain and proposal.genes.tobytes() != tuned.tobytes():

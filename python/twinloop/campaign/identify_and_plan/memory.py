@@ -66,6 +66,11 @@ class Learnt(Recorded, kind="learnt"):
     VERSION = 2
     RENAMED: ClassVar[Mapping[str, str]] = {"told": "experiments"}
 
+    @property
+    def explained(self) -> bool:
+        """Whether a law explains the flights: where none does, the best model of either kind was kept of them."""
+        return not self.two_laws or self.two_laws[-1].experiments != self.experiments
+
 
 @dataclass(frozen=True, eq=False)
 class Memory(Recorded, kind="memory_of_default"):

@@ -226,9 +226,12 @@ class IdentifyAndPlan:
         return answer
 
     def _within_reach(self, committee: Committee, tuned: Floats, book: Logbook) -> Floats:
-        """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with."""
+        """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with.
+
+        Where no law explains the flights, limits on what a model does are none on what the system does.
+        """
         flown = self._flown(book, standing.best_flown(book), tuned)
-        if flown.seen is None or not committee.trusted:
+        if flown.seen is None or not (committee.trusted and committee.explains):
             return tuned
         found = self.planner.propose(committee, tuned, flown, self.setup.goal, len(book.tests), True, True)
         return found.genes if found.safe else tuned
@@ -282,7 +285,7 @@ class IdentifyAndPlan:
         # The lag of a linear twin that stands for what no law explains is such a margin already.
         wanted = self.options.delay_margin and not stands_in(latest.identified)
         slower = [delayed(latest.believed[0], self.setup.signals, periods)] if wanted else []
-        return Committee(latest.believed, sensors, latest.follows, delayed=slower)
+        return Committee(latest.believed, sensors, latest.follows, slower, latest.explained)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
         """Whether the tuned gains are flown as they are, unless that is what a test that is waiting does."""
