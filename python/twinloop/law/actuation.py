@@ -33,6 +33,11 @@ class Actuator(NamedTuple):
         return self.lag == 0.0 and self.delay == 0
 
 
+def in_periods(count: int) -> str:
+    """A number of periods in words."""
+    return f"{count} period{'s' if count != 1 else ''}"
+
+
 class HiddenState(NamedTuple):
     """An unmeasured state h that commands or states drive: dh/dt = level − rest − h / time.
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinloop.errors import InvalidInput
-from twinloop.law.actuation import Actuator
+from twinloop.law.actuation import Actuator, in_periods
 from twinloop.law.expansion import Expansion, Monomial, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.forms import DERIVATIVES
@@ -156,7 +156,7 @@ class _Page:
         for (lag, delay, rest), places in alike.items():
             lags = [member.actuation.actuators[places[0]].lag for member in self.members]
             parts = [f"a lag of {self.writer.number(lag)}{self._deviation(lags)} s"] if lag > 0.0 else []
-            parts += [f"a delay of {delay} period{'s' if delay > 1 else ''}"] if delay else []
+            parts += [f"a delay of {in_periods(delay)}"] if delay else []
             start = "the first command" if rest is None else self.writer.number(rest)
             names = ", ".join(self.signals.command_names[place] for place in places)
             lines.append(f"{names}: act with {' and '.join(parts)}, from {start} at the start")

@@ -40,6 +40,18 @@ def nearby(family: Family, genes: Floats, others: Sequence[Floats]) -> NDArray[n
     return np.asarray(gaps.max(axis=2, initial=0.0).min(axis=1) <= NEAR)
 
 
+def scores_of(lost: Floats, quality: Floats, excess: Floats, unit: float) -> Floats:
+    """Scores (K, 2) of genes: the share of their flights that diverges, then their quality with what an excess costs.
+
+    Args:
+        lost: that share (K,).
+        quality: mean over the flights that last (K,).
+        excess: by how much the worst of them uses more of the envelope than it may (K,).
+        unit: a quality, so that an excess costs something where the quality is 0.
+    """
+    return np.stack([lost, quality + excess * (10.0 * quality + unit)], axis=1)
+
+
 def tune_gains(
     family: Family,
     score: Score,

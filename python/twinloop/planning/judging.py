@@ -38,9 +38,8 @@ class Committee:
         members: m of them.
         sds: of each state's sensor (n_x,).
         trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
-        delayed: models with more delay than was seen; gains have to bear it until the last prediction came true.
-        explains: whether the best one explains the runs; what is best within limits on one that does not is best by
-            its errors.
+        delayed: models with more delay than was seen, which gains have to tolerate.
+        explains: whether the best one explains the runs.
     """
 
     members: Sequence[_core.Model]
@@ -48,6 +47,14 @@ class Committee:
     trusted: bool
     delayed: Sequence[_core.Model] = ()
     explains: bool = True
+
+    @property
+    def predicts_limits(self) -> bool:
+        """Whether flights that keep limits on the best model may be expected to keep them on the system.
+
+        Of a model that does not explain the runs, the gains that are best within limits are best because of its errors.
+        """
+        return self.trusted and self.explains
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from twinloop.controllers import Family
 from twinloop.planning.candidates import candidates
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, first_chirps
-from twinloop.planning.gains import tune_gains
+from twinloop.planning.gains import scores_of, tune_gains
 from twinloop.planning.judging import Committee, Judge, Task
 from twinloop.planning.proposal import Flown, Proposal, Wanted
 from twinloop.planning.quality import Quality
@@ -110,7 +110,7 @@ class Planner(Judge):
                 1, np.isfinite(judged.qualities).sum(axis=(0, 1))
             )
             excess = np.maximum(0.0, lasts.worst_usage - (1.0 - options.margin))
-            return np.stack([judged.lost, mean + excess * (10.0 * mean + unit)], axis=1)
+            return scores_of(judged.lost, mean, excess, unit)
 
         return tune_gains(
             self.family, scored(score), starts, evaluations=options.evaluations // 2, spread=spread,
@@ -175,8 +175,7 @@ class Planner(Judge):
         wanted = Wanted(goal, number, exploit)
         found = self._compared(committee, tuned, flown, wanted)
         self.watch("candidates")
-        believed = committee.trusted and committee.explains
-        if self.options.within and believed and found.possible[0] and not found.keeps[0]:
+        if self.options.within and committee.predicts_limits and found.possible[0] and not found.keeps[0]:
             found = self._within(found)
         proposal = found.proposal()
         if last and not found.wanted.plain and proposal.genes.tobytes() != tuned.tobytes():

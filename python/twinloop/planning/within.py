@@ -12,7 +12,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.planning.gains import tune_gains
+from twinloop.planning.gains import scores_of, tune_gains
 from twinloop.planning.judging import Committee, Judge
 from twinloop.planning.settings import PlanningOptions
 
@@ -57,7 +57,7 @@ def tune_within(
             lost = lost + late.lost
             excess = excess + np.maximum(0.0, late.finite.worst_usage - most)
         mean = near.finite.qualities.mean(axis=(0, 1))
-        return np.stack([lost, mean + excess * (10.0 * mean + unit)], axis=1)
+        return scores_of(lost, mean, excess, unit)
 
     return tune_gains(
         judge.family, score, starts, evaluations=options.evaluations // 2, spread=SPREAD,

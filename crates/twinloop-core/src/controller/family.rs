@@ -138,7 +138,7 @@ impl Family {
         matches!(self.law, Source::Foreign(_))
     }
 
-    /// Controllers of these parameters (size) at the start of a run.
+    /// Controllers of these parameters (size) at the start of a run. By a call: each loop would have a copy of it.
     #[inline(never)]
     pub fn start<V: Vector>(&self, parameters: &[V]) -> Controllers<V> {
         let mut parameters = parameters.iter();

@@ -14,6 +14,7 @@ from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 DRAWS = 32
+"""Flights under drawn disturbances."""
 
 
 def moved_by_gusts(

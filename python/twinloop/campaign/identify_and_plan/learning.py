@@ -173,8 +173,8 @@ class Learner:
         )
         misses = answer.misses(book.experiments, self.setup, self.workers)
         explained = follows and not misses and not is_rough(identified)
-        late = identified.actuation, self.setup.signals, explained
-        actuators = claimed(*late)
+        actuation, signals = identified.actuation, self.setup.signals
+        actuators = claimed(actuation, signals, explained)
         return Lesson(
             iteration=len(book.experiments),
             tests=tuple(run.number for run in book.experiments),
@@ -195,7 +195,7 @@ class Learner:
             follows=follows,
             remarks=(
                 *identified.remarks,
-                *stand_ins(*late),
+                *stand_ins(actuation, signals, explained),
                 *diagnostics_of(
                     book.experiments,
                     self.setup.signals,

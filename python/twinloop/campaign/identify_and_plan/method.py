@@ -42,7 +42,7 @@ from twinloop.records import Record
 from twinloop.test import Test
 
 TOLERATED = 0.5
-"""Share of the delay that gains have to bear that is left of it after a prediction that came true."""
+"""Share that is left of the delay that gains have to tolerate, after each prediction that came true."""
 
 
 class IdentifyAndPlan:
@@ -226,14 +226,12 @@ class IdentifyAndPlan:
         return answer
 
     def _within_reach(self, committee: Committee, tuned: Floats, book: Logbook) -> Floats:
-        """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with.
-
-        Where no law explains the flights, limits on what a model does are none on what the system does.
-        """
+        """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with."""
         flown = self._flown(book, standing.best_flown(book), tuned)
-        if flown.seen is None or not (committee.trusted and committee.explains):
+        if flown.seen is None or not committee.predicts_limits:
             return tuned
-        found = self.planner.propose(committee, tuned, flown, self.setup.goal, len(book.tests), True, True)
+        goal, number = self.setup.goal, len(book.tests)
+        found = self.planner.propose(committee, tuned, flown, goal, number, exploit=True, last=True)
         return found.genes if found.safe else tuned
 
     def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
@@ -280,7 +278,7 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        # Gains that bear a delay and fly as predicted say little of gains that do not: half of it has to be borne next.
+        # Gains that tolerate a delay and fly as predicted say little of gains that do not: half of it remains.
         periods = TOLERATED ** nearly_confirmed_in_a_row(book.experiments)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
         wanted = self.options.delay_margin and not stands_in(latest.identified)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from twinloop.law.actuation import Actuation, Actuator
+from twinloop.law.actuation import Actuation, Actuator, in_periods
 from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
 
@@ -49,5 +49,5 @@ def _late(actuator: Actuator) -> str:
     """The lag and the delay in words."""
     parts = [f"lag {actuator.lag:.3g} s"] if actuator.lag else []
     if actuator.delay:
-        parts.append(f"delay {actuator.delay} period{'s' if actuator.delay != 1 else ''}")
+        parts.append(f"delay {in_periods(actuator.delay)}")
     return ", ".join(parts)

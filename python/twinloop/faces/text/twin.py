@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from twinloop.faces.text.table import cell, table
+from twinloop.law.actuation import in_periods
 
 A_DAY = 86_400.0
 """Seconds: what takes longer to fade does not fade within a flight."""
@@ -101,7 +102,7 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
     words = []
     for (lag, delay, identified), names in groups.items():
         slow = f"lag {lag:.3g} s" if lag else "no lag"
-        late = f"delay {delay} period{'s' if delay != 1 else ''}" if delay else "no delay"
+        late = f"delay {in_periods(delay)}" if delay else "no delay"
         words.append(f"{', '.join(names)}: {slow}, {late}{'' if identified else f' ({STAND_IN})'}")
     return f"Actuators: {'; '.join(words)}."
 
