@@ -33,10 +33,10 @@ PLAIN = 1_000_000
 """Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""
 ROUGH = serious(
     "rough",
-    "No nonlinear law follows the flights as well in free run, so the twin is linear. It follows"
-    " them roughly: this may be enough to tune gains, but it is not a simulator.",
+    "No law explains the flights, and a linear one follows them in free run, or predicted later ones, better than"
+    " a nonlinear one. So the twin is linear, and rough: this may be enough to tune gains, but it is not a simulator.",
 )
-"""What is said of a twin that is linear because no other one follows."""
+"""What is said of a twin that is linear because no law explains the flights and no other one is better."""
 BEFORE = note(
     "known-before",
     "The twin learnt from all flights misses some of them in free run; the twin of before the last flight"

@@ -77,12 +77,16 @@ def actuators(result: Mapping[str, Any]) -> Table | None:
     if not found:
         return None
     head = ["command", "lag (s)", "delay (periods)", "identified"]
-    # Results of earlier versions do not say so: what they name was identified.
-    rows = [
-        [words(each["name"]), each["lag"], each["delay"], "yes" if each.get("identified", True) else STAND_IN]
-        for each in found
-    ]
+    rows = [[words(each["name"]), each["lag"], each["delay"], _identified(each)] for each in found]
     return table_of("actuators", "Actuators", head, rows)
+
+
+def _identified(actuator: Mapping[str, Any]) -> str:
+    """Whether a lag or a delay was identified; a dash where there is neither."""
+    if not (actuator["lag"] or actuator["delay"]):
+        return "–"
+    # Results of earlier versions do not say so: what they name was identified.
+    return "yes" if actuator.get("identified", True) else STAND_IN
 
 
 def rivals(found: Examination) -> Table | None:
