@@ -17,6 +17,7 @@ from twinloop.campaign.identify_and_plan.choice import (
     nearly_confirmed_in_a_row,
     over_promised,
 )
+from twinloop.campaign.identify_and_plan.gusts import UNMOVED, Moved
 from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
@@ -36,7 +37,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
-    experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True,
+    experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -61,14 +62,15 @@ def chosen(
         family=FAMILY, judge=judge, stable_members=lambda members, genes: members,
         options=PlanningOptions(track_record=track_record),
     )  # fmt: skip
-    choice = Choice(planner, Committee([None], np.zeros(2), trusted), book, 4, confidence)
+    choice = Choice(planner, Committee([None], np.zeros(2), trusted), book, 4, confidence, lambda test: gusts)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
         unfit=lambda book: list(unfit), on_task=lambda book, test: True,
         measured=lambda book, test: measured if test == 0 else None, best_flown=lambda book: best_measured,
     ):  # fmt: skip
         found = choice.between(TUNED, best)
-    return ("tuned" if (found.genes == TUNED).all() else "flown"), found.reason
+    told = [found.reason, found.predicted, found.spread]
+    return ("tuned" if (found.genes == TUNED).all() else "flown"), told[0] if gusts is UNMOVED else told
 
 
 @pytest.mark.parametrize(
@@ -108,6 +110,15 @@ def test_where_the_last_flight_was_not_as_predicted_others_must_be_better_by_two
     assert chosen(1.01 * enough, experiments=missed)[0] == "flown"
     assert "not as predicted" in chosen(1.01 * enough, experiments=missed)[1]
     assert chosen(1.01 * enough)[0] == "tuned"
+    # Whatever else disturbs them: what gusts will add was measured in the flight, too.
+    assert chosen(0.99 * enough, experiments=missed, gusts=Moved(0.1, 0.0))[0] == "flown"
+
+
+def test_what_gusts_add_is_predicted():
+    answer, (_, predicted, spread) = chosen(0.5, gusts=Moved(0.1, 0.3))
+    assert (answer, predicted) == ("tuned", pytest.approx(0.6))
+    # Members and draws agree, and what was missed before is less.
+    assert spread == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize(

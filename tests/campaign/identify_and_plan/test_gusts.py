@@ -8,7 +8,7 @@ from strategies import program_text
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.streams import Unit
-from twinloop.campaign.identify_and_plan.gusts import moved_by_gusts
+from twinloop.campaign.identify_and_plan.gusts import UNMOVED, Moved, moved_by_gusts
 from twinloop.law.noise import CorrelatedDisturbance, Noise
 from twinloop.planning.quality import quality_of
 
@@ -33,7 +33,22 @@ def moved(noise, growth=0.0, start=5.0):
 def test_kicks_add_up_to_what_a_random_walk_adds_to_an_integrated_error():
     # |x| = x, so that the error's integral moves by DT Σ of the walk, of which kick j is in all readings after it.
     expected = DT * KICK * np.sqrt(np.square(np.arange(1, STEPS + 1)).sum())
-    assert moved(Noise(np.zeros(1), np.array([KICK]), dt=DT)) == pytest.approx(expected, rel=0.35)
+    bias, spread = moved(Noise(np.zeros(1), np.array([KICK]), dt=DT))
+    assert spread == pytest.approx(expected, rel=0.35)
+    # In proportion: as often better as worse, by as much.
+    assert bias == pytest.approx(0.0, abs=1e-12)
+
+
+def test_at_the_target_every_disturbance_is_a_bias():
+    # |walk| is √(2/π) of its standard deviation on average, KICK √j after j kicks; the first reading is the start.
+    bias, spread = moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), start=0.0)
+    expected = DT * KICK * np.sqrt(2.0 / np.pi) * np.sqrt(np.arange(1, STEPS + 1)).sum()
+    assert bias == pytest.approx(expected, rel=0.4) and spread > 0.0
+
+
+def test_a_prediction_is_moved_and_its_variances_add():
+    assert Moved(0.5, 3.0).added_to(2.0, 4.0) == (2.5, 5.0)
+    assert UNMOVED.added_to(2.0, 4.0) == (2.0, 4.0)
 
 
 def test_a_gust_that_is_forgotten_slowly_moves_it_more_than_one_that_is_forgotten_at_once():
@@ -41,9 +56,9 @@ def test_a_gust_that_is_forgotten_slowly_moves_it_more_than_one_that_is_forgotte
         moved(Noise(np.zeros(1), np.zeros(1), (CorrelatedDisturbance((0,), "acceleration", 0.1, time),), DT))
         for time in (5.0, 0.05)
     )
-    assert slow > 3.0 * quick > 0.0
+    assert slow.spread > 3.0 * quick.spread > 0.0
 
 
 def test_sensors_alone_and_flights_that_diverge_add_nothing():
-    assert moved(Noise(np.array([0.1]), np.zeros(1), dt=DT)) == 0.0
-    assert moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), growth=4.0) == 0.0
+    assert moved(Noise(np.array([0.1]), np.zeros(1), dt=DT)) == UNMOVED
+    assert moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), growth=4.0) == UNMOVED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from twinloop.campaign import standing
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated
+from twinloop.campaign.identify_and_plan.gusts import Moved
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
@@ -40,6 +41,7 @@ class Choice:
         book: of the campaign.
         draws: of the sensors' noise.
         confidence: share of members and draws that must find tuned gains better than the best flown.
+        gusts: what disturbances do to the quality of a flight.
     """
 
     planner: Planner
@@ -47,6 +49,7 @@ class Choice:
     book: Logbook
     draws: int
     confidence: float
+    gusts: Callable[[Test], Moved]
 
     def between(self, tuned: Floats, best: Test | None) -> Test:
         """The controller to fly, without excitation, for the campaign's own task.
@@ -130,7 +133,9 @@ class Choice:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         if tuned.tobytes() == flown.genes.tobytes():
             return "the twin finds no better ones"
-        if self.planner.options.track_record and (spoken := self._spoken_against(members, recorded, flown)):
+        if self.planner.options.track_record and (
+            spoken := self._spoken_against(members, recorded, tuned, flown)
+        ):
             return spoken
         if better < self.confidence:
             sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
@@ -140,14 +145,16 @@ class Choice:
             )
         return ""
 
-    def _spoken_against(self, members: Sequence[_core.Model], recorded: Floats, flown: Test) -> str:
+    def _spoken_against(
+        self, members: Sequence[_core.Model], recorded: Floats, tuned: Floats, flown: Test
+    ) -> str:
         """Why what the twin said of the last flights speaks against gains that it prefers; nothing if it does not."""
         measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
         without = share_of(self.planner, self.committee, flown, self.draws)
         alone = None if measured is None else measured * without
         promised = over_promised(self.book.experiments)
         if alone is not None and promised > 1.0:
-            predicted, _ = expected(recorded[:, :, 0])
+            predicted, _ = self._expected(self.book.of_task(tuned, flown.number), recorded[:, :, 0])
             if not predicted * promised < alone:
                 return (
                     f"the last two flights were worse than predicted, both by {100 * (promised - 1):.2g} % or more, and"
@@ -160,8 +167,7 @@ class Choice:
                 " than was measured, so its prediction is not used here"
             )
         if alone is not None and not confirmed(self.book.experiments):
-            predicted, spread = expected(recorded[:, :, 0])
-            spread = calibrated(spread, predicted, self.book.experiments)
+            predicted, spread = self._expected(self.book.of_task(tuned, flown.number), recorded[:, :, 0])
             if not predicted + SURE * spread < alone:
                 worth = f"{alone:.3g} was measured with these"
                 if flown.excitation is not None:
@@ -204,10 +210,14 @@ class Choice:
     def _answer(
         self, test: Test, measured: float | None, judged: Judged, recorded: Floats, pick: int, reason: str
     ) -> Test:
-        predicted, spread = expected(recorded[:, :, pick])
-        spread = calibrated(spread, predicted, self.book.experiments)
+        predicted, spread = self._expected(test, recorded[:, :, pick])
         usages = judged.usages[:, :, pick]
         return replace(test, predicted=predicted, measured=measured).explained(spread, risk(usages), reason)
+
+    def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
+        """The quality to be measured of a flight, and its calibrated spread, disturbances included."""
+        predicted, spread = self.gusts(test).added_to(*expected(recorded))
+        return predicted, calibrated(spread, predicted, self.book.experiments)
 
     def _judge(
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from math import sqrt
+from typing import NamedTuple
+
 import numpy as np
 
 from twinloop import _core
@@ -14,7 +17,28 @@ from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
 DRAWS = 32
-"""Flights under drawn disturbances."""
+"""Flights under drawn disturbances: half of them, and the same with the opposite sign, so that what a disturbance does
+to a quality in proportion is no bias."""
+
+
+class Moved(NamedTuple):
+    """What disturbances do to the quality of a flight.
+
+    Args:
+        bias: what they add to it on average; most flights are worse for them.
+        spread: standard deviation of what they add.
+    """
+
+    bias: float
+    spread: float
+
+    def added_to(self, predicted: float, spread: float) -> tuple[float, float]:
+        """A quality that was predicted without disturbances, and its standard deviation, with them."""
+        return predicted + self.bias, sqrt(spread * spread + self.spread * self.spread)
+
+
+UNMOVED = Moved(0.0, 0.0)
+"""A flight that nothing disturbs."""
 
 
 def moved_by_gusts(
@@ -25,10 +49,10 @@ def moved_by_gusts(
     unit: Unit,
     limits: Limits,
     workers: _core.Workers,
-) -> float:
-    """Root mean square by which drawn disturbances move the quality of a flight, their bias included.
+) -> Moved:
+    """By how much drawn disturbances move the quality of a flight.
 
-    A committee flies candidates under the noise of sensors alone, so its spread does not have this.
+    A committee flies candidates under the noise of sensors alone, so neither its prediction nor its spread has this.
 
     Args:
         model: that is flown.
@@ -39,9 +63,11 @@ def moved_by_gusts(
         limits: where a run counts as diverged, which then counts for nothing.
         workers: how the work is carried out.
     """
-    moved = noise.disturbance(DRAWS, test.steps, unit.stream("repeats"))
-    still = np.zeros((1, *moved.shape[1:]))
-    runs = drawn_runs(model, test, limits, disturbance=np.concatenate([still, moved]), workers=workers)
+    drawn = noise.disturbance(DRAWS // 2, test.steps, unit.stream("repeats"))
+    still = np.zeros((1, *drawn.shape[1:]))
+    runs = drawn_runs(
+        model, test, limits, disturbance=np.concatenate([still, drawn, -drawn]), workers=workers
+    )
     t = test.signals.dt * np.arange(test.steps + 1, dtype=np.float64)
     values = [
         quality.flown(Trajectory(t, states, commands), test.target_state)
@@ -49,5 +75,6 @@ def moved_by_gusts(
         if lasted == test.steps
     ]
     if runs.lasted[0] < test.steps or len(values) < 2:
-        return 0.0
-    return float(np.sqrt(np.square(np.array(values[1:]) - values[0]).mean()))
+        return UNMOVED
+    added = np.array(values[1:]) - values[0]
+    return Moved(float(added.mean()), float(added.std()))

@@ -21,7 +21,7 @@ from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed_in_a_row
-from twinloop.campaign.identify_and_plan.gusts import moved_by_gusts
+from twinloop.campaign.identify_and_plan.gusts import Moved, moved_by_gusts
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -132,8 +132,10 @@ class IdentifyAndPlan:
             self._exploits(book, tuned, last),
             last and self.options.exploit_last,
         )
-        spread = float(np.sqrt(found.spread**2 + self._moved_by_gusts(book, found) ** 2))
-        found = replace(found, spread=calibrated(spread, found.predicted, book.experiments))
+        gusts = self._gusts(book, self._as_test(book, found))
+        predicted, spread = gusts.added_to(found.predicted, found.spread)
+        spread = calibrated(spread, predicted, book.experiments)
+        found = replace(found, predicted=predicted, spread=spread)
         test = book.new_test(
             found.genes,
             excitation=found.excitation,
@@ -149,15 +151,18 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
         return test
 
-    def _moved_by_gusts(self, book: Logbook, found: Proposal) -> float:
-        """What disturbances add to the spread of a proposal's quality; none that are known to be a model error."""
-        latest, setup = self._latest(), self.setup
-        lesson, noise = latest.lessons[-1], latest.identified.noise(setup.signals)
-        errors = [i for i, name in enumerate(setup.signals.state_names) if lesson.cause(name) == "law"]
-        flight = replace(
+    def _as_test(self, book: Logbook, found: Proposal) -> Test:
+        """The test that a proposal would become."""
+        return replace(
             book.of_task(found.genes, len(book.tests)),
             initial_state=found.initial_state, target_state=found.target_state, excitation=found.excitation,
         )  # fmt: skip
+
+    def _gusts(self, book: Logbook, flight: Test) -> Moved:
+        """What disturbances do to the quality of a flight; none that are known to be a model error."""
+        latest, setup = self._latest(), self.setup
+        lesson, noise = latest.lessons[-1], latest.identified.noise(setup.signals)
+        errors = [i for i, name in enumerate(setup.signals.state_names) if lesson.cause(name) == "law"]
         unit = Unit(setup.seed).part(len(book.experiments), 3)
         return moved_by_gusts(
             latest.identified.model,
@@ -216,7 +221,14 @@ class IdentifyAndPlan:
             return self.memory.best[1]
         committee = self._committee(book)
         best = best_alone(self.planner, committee, book, self.options.draws)
-        choice = Choice(self.planner, committee, book, self.options.draws, self.options.confidence)
+        choice = Choice(
+            self.planner,
+            committee,
+            book,
+            self.options.draws,
+            self.options.confidence,
+            partial(self._gusts, book),
+        )
         if at_once:
             tuned, note = known_gains(self.memory, best)
             found = choice.between(tuned, best)
