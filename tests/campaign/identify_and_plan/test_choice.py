@@ -81,6 +81,9 @@ def chosen(
         ([0.9, 0.9, 0.9, 0.9], 1.0, "tuned"),
         ([1.0, 1.0, 1.0, 1.0], 0.01, "flown"),
         ([1.1, 1.1, 1.1, 1.1], 0.0, "tuned"),
+        # Hardly better is not worth gains that have not flown.
+        ([0.996, 0.996, 0.996, 0.996], 0.8, "flown"),
+        ([0.994, 0.994, 0.994, 0.994], 0.8, "tuned"),
     ],
 )
 def test_gains_are_preferred_where_so_large_a_share_of_the_predictions_prefers_them(new, confidence, answer):

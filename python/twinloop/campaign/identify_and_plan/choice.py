@@ -28,6 +28,9 @@ SURE = 2.0
 """Spreads of a predicted quality that a flight may be off it and still confirm it."""
 NEARLY = 0.1
 """Share of a quality by which a prediction may be off it and still have come true."""
+WORTH = 0.005
+"""Share of a quality by which gains that have not flown must be better to be worth it."""
+MORE = f"{100 * WORTH:g} % or more"
 UNKNOWN = "No controller to fly: "
 
 
@@ -40,7 +43,8 @@ class Choice:
         committee: that judges.
         book: of the campaign.
         draws: of the sensors' noise.
-        confidence: share of members and draws that must find tuned gains better than the best flown.
+        confidence: share of members and draws that must find tuned gains better than the best flown, by half a percent
+            or more.
         gusts: what disturbances do to the quality of a flight.
     """
 
@@ -80,12 +84,12 @@ class Choice:
             return self._tuned(tuned, judged, recorded, reason)
         flies = standing.flies(self.book, flown.number)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
-        better = float((new < old).mean())
+        better = float((new < (1.0 - WORTH) * old).mean())
         if flies and not refused:
             refused = self._not_preferred(members, recorded, tuned, flown, better)
         if not refused:
             share = f"{100 * better:.3g} %"
-            reason = f"Tuned on the twin: better than the best flown gains in {share} of its predictions."
+            reason = f"Tuned on the twin: better than the best flown gains by {MORE} in {share} of its predictions."
             if not flies:
                 reason = (
                     "Tuned on the twin: no model predicts that they leave the envelope, as the best flown gains"
@@ -140,8 +144,8 @@ class Choice:
         if better < self.confidence:
             sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
             return (
-                f"newly tuned ones are better in only {sure} of the twin's predictions, and proven gains are replaced"
-                f" from {asked} on"
+                f"newly tuned ones are better by {MORE} in only {sure} of the twin's predictions, and proven gains are"
+                f" replaced from {asked} on"
             )
         return ""
 
