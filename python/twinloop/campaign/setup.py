@@ -18,7 +18,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats, number, whole
 from twinloop.campaign.coevolution.search import grammar, settings_of_tests, variation
 from twinloop.campaign.presets import AnyOptions, DefaultOptions, Options, options_of
-from twinloop.controllers import Family, UnboundFamily
+from twinloop.controllers import Family, Mixer, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
 from twinloop.identification.terms.formulas import parsed_term
 from twinloop.identification.terms.pool import Pool
@@ -80,6 +80,12 @@ class Setup(Recorded, kind="setup"):
     def setting(self) -> _core.Setting:
         """What tests are flown in, for the native engine."""
         return self.limits.setting(self.family)
+
+    @property
+    def mixer(self) -> Mixer | None:
+        """From the controller's axes to the commands; None where each axis is a command, or the controller has none."""
+        output = getattr(self.controller, "output", None)
+        return output if isinstance(output, Mixer) else None
 
     @property
     def final_target(self) -> Floats:

@@ -15,6 +15,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.settings import IdentificationOptions
+from twinloop.identification.terms.directions import Direction
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals
 
@@ -33,6 +34,7 @@ class Context:
         unit: of work; what is drawn for a hypothesis is a part of it.
         workers: how the work is carried out.
         rests: commands whose effect may be there at the start of a run (n_u,).
+        axes: directions in which the controller moves alike commands.
         earlier: what was learnt from fewer runs.
         watch: called with each step that begins.
         as_integrated: whether chains that step bear what integration leaves, too: where forms are compared, what a
@@ -45,6 +47,7 @@ class Context:
     unit: Unit
     workers: _core.Workers
     rests: Sequence[Floats] = ()
+    axes: Sequence[Direction] = ()
     earlier: Identified | None = None
     watch: Watch = unwatched
     as_integrated: bool = False

@@ -37,6 +37,7 @@ from twinloop.identification.records import Run
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import starts
+from twinloop.identification.terms.directions import Direction
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -87,6 +88,7 @@ def identify_runs(
     options: IdentificationOptions,
     *,
     rests: Sequence[Floats] = (),
+    axes: Sequence[Direction] = (),
     seed: int = 0,
     iteration: int = 0,
     earlier: Identified | None = None,
@@ -102,6 +104,7 @@ def identify_runs(
         signals: of the system.
         options: of the identification.
         rests: commands whose effect may be there at the start of a run (n_u,).
+        axes: directions in which the controller moves alike commands.
         seed: of the campaign.
         iteration: of the campaign, which tells its random numbers from those of others.
         earlier: what was learnt from fewer runs; its terms are candidates again.
@@ -121,6 +124,7 @@ def identify_runs(
         Unit(seed, (iteration,)),
         workers,
         rests=rests,
+        axes=axes,
         earlier=earlier,
         watch=watch,
     )

@@ -42,8 +42,8 @@ class IdentificationOptions:
         restarts: of the evolution.
         population: features that are judged at once.
         longest: description length of an evolved expression at most, nats.
-        directions: whether directions of alike commands, read off the best model so far, are terms, also in squares
-            and times states.
+        directions: whether directions of alike commands are terms, also in squares and, if read off the best model so
+            far, times states; those of the controller's mixer are terms from the beginning.
         moves: of a walk over subsets of terms.
         starts: number of walks for each output.
         largest: number of terms of an output.

@@ -63,13 +63,16 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
     driven = (declared_noise(chain, signals) for chain in every if chain.output is not None)
     if options.moderation:
         driven = (with_moved(chain, runs, signals.dt) for chain in driven)
+    candidates = Candidates.of(pool, signals, options, form, seen)
+    if options.libraries and options.directions:
+        candidates = candidates.with_directions(context.axes, exact=True)
     return Hypothesis(
         form=form,
         offsets=np.zeros(signals.n_x),
         runs=runs,
         actuation=Actuation.direct(signals),
         alike=alike_commands(signals),
-        candidates=Candidates.of(pool, signals, options, form, seen),
+        candidates=candidates,
         driven=tuple(driven),
         given=tuple(given_noise(chain, signals) for chain in every if chain.output is None),
         start=start,

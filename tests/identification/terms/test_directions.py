@@ -15,7 +15,8 @@ from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import chains
-from twinloop.identification.terms.directions import directions, terms_of, together, unequal
+from twinloop.identification.terms.candidates import Candidates
+from twinloop.identification.terms.directions import directions, of_mixer, terms_of, together, unequal
 from twinloop.identification.terms.pool import Pool
 
 WORKERS = _core.Workers()
@@ -97,7 +98,7 @@ def test_terms_of_a_direction_are_it_its_squares_and_it_times_each_state(shares)
     rows = np.random.default_rng(1).normal(size=(20, pool.inputs))
     linear = sum(share * rows[:, place] for place, share in direction)
     squares = sum(share * rows[:, place] ** 2 for place, share in direction)
-    terms = terms_of(pool, direction, signals)
+    terms = terms_of(pool, direction, range(signals.n_x))
     values = pool.values(list(terms), rows)
     expected = np.stack([linear, squares, rows[:, 0] * linear, rows[:, 1] * linear], axis=1)
     np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-12)
@@ -114,6 +115,33 @@ def test_a_direction_is_written_as_a_person_would():
     assert pool.text(yaw, symbols) == "u1 - u2 + u3 - 0.5*u4"
     assert pool.text(pool.product(0, yaw), symbols) == "x*u1 - x*u2 + x*u3 - 0.5*x*u4"
     assert pool.text(pool.add("-", 0, yaw), symbols) == "x - u1 + u2 - u3 + 0.5*u4"
+
+
+# Said by a mixer
+
+
+def test_axes_that_move_alike_commands_are_directions():
+    signals = machine(4)
+    x = [[1, -1, 1, 0, 1], [1, -1, -1, 0, 0], [1, 1, 1, 0, 0], [1, 1, -1, 0, 0], [0, 0, 0, 1, 1]]
+    # The rudder alone is a plain command, and with a rotor no direction of alike ones; an axis turned is the same.
+    columns = np.column_stack([np.array(x, dtype=float), [3.0, 3.0, -3.0, -3.0, 0.0]])
+    both, roll, pitch = of_mixer(columns, signals)
+    assert both == ((1, 1.0), (2, 1.0), (3, 1.0), (4, 1.0))
+    assert roll == ((1, 1.0), (2, 1.0), (3, -1.0), (4, -1.0))
+    assert pitch == ((1, 1.0), (2, -1.0), (3, 1.0), (4, -1.0))
+
+
+def test_shares_of_a_mixer_are_exact_and_cost_nothing():
+    signals, pool = machine(2), Pool(4)
+    [own] = of_mixer(np.array([[-0.5], [1.5], [0.0]]), signals)
+    assert own == ((1, 1.0 / 3.0), (2, -1.0))
+    bare = Candidates.of(pool, signals, options_of("default", FAST), "acceleration")
+    told, read = bare.with_directions([own], exact=True), bare.with_directions([own])
+    node = together(told.pool, own)
+    assert node in told.ladder[0] and node not in bare.ladder[0]
+    assert read.pool.found[node] - told.pool.found[node] == pytest.approx(pool.further)
+    # Itself and its squares.
+    assert len(told.ladder[0]) == len(bare.ladder[0]) + 2
 
 
 # Chosen
@@ -141,10 +169,10 @@ def flown(gains, runs=2, noise=1e-3, cross=0.0, seed=3):
     return signals, found
 
 
-def learnt(flights, **changes):
+def learnt(flights, axes=(), **changes):
     signals, runs = flights
     options = options_of("default", {**FAST, "form": "acceleration", **changes})
-    return identify_runs(runs, signals, options, rests=[np.ones(signals.n_u)], workers=WORKERS)
+    return identify_runs(runs, signals, options, rests=[np.ones(signals.n_u)], axes=axes, workers=WORKERS)
 
 
 def slopes(found, gains, speed=0.4):
@@ -177,6 +205,23 @@ def test_rotors_that_are_not_equal_are_told_apart(gains):
     np.testing.assert_allclose(slopes(found, gains), gains, rtol=0.02)
     plain = learnt(flown(gains), directions=False)
     assert found.description_length <= plain.description_length + 1e-6 and found.terms == plain.terms
+
+
+def test_what_a_mixer_says_shows_in_readings_that_single_commands_leave_open():
+    weak = np.array(GYRO) / 60.0
+    flights = flown(weak, runs=1, noise=0.01)
+    axes = of_mixer(np.sign([*weak, 0.0])[:, None], flights[0])
+    alone, told = learnt(flights), learnt(flights, axes)
+    assert together(told.pool, axes[0], squared=True) in told.sums[0].weights
+    assert not slopes(alone, weak).any()
+    np.testing.assert_allclose(slopes(told, weak), weak, rtol=0.1)
+
+
+def test_a_mixer_that_is_wrong_misleads_nobody():
+    flights = flown(GYRO, cross=0.3)
+    found = learnt(flights, of_mixer(np.array([[1.0], [1.0], [-1.0], [-1.0], [0.0]]), flights[0]))
+    np.testing.assert_allclose(slopes(found, GYRO), GYRO, rtol=0.01)
+    assert [len(s.weights) for s in found.sums] == [2, 3]
 
 
 def test_a_share_of_its_own_costs_a_constant():

@@ -41,7 +41,6 @@ from twinloop.campaign.examination.use import (
     strongest_commands,
 )
 from twinloop.campaign.history import Experiment
-from twinloop.controllers import Mixer
 from twinloop.errors import NotAvailable
 from twinloop.law.linear.margins import Loops, Margins, margins_of
 from twinloop.law.twin import Twin
@@ -274,8 +273,8 @@ class Examination:
 
     def _of_axes(self, commands: Floats) -> Floats:
         """What the axes have asked for, from the commands that were sent; the commands where there are no axes."""
-        mixer = getattr(self.setup.controller, "output", None)
-        if not isinstance(mixer, Mixer) or mixer.offset is None:
+        mixer = self.setup.mixer
+        if mixer is None or mixer.offset is None:
             return commands
         linear = np.sign(commands) * np.abs(commands) ** (1.0 / mixer.power) - mixer.offset
         return np.asarray(linear @ np.linalg.pinv(mixer.matrix).T)

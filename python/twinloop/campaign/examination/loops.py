@@ -41,12 +41,11 @@ def loops_around(
     """
     if broken_at not in ("axes", "commands"):
         raise unknown("place to break a loop at", broken_at, ("axes", "commands"))
-    signals, described = setup.signals, setup.controller
-    mixer = getattr(described, "output", None)
+    signals, mixer = setup.signals, setup.mixer
     if mixer is None or broken_at == "commands":
         names: Sequence[str] = signals.command_names
     else:
-        axes = getattr(described, "axes", None)
+        axes = getattr(setup.controller, "axes", None)
         names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
     laws = [twin.law, *(Law.of(member, signals) for member in twin.members)]
     return closed_loops(laws, setup.family, genes, setup.final_target, mixer, broken_at), names

@@ -26,6 +26,7 @@ from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
+from twinloop.identification.terms.directions import Direction, of_mixer
 from twinloop.objectives import closed_loop, normalised_error
 from twinloop.remarks import Remark, note, serious
 
@@ -152,6 +153,7 @@ class Learner:
             [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
             self.setup.signals,
             rests=self._rests(),
+            axes=self._axes(),
             seed=self.setup.seed,
             workers=self.workers,
             watch=self.watch,
@@ -162,6 +164,11 @@ class Learner:
         family, target = self.setup.family, np.atleast_2d(self.setup.target_state)[0]
         middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
         return [family.controller(middle).command(target, target)]
+
+    def _axes(self) -> list[Direction]:
+        """Directions in which the controller's axes move alike commands, as its mixer says."""
+        mixer = self.setup.mixer
+        return [] if mixer is None else of_mixer(mixer.matrix, self.setup.signals)
 
     def _lesson(self, answer: Answer, book: Logbook) -> Lesson:
         identified, follows = answer.identified, answer.follows

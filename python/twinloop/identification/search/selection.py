@@ -112,7 +112,8 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
     inputs = stages(climber.runs, context.signals, climber.actuation)
     if options.libraries and options.directions and not brief:
         found = directions(posed(context, climber, inputs), climber.sums, context.signals)
-        climber = replace(climber, candidates=climber.candidates.with_directions(found, context.signals))
+        states = range(context.signals.n_x)
+        climber = replace(climber, candidates=climber.candidates.with_directions(found, states))
     climber = replace(climber, candidates=climber.candidates.growing())
     problem, ladder = posed(context, climber, inputs), climber.candidates.ladder
     for number, terms in enumerate((ladder[:1] if brief else ladder) if options.libraries else ()):

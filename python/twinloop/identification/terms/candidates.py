@@ -73,15 +73,24 @@ class Candidates(Recorded, kind="candidates"):
             pool.rungs.setdefault(term, 0)
         return replace(self, pool=pool, ladder=tuple(tuple(dict.fromkeys([*r, *more])) for r in self.ladder))
 
-    def with_directions(self, found: Sequence[Direction], signals: Signals) -> Candidates:
-        """The same with terms of directions on the first rung; none that would evade the bounds of a plain one."""
+    def with_directions(
+        self, found: Sequence[Direction], states: Iterable[int] = (), *, exact: bool = False
+    ) -> Candidates:
+        """The same with terms of directions on the first rung; none that would evade the bounds of a plain one.
+
+        Args:
+            found: directions, one of which is chosen.
+            states: that they are multiplied by, too.
+            exact: whether shares are known, as those of a mixer, and not constants that were found.
+        """
         pool = self.pool.copy()
         bounded = {node for limits in self.priors.bounds.values() for node in limits}
         admitted = []
         for direction in found:
             # A direction is one of those found, and a share that is not that of all others a constant.
-            choice = float(log(len(found) + 1)) + pool.further * unequal(direction)
-            for term, plain in terms_of(pool, direction, signals).items():
+            constants = 0 if exact else unequal(direction)
+            choice = float(log(len(found) + 1)) + pool.further * constants
+            for term, plain in terms_of(pool, direction, states).items():
                 if bounded.isdisjoint(plain):
                     pool.found.setdefault(term, pool.length(plain[0]) + choice)
                     admitted.append(term)

@@ -1,4 +1,4 @@
-"""Directions of commands: how alike commands move an output together, read off the best model so far.
+"""Directions of commands: how alike commands act together, as a controller's mixer or the best model so far says.
 
 Rotors, wheels and rudders share their work. What one output feels of them all, their sum or the difference of two
 sides, acts elsewhere, too: times a rate, times a hidden state, in squares. One term says so where it would take one for
@@ -7,7 +7,7 @@ each command, and holds where the commands are no longer tied to each other, as 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -69,8 +69,27 @@ def unequal(direction: Direction) -> int:
     return sum(abs(share) != 1.0 for _, share in direction)
 
 
-def terms_of(pool: Pool, direction: Direction, signals: Signals) -> dict[int, list[int]]:
-    """Terms that a direction makes: itself, its squares, and itself times every state.
+def of_mixer(matrix: Floats, signals: Signals) -> list[Direction]:
+    """Directions in which a mixer moves commands: its columns, of alike commands.
+
+    Args:
+        matrix: of the mixer (commands, axes).
+        signals: of the system.
+
+    Returns:
+        Directions without repetition; none for an axis that moves one command, or commands of different kinds.
+    """
+    found = []
+    for column in matrix.T:
+        moved = set(np.flatnonzero(column).tolist())
+        if len(moved) > 1 and any(moved <= set(group) for group in alike_commands(signals)):
+            shares = (column / np.abs(column).max()).tolist()
+            found.append(_turned([(signals.n_x + i, shares[i]) for i in sorted(moved)]))
+    return list(dict.fromkeys(found))
+
+
+def terms_of(pool: Pool, direction: Direction, states: Iterable[int]) -> dict[int, list[int]]:
+    """Terms that a direction makes: itself, its squares, and itself times states.
 
     Returns:
         By the term's node those of the plain terms that it is made of.
@@ -80,7 +99,7 @@ def terms_of(pool: Pool, direction: Direction, signals: Signals) -> dict[int, li
         node: places,
         together(pool, direction, squared=True): [pool.product(place, place) for place in places],
     }
-    for state in range(signals.n_x):
+    for state in states:
         found[pool.product(state, node)] = [pool.product(state, place) for place in places]
     return found
 
@@ -106,6 +125,10 @@ def _direction(places: Sequence[int], shares: Floats) -> Direction:
         for place, share in zip(places, (shares / largest).tolist(), strict=True)
         if abs(share) >= LEAST
     ]
-    # A direction and its opposite are one.
+    return _turned(parts)
+
+
+def _turned(parts: Sequence[tuple[int, float]]) -> Direction:
+    """A direction and its opposite are one."""
     turn = 1.0 if parts[0][1] > 0.0 else -1.0
     return tuple((place, turn * share) for place, share in parts)
