@@ -60,6 +60,7 @@ ABLATIONS: dict[str, Ablation] = {
         "the upper rungs of the ladder of libraries", {"libraries": ("linear", "quadratic", "damping")}
     ),
     "directions": Ablation("directions of alike commands, as one term", {"directions": False}),
+    "mixer": Ablation("axes of the controller's mixer, as one term", {"mixer": False}),
     "evolution": Ablation("evolved terms", {"generations": 0}),
     "implicit": Ablation(
         "quotients with a denominator of their own, joints that share masses", {"implicit": False}
@@ -128,7 +129,7 @@ def ablation(name: str) -> Ablation:
 
 
 NO_PRIOR: Mapping[str, object] = {**ABLATIONS["kinematics"].options, **ABLATIONS["libraries"].options}
-"""Nothing is known of derivatives, and terms are evolved only."""
+"""Nothing is known of derivatives, and terms are evolved only, so that no mixer names any."""
 
 SMOKE_OPTIONS: dict[str, Mapping[str, object]] = {
     "paper": {

@@ -42,8 +42,9 @@ class IdentificationOptions:
         restarts: of the evolution.
         population: features that are judged at once.
         longest: description length of an evolved expression at most, nats.
-        directions: whether directions of alike commands are terms, also in squares and, if read off the best model so
-            far, times states; those of the controller's mixer are terms from the beginning.
+        directions: whether directions of alike commands, read off the best model so far, are terms, also in squares
+            and times states.
+        mixer: whether the axes of the controller's mixer are such directions from the beginning, also in squares.
         moves: of a walk over subsets of terms.
         starts: number of walks for each output.
         largest: number of terms of an output.
@@ -98,6 +99,7 @@ class IdentificationOptions:
     population: int = 120
     longest: float = 20.0
     directions: bool = True
+    mixer: bool = True
     moves: int = 50_000
     starts: int = 4
     largest: int = 16
@@ -153,6 +155,8 @@ class IdentificationOptions:
             hidden=False,
             storage=False,
             parts=False,
+            directions=False,
+            mixer=False,
         )
 
     def brief(self) -> IdentificationOptions:

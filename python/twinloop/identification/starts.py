@@ -64,7 +64,7 @@ def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
     if options.moderation:
         driven = (with_moved(chain, runs, signals.dt) for chain in driven)
     candidates = Candidates.of(pool, signals, options, form, seen)
-    if options.libraries and options.directions:
+    if options.libraries and options.mixer:
         candidates = candidates.with_directions(context.axes, exact=True)
     return Hypothesis(
         form=form,
