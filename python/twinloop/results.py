@@ -22,6 +22,7 @@ from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Pl
 from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 from twinloop.law.expressions import Expressions
+from twinloop.law.flown import Span
 from twinloop.law.law import Law
 from twinloop.law.linear.margins import LoopMargins, Margins
 from twinloop.law.linear.state_space import Linear
@@ -72,6 +73,7 @@ __all__ = [
     "Quality",
     "Responses",
     "SelectedTests",
+    "Span",
     "StateFit",
     "StepAnswer",
     "TestErrors",

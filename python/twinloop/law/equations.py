@@ -13,6 +13,7 @@ from twinloop.errors import InvalidInput
 from twinloop.law.actuation import Actuator, in_periods
 from twinloop.law.expansion import Expansion, Monomial, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
+from twinloop.law.flown import Span
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
 from twinloop.law.spread import Spread, spreads, varying_in
@@ -37,7 +38,7 @@ class _Piece:
     note: str = ""
 
 
-def equations(law: Law, members: Sequence[Law] = (), digits: int = 6) -> str:
+def equations(law: Law, members: Sequence[Law] = (), digits: int = 6, flown: Sequence[Span] = ()) -> str:
     """A law as text that SymPy reads, too.
 
     Sums are multiplied out and like terms collected, unless every bit is asked for. A line that goes on begins with the
@@ -47,6 +48,7 @@ def equations(law: Law, members: Sequence[Law] = (), digits: int = 6) -> str:
         law: to be written.
         members: of the committee; behind each constant stands its standard deviation over those that have its term.
         digits: significant digits of constants; 17 give every bit back, as the program computes it and without ±.
+        flown: how far the flights went that it was learnt from.
 
     Returns:
         Lines of at most 100 columns, where the names of the signals allow it.
@@ -56,15 +58,15 @@ def equations(law: Law, members: Sequence[Law] = (), digits: int = 6) -> str:
     """
     if not 1 <= digits <= EXACT:
         raise InvalidInput(f"Equations, digits: expected 1 to 17, found {digits}; 17 are exact.")
-    page = _Page(law, members, digits)
+    page = _Page(law, members, digits, flown)
     return "\n".join([*page.legend(), "", *page.body()])
 
 
 class _Page:
     """One law on its way to text."""
 
-    def __init__(self, law: Law, members: Sequence[Law], digits: int) -> None:
-        self.law, self.signals = law, law.signals
+    def __init__(self, law: Law, members: Sequence[Law], digits: int, flown: Sequence[Span]) -> None:
+        self.law, self.signals, self.flown = law, law.signals, flown
         self.exact = digits == EXACT
         self.members = () if self.exact else tuple(members)
         self.expressions = law.expressions if self.exact else Expressions()
@@ -127,6 +129,8 @@ class _Page:
                 " over as many of them as have the term, where a number of them is given"
             )
         lines += self._actuators() + self._offsets()
+        if self.flown:
+            lines.append(f"flown: {', '.join(map(str, self.flown))}; beyond, the law is extrapolated")
         return [part for line in lines for part in _comment(line)]
 
     def _step(self) -> str:

@@ -24,13 +24,14 @@ from twinloop.law.exports.environment import Reward, environment
 from twinloop.law.exports.gymnasium_source import Episode
 from twinloop.law.exports.taking import taken_twin
 from twinloop.law.flight import fly
+from twinloop.law.flown import Span, far_beyond, spans
 from twinloop.law.law import Law
 from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import Noise
 from twinloop.law.uncertainty import DRAWS, NINE_OF_TEN, committee_runs, spread_of
 from twinloop.records import Recorded, checked_record, from_text, read
-from twinloop.remarks import Remark
+from twinloop.remarks import Remark, warn
 from twinloop.signals import Signals
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory, check_recorded, continued
@@ -199,6 +200,11 @@ class Twin(Shown, Recorded, kind="twin"):
         """Equations, kinematics, actuators, hidden states, sensors' offsets and integrator, as a value."""
         return Law.of(self.model, self.signals)
 
+    @cached_property
+    def flown(self) -> tuple[Span, ...]:
+        """Between which values its flights have shown each state; beyond them its law is extrapolated."""
+        return spans(self.signals, self.flights)
+
     def equations(self, digits: int = 6) -> str:
         """The twin as text, which SymPy reads as well.
 
@@ -213,10 +219,12 @@ class Twin(Shown, Recorded, kind="twin"):
             InvalidInput: digits out of range.
         """
         law, *members = (Law.of(model, self.signals) for model in (self.model, *self.members))
-        return equations(law, members, digits)
+        return equations(law, members, digits, self.flown)
 
     def simulate(self, test: Test | Replay, initial_state: ArrayLike | None = None) -> Trajectory:
         """Flies a test on the twin instead of the system.
+
+        A `RemarkWarning` names a state that goes further beyond the `flown` range than this is wide.
 
         Args:
             test: any test for the same signals.
@@ -233,6 +241,11 @@ class Twin(Shown, Recorded, kind="twin"):
         if initial_state is not None:
             start = floats("Initial state", initial_state, (self.signals.n_x,))
             test = dataclasses.replace(test, initial_state=start)
+        run = self._simulated(test)
+        warn(far_beyond(self.flown, run, self.signals), stacklevel=2)
+        return run
+
+    def _simulated(self, test: Test | Replay) -> Trajectory:
         run = fly(self.model, test, limits=self.limits)
         spread = self.spread(test)
         if spread is None or self.noise is None:
@@ -272,7 +285,7 @@ class Twin(Shown, Recorded, kind="twin"):
         key = id(test), id(flown)
         if key not in self._free_runs:
             # With both of them: as long as they are here, their numbers are nobody else's.
-            self._free_runs[key] = test, flown, self.simulate(self.as_flown(test, flown))
+            self._free_runs[key] = test, flown, self._simulated(self.as_flown(test, flown))
         return self._free_runs[key][2]
 
     def began(self, flown: Trajectory) -> Floats:
@@ -384,7 +397,9 @@ class Twin(Shown, Recorded, kind="twin"):
             NotAvailable: Gymnasium is not installed.
             InvalidInput: states or steps that cannot be used.
         """
-        return environment(self, initial_state, target_state, steps, reward, noisy)
+        # Without flights it does not say at every step that it is beyond them.
+        mover = Twin(self.model, self.signals, limits=self._limits, noise=self.noise)
+        return environment(mover, initial_state, target_state, steps, reward, noisy)
 
     def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
         """The twin around a point, by exact derivatives of its equations.
@@ -414,6 +429,8 @@ class Twin(Shown, Recorded, kind="twin"):
     def simulate_commands(self, initial_state: ArrayLike, commands: ArrayLike) -> Trajectory:
         """A free run under given commands, without a controller; lags and hidden states begin at rest, as in a flight.
 
+        A `RemarkWarning` names a state that goes further beyond the `flown` range than this is wide.
+
         Args:
             initial_state: (n_x,), SI units, radians.
             commands: (n, n_u), in their units, each held for one period; they are clipped to their bounds.
@@ -429,6 +446,7 @@ class Twin(Shown, Recorded, kind="twin"):
         low, high = np.array([command.bounds for command in self.signals.commands]).T
         sent = np.clip(u if len(u) else [low], low, high)
         run = fly(self.model, Replay(self.signals, state, sent), limits=self.limits)
+        warn(far_beyond(self.flown, run, self.signals), stacklevel=2)
         return run if len(u) else Trajectory(np.zeros(1), run.states[:1], u, true_states=state[np.newaxis])
 
     def fit(self, trajectory: Trajectory) -> FitTable:
