@@ -115,14 +115,7 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
             f"Trajectory: expected at most the {steps} steps of the test, found {trajectory.steps}; cut the"
             " record."
         )
-    intervals = np.diff(trajectory.t)
-    worst = int(np.argmax(np.abs(intervals - signals.dt)))
-    if abs(intervals[worst] - signals.dt) > JITTER * signals.dt * (1.0 + 1e-9):
-        raise InvalidInput(
-            f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s"
-            f" after row {worst}; put in a row that was lost, or declare the system's own period as dt. Where the"
-            " loop only jitters around it, pass the even times dt * np.arange(n + 1)."
-        )
+    check_period(trajectory, signals)
     # Twice: noise may carry the last reading of a run that was stopped in time past the limit.
     farthest = 2.0 * limits.states
     excess = np.abs(trajectory.states) / farthest
@@ -136,6 +129,38 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
         )
     _check_commands(trajectory, signals)
     return trajectory
+
+
+def check_period(trajectory: Trajectory, signals: Signals) -> None:
+    """Refuses times that are not one period apart.
+
+    Args:
+        trajectory: of at least one step.
+        signals: with the period.
+
+    Raises:
+        InvalidInput: two rows that are not, with their place.
+    """
+    intervals = np.diff(trajectory.t)
+    worst = int(np.argmax(np.abs(intervals - signals.dt)))
+    if abs(intervals[worst] - signals.dt) > JITTER * signals.dt * (1.0 + 1e-9):
+        raise InvalidInput(
+            f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s after row"
+            f" {worst + 1}, t = {trajectory.t[worst]:g} s; put in a row that was lost, give t in s, or declare the"
+            " system's own period as dt. Where the loop only jitters around it, pass the even times dt * np.arange(n"
+            " + 1)."
+        )
+
+
+def equal_runs(one: Trajectory, other: Trajectory) -> bool:
+    """Whether two runs have the same states and commands, to the last digit.
+
+    Args:
+        one: run.
+        other: run.
+    """
+    pairs = (one.states, other.states), (one.commands, other.commands)
+    return all(a.shape == b.shape and np.array_equal(a, b) for a, b in pairs)
 
 
 def continued(trajectory: Trajectory, signals: Signals, start: Floats) -> Trajectory:

@@ -5,6 +5,7 @@ import pytest
 
 import twinloop as tl
 from lives import PLANT, SIGNALS, SMALL, by_hand, made
+from twinloop.campaign.from_logs import learnt_from_logs
 
 
 def test_a_twin_from_logs_is_that_of_a_campaign_with_attached_runs():
@@ -37,6 +38,12 @@ def test_an_envelope_that_does_not_hold_zero_is_no_hindrance():
     run = tl.Trajectory(0.1 * np.arange(41), np.array(level)[:, None], commands)
     twin = tl.identify([run], signals, options={**SMALL, "libraries": ("linear",)}, threads=1)
     assert max(row.normalised for row in twin.errors) < 1e-3
+
+
+def test_a_run_that_is_learnt_is_not_held_out():
+    run = by_hand(40)
+    with pytest.raises(tl.InvalidInput, match="hold out that are not learnt"):
+        learnt_from_logs([run], SIGNALS, [by_hand(40)])
 
 
 @pytest.mark.parametrize("runs", [[], [np.zeros((3, 2))], "flight.csv"])

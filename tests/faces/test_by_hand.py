@@ -199,6 +199,16 @@ def test_a_log_that_was_told_is_not_told_twice_and_what_was_expected_stands_besi
     assert float(last.split()[1].strip("(")) == pytest.approx(predicted.states[-1, 0], abs=0.2)
 
 
+def test_rows_that_are_missing_within_a_flight_are_no_flight_that_was_stopped(folder):
+    run("ask", "rig.db")
+    flown(look().tests[0])
+    lines = Path("flight.csv").read_text(encoding="utf-8").splitlines()
+    Path("flight.csv").write_text("\n".join(lines[:8] + lines[10:]), encoding="utf-8")
+    refused = run("tell", "rig.db", "0", "flight.csv")
+    assert refused.exit_code == 2 and "found 0.15 s after row 7" in refused.stderr
+    assert "--aborted" not in refused.stderr
+
+
 def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder):
     run("ask", "rig.db")
     test = look().tests[0]
@@ -350,7 +360,13 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
         ("t,angle,rate,torqe\n0,0,0,0\n", "did you mean 'torqe'"),
         ("t,angle,rate,torque\n0,0,x,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found 'x'"),
         ("t,angle,rate,torque\n0,0,0,0\n0.05,0\n", "line 3"),
-        ("t,angle,rate,torque\n0.05,0,0,0\n0,0,0,0\n", "times that grow"),
+        ("t,angle,rate,torque\n0.05,0,0,0\n0,0,0,0\n", "log.csv: .*times that grow"),
+        (
+            "t,angle,rate,torque\n0,0,0,0\n0.05,0,nan,0\n",
+            "log.csv: .*for rate in each row, found nan in row 2, t = 0.05 s",
+        ),
+        ("t,angle,rate,torque\n0,0,0,inf\n0.05,0,0,0\n", "for torque in each row, found inf in row 1"),
+        ("t,angle,rate,torque\n", "log.csv: .*record the run"),
     ],
 )
 def test_a_log_with_a_mistake_is_refused_with_its_place(tmp_path, text, word):

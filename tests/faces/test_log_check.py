@@ -85,6 +85,11 @@ def test_a_fault_is_called_by_its_name_and_ends_with_one(checked, fault):
     assert fault in {each["code"] for each in json.loads(checked(change, "--json").stdout)["remarks"]}
 
 
+def test_a_log_of_a_head_alone_is_too_short(checked):
+    said = checked(without(range(121)))
+    assert said.exit_code == 1 and "The log has 0 rows" in said.stdout and said.stdout.count("✗") == 2
+
+
 NOTES = {
     "constant-command": (changed("torque", 1.0), "torque is 1 N m in every row"),
     "saturated": (changed("torque", lambda u: np.sign(u) * 2.0), "at a bound in 100 %"),

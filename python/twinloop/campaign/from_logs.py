@@ -10,7 +10,7 @@ from twinloop.controllers import StateFeedback
 from twinloop.errors import InvalidInput
 from twinloop.law.twin import Twin
 from twinloop.signals import Signals
-from twinloop.trajectory import Trajectory
+from twinloop.trajectory import Trajectory, equal_runs
 
 
 def identify(
@@ -65,13 +65,18 @@ def learnt_from_logs(
         progress: as in `Campaign`.
 
     Raises:
-        InvalidInput: no runs, or a run that cannot be learnt.
+        InvalidInput: no runs, a run that cannot be learnt, or one that is both learnt and held out.
     """
     found, apart = list(runs), list(held_out)
     if not found or not all(isinstance(run, Trajectory) for run in [*found, *apart]):
         raise InvalidInput(
             "identify: expected at least one Trajectory, such as twinloop.load gives, found something else; pass a"
             " list."
+        )
+    if any(equal_runs(run, other) for run in apart for other in found):
+        raise InvalidInput(
+            "identify: expected runs to hold out that are not learnt, found one that is, equal to the last digit; leave"
+            " it out of one of the two."
         )
     # A campaign has a task and a controller; neither is used here, so both are what any system has.
     rest = [0.0 if state.envelope is None else sum(state.envelope) / 2.0 for state in signals.states]

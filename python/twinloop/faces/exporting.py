@@ -53,7 +53,7 @@ def export(
     file = None if is_address(source) else Path(source)
     if file is not None and not file.exists():
         raise InvalidInput(
-            f"Export: expected a store or a twin as JSON, found no file {source!r}; run with --store."
+            f"Export: expected a store or a twin as JSON, found no file {source!r}; check its name."
         )
     to: str | Path = output if output is not None else str(kind)
     if what == "twin":

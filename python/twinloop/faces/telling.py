@@ -10,7 +10,7 @@ from twinloop.campaign import Campaign
 from twinloop.errors import InvalidInput, at
 from twinloop.logs import load
 from twinloop.test import Test
-from twinloop.trajectory import Trajectory
+from twinloop.trajectory import Trajectory, check_period, equal_runs
 
 
 def numbered(campaign: Campaign, number: int) -> Test:
@@ -61,6 +61,11 @@ def tell(
     ended = "aborted" if aborted else "completed"
     run = load(log, campaign.signals, ended=ended, reason=aborted, name=called)
     if not aborted and run.steps < test.steps:
+        if run.steps:
+            with at(f"Log {called}"):
+                check_period(
+                    run, campaign.signals
+                )  # rows that are missing within it are no flight that was stopped
         raise InvalidInput(
             f"Log {called}: expected the {test.steps} steps of test {number}, found {run.steps}; record it whole, or"
             f" {otherwise}."
@@ -115,7 +120,7 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
 def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | None) -> None:
     """Refuses a log that is there already; a system without noise repeats itself where a test is flown again."""
     for told in campaign.experiments:
-        if _same(run, told.trajectory) and not (test is not None and _again(told.test, test)):
+        if equal_runs(run, told.trajectory) and not (test is not None and _again(told.test, test)):
             raise InvalidInput(
                 f"Log {called}: expected a new flight, found one that is recorded already, equal to the last"
                 " digit; nothing was changed. Name the log of this flight."
@@ -129,8 +134,3 @@ def _again(earlier: Test | None, test: Test) -> bool:
     if earlier.excitation is None or test.excitation is None:
         return earlier.excitation is test.excitation
     return bool(np.array_equal(earlier.excitation, test.excitation))
-
-
-def _same(one: Trajectory, other: Trajectory) -> bool:
-    pairs = (one.states, other.states), (one.commands, other.commands)
-    return all(a.shape == b.shape and np.array_equal(a, b) for a, b in pairs)

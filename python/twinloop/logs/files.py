@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.errors import InvalidInput
+from twinloop.errors import InvalidInput, at
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -66,7 +66,9 @@ def load(
         NotAvailable: a `.ulg` without the package pyulog.
     """
     t, states, commands = read_log(path, signals, name, columns, Window(start, stop))
-    return Trajectory(t, states, commands, ended=ended, reason=reason)
+    with at(f"Log {path if name is None else name}"):
+        _refuse_no_number(t, (*signals.state_names, *signals.command_names), (states, commands))
+        return Trajectory(t, states, commands, ended=ended, reason=reason)
 
 
 def read_log(
@@ -130,6 +132,20 @@ def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
         for row in range(rows):
             writer.writerow(
                 [repr(float(values[row])) if row < len(values) else "" for values in columns.values()]
+            )
+
+
+def _refuse_no_number(t: Floats, names: Sequence[str], parts: Sequence[Floats]) -> None:
+    """Names the column and the time of a value that is not finite, as a person finds it in a log."""
+    if any(values.ndim != 2 or values.dtype.kind != "f" for values in parts) or t.ndim != 1:
+        return  # of another shape: Trajectory says what was expected
+    columns = [column for values in parts for column in values.T]
+    for name, column in zip(names, columns, strict=False):
+        rows = np.flatnonzero(~np.isfinite(column))
+        if len(rows) and rows[0] < len(t):
+            raise InvalidInput(
+                f"expected a finite number for {name} in each row, found {column[rows[0]]} in row {rows[0] + 1}, t ="
+                f" {t[rows[0]]:g} s ({len(rows)} such row{'s' * (len(rows) > 1)}); cut the log before it."
             )
 
 

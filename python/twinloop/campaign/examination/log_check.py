@@ -222,6 +222,8 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
                 " between can hardly be learnt.",
             )
         return
+    if column.least is None:
+        return  # a log without rows: that it is too short is said already
     if column.least == column.greatest:
         yield serious(
             "still",

@@ -27,7 +27,7 @@ def taken_twin(
     if not force and not twin.follows:
         raise NotAvailable(
             "Export: expected a twin that follows the flights that it was learnt from, found one that does not"
-            " follow half of them; learn from more tests, or pass force=True."
+            " follow half of them; learn from more tests, or pass force=True (--force)."
         )
     source = Source(
         twin.law,
