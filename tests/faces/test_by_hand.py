@@ -209,6 +209,24 @@ def test_rows_that_are_missing_within_a_flight_are_no_flight_that_was_stopped(fo
     assert "--aborted" not in refused.stderr
 
 
+def test_what_speaks_against_a_flight_is_said_when_it_is_told(folder):
+    run("ask", "rig.db")
+    flight = flown(look().tests[0])
+    lines = Path("flight.csv").read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    turned = [",".join([t, str(-float(u)) if u else u, *rest]) for t, u, *rest in rows]
+    Path("turned.csv").write_text("\n".join([lines[0], *turned]), encoding="utf-8")
+    told = run("tell", "rig.db", "0", "turned.csv")
+    assert told.exit_code == 0 and told.stdout.startswith("Saved: test 0 flown")
+    assert (
+        "Against this flight: The commands recorded of test 0 are none that its controller gives"
+        in told.stderr
+    )
+    assert flight.steps == look().experiments[0].trajectory.steps
+    again = run("tell", "rig.db", "0", "flight.csv", "--json")
+    assert json.loads(again.stdout)["remarks"] == [] and again.stderr == ""
+
+
 def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder):
     run("ask", "rig.db")
     test = look().tests[0]

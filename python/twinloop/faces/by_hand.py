@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import click
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import foreseen
 from twinloop.campaign.campaign_file import read_file, template
+from twinloop.campaign.examination.log_check import against
+from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.files import check_writable, write_text
@@ -140,13 +143,15 @@ def tell(
             f"Saved: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
             f" {shown_name(store)}."
         )
-        runs = [run.quality for run in campaign.experiments if run.number == asked.number]
+        runs = [run for run in campaign.experiments if run.number == asked.number]
         quality = {
             "predicted": asked.predicted,
             "spread": asked.spread,
-            "quality": runs[-1] if runs else None,
+            "quality": runs[-1].quality if runs else None,
         }
-        answer({**_standing(campaign, asked), **quality}, text, as_json)
+        remarks = _against(campaign, runs[-1] if log is not None else None)
+        answer({**_standing(campaign, asked), **quality, "remarks": remarks}, text, as_json)
+        _say(remarks)
 
 
 def _told(
@@ -193,7 +198,11 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
         text = f"Saved: {flight}; {_count(campaign)} in {shown_name(store)}."
-        answer({"file": str(flight), "experiments": len(campaign.experiments)}, text, as_json)
+        remarks = _against(campaign, campaign.experiments[-1])
+        answer(
+            {"file": str(flight), "experiments": len(campaign.experiments), "remarks": remarks}, text, as_json
+        )
+        _say(remarks)
 
 
 @click.command()
@@ -207,6 +216,17 @@ def abandon(store: str, test: int, as_json: bool) -> None:
         campaign.abandon(asked)
         text = f"Saved: test {test} abandoned in {shown_name(store)}."
         answer(_standing(campaign, asked), text, as_json)
+
+
+def _against(campaign: Campaign, flight: Experiment | None) -> list[str]:
+    """What speaks against a flight that was told."""
+    return [] if flight is None else [remark.sentence for remark in against(flight, campaign.signals)]
+
+
+def _say(remarks: Sequence[str]) -> None:
+    """Says what speaks against a flight at once, while somebody can still look at the rig."""
+    for remark in remarks:
+        click.echo(f"Against this flight: {remark}", err=True)
 
 
 def _standing(campaign: Campaign, test: Test) -> dict[str, object]:

@@ -199,3 +199,9 @@ def test_readings_of_nothing_but_noise_are_a_serious_remark():
     assert "only-noise" not in codes(
         flown(change=lambda x: x * [1.0, 1.0, 0.0] + 0.01 * stream.normal(size=x.shape))
     )
+
+
+def test_what_no_controller_corrects_is_held_against_no_effect_alone():
+    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, False, STEPS, without_test=True)
+    assert remark.code == "does-not-follow" and remark.serious
+    assert "unstable without its controller" in remark.sentence and "backlash" not in remark.sentence

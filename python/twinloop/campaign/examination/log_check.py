@@ -9,8 +9,10 @@ import numpy as np
 
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.identify_and_plan.diagnostics import against_derivatives
+from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.diagnostics import against_derivatives, from_other_controllers
 from twinloop.campaign.identify_and_plan.readings import suspicious
+from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.errors import InvalidInput
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
@@ -118,6 +120,21 @@ def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> 
         columns=columns,
         remarks=tuple(remarks),
     )
+
+
+def against(flight: Experiment, signals: Signals) -> list[Remark]:
+    """What speaks against a flight by itself, without a twin.
+
+    Args:
+        flight: as it was told.
+        signals: declared signals.
+
+    Returns:
+        Serious remarks, none where nothing does.
+    """
+    run = flight.trajectory
+    found = check_log(run.t, run.states, run.commands, signals).remarks
+    return [*(each for each in found if each.serious), *from_other_controllers(other_commands([flight]))]
 
 
 def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:

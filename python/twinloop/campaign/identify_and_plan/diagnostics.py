@@ -35,6 +35,7 @@ def diagnostics_of(
     others: Sequence[int] = (),
     recurring: Sequence[str] = (),
     unmoved: Sequence[str] = (),
+    without_test: bool = False,
 ) -> list[Remark]:
     """What speaks against the data or the twin.
 
@@ -47,6 +48,7 @@ def diagnostics_of(
         others: numbers of the tests whose recorded commands are none that their controllers give.
         recurring: states whose disturbance comes again in flight after flight.
         unmoved: states that move though their equations say that nothing moves them.
+        without_test: whether the flights that it does not follow are all without a test, replayed without a controller.
 
     Returns:
         Remarks, none where nothing does.
@@ -55,18 +57,22 @@ def diagnostics_of(
     said = [
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
-        *_other_commands(others),
+        *from_other_controllers(others),
         *_unmoved(unmoved),
     ]
     if not follows:
-        said += _does_not_follow(explained=any(remark.serious for remark in said))
+        said += _does_not_follow(any(remark.serious for remark in said), without_test)
     elif misses:
         said += _free_run(misses, len(experiments), signals)
     return [*said, *_model_error(recurring), *_copies(experiments), *_none_complete(experiments, steps)]
 
 
-def _other_commands(tests: Sequence[int]) -> Iterator[Remark]:
-    """Tests whose recorded commands are none that their controllers give."""
+def from_other_controllers(tests: Sequence[int]) -> Iterator[Remark]:
+    """Tests whose recorded commands are none that their controllers give.
+
+    Args:
+        tests: their numbers.
+    """
     if tests:
         yield serious(
             "other-commands",
@@ -86,14 +92,22 @@ def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
         )
 
 
-def _does_not_follow(explained: bool) -> Iterator[Remark]:
+def _does_not_follow(explained: bool, without_test: bool) -> Iterator[Remark]:
     """That the twin does not follow its own flights, and why, where no remark before has explained it."""
-    cause = (
-        "the remarks before this one say why"
-        if explained
-        else "there is an effect that no term describes, such as a contact, backlash, stiction or"
-        " an unmeasured state; the records show no wrong sign or unit"
-    )
+    if explained:
+        cause = "the remarks before this one say why"
+    elif without_test:
+        cause = (
+            "those that it leaves have no test, so their recorded commands are replayed and no controller corrects the"
+            " twin. If the system is unstable without its controller, every model leaves them, however right it is:"
+            " begin a campaign without these logs, and let tests be flown. Otherwise there is an effect that no term"
+            " describes"
+        )
+    else:
+        cause = (
+            "there is an effect that no term describes, such as a contact, backlash, stiction or"
+            " an unmeasured state; the records show no wrong sign or unit"
+        )
     yield serious(
         "does-not-follow",
         f"In free run the twin does not follow the runs that it was learnt from: {cause}.",

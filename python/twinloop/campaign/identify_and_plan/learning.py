@@ -12,7 +12,7 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch
 from twinloop.campaign.history import Experiment, Lesson
-from twinloop.campaign.identify_and_plan.answer import Answer
+from twinloop.campaign.identify_and_plan.answer import WRONG, Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
@@ -178,6 +178,9 @@ class Learner:
             tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
             for kind in ("law", "undecided")
         )
+        lost = [
+            run for run, error in zip(book.experiments, free, strict=True) if not error <= WRONG * run.frozen
+        ]
         misses = answer.misses(book.experiments, self.setup, self.workers)
         explained = follows and not misses and not is_rough(identified)
         actuation, signals = identified.actuation, self.setup.signals
@@ -213,6 +216,7 @@ class Learner:
                     () if follows else other_commands(book.experiments),
                     recurring,
                     [names[state] for state in answer.unmoved],
+                    without_test=bool(lost) and all(run.test is None for run in lost),
                 ),
             ),
             recurring=recurring,

@@ -78,5 +78,7 @@ def known_gains(memory: Memory, best: Test | None) -> tuple[Floats, str]:
     known = [] if asked is None or asked.gains is None else [asked.gains]
     known += [] if best is None else [best.genes]
     if not known:
-        raise NotAvailable(f"{UNKNOWN}none has flown, and none was tuned yet. Let it finish learning.")
+        raise NotAvailable(
+            f"{UNKNOWN}none has flown, and none was tuned yet. Fly the first test, then let it finish learning."
+        )
     return known[0], " No gains were tuned on this twin yet."
