@@ -205,3 +205,12 @@ def test_what_no_controller_corrects_is_held_against_no_effect_alone():
     (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, False, STEPS, without_test=True)
     assert remark.code == "does-not-follow" and remark.serious
     assert "unstable without its controller" in remark.sentence and "backlash" not in remark.sentence
+
+
+def test_a_bias_that_outgrows_a_fast_swing_is_no_contradiction_and_a_small_swing_is_enough_for_a_unit():
+    fast = {"size": 0.05, "noise": 0.001}
+    assert said(flown(**fast, change=lambda x: x + np.array([0.0, 0.0, 0.1]))) == []
+    small = {"size": 0.05, "noise": 0.004}
+    assert said(flown(**small)) == []
+    (sentence,) = said(flown(**small, change=lambda x: x * [1.0, 1.0, 180.0 / np.pi]))
+    assert "times as fast as rate" in sentence

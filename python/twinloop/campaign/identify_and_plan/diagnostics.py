@@ -18,6 +18,10 @@ from twinloop.trajectory import Trajectory
 
 MOVED = 20.0
 """Standard deviations of its noise that a state must have moved before it is held against its derivative."""
+BENT = 5.0
+"""The same about a line, which is all that a biased rate adds."""
+WALKED = 3.0
+"""Standard deviations of the random walk, which noise becomes when a rate is integrated, that this must have moved."""
 AS_FAST = (0.5, 2.0)
 """Times as fast as its derivative says, between which a state is taken to do what was declared."""
 ALIKE = 0.5
@@ -184,17 +188,13 @@ def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Ite
             continue
         j = signals.state_names.index(rate.derivative_of)
         pairs = [_moved(run.states[:, j], run.states[:, i], signals.dt) for run in runs]
-        moved, declared = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-        size, declared_size, product = (
-            float(values.sum()) for values in (np.square(moved), np.square(declared), moved * declared)
+        # Integrated, white noise is a random walk: about its line it has a fifteenth of its last variance.
+        walks = sum(float(noise[i]) * (signals.dt * run.steps) ** 2 / 15.0 for run in recorded)
+        how = _against(
+            [tuple(map(_without_line, pair)) for pair in pairs], BENT**2 * noise[j], WALKED**2 * walks
         )
-        if size <= len(moved) * MOVED * MOVED * noise[j] or declared_size == 0.0:
-            continue
-        how = ""
-        if product * product < ALIKE * ALIKE * size * declared_size:
-            how = "does not change as"
-        elif not AS_FAST[0] * declared_size < product < AS_FAST[1] * declared_size:
-            how = f"changes {product / declared_size:.3g} times as fast as"
+        if how is None:
+            how = _against(pairs, MOVED**2 * noise[j], 0.0)
         if how:
             yield serious(
                 "derivative",
@@ -203,7 +203,35 @@ def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Ite
             )
 
 
+def _against(pairs: Sequence[tuple[Floats, ...]], least: float, least_declared: float) -> str | None:
+    """How states contradict what their derivatives say: "" if they do not, None if they moved too little to tell.
+
+    Args:
+        pairs: of each run, the state and the same by its derivative.
+        least: mean square that the state must have.
+        least_declared: sum of squares that its integrated derivative must have.
+    """
+    moved, declared = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    size, declared_size, product = (
+        float(values.sum()) for values in (np.square(moved), np.square(declared), moved * declared)
+    )
+    if size <= len(moved) * least or declared_size <= least_declared:
+        return None
+    if product * product < ALIKE * ALIKE * size * declared_size:
+        return "does not change as"
+    if not AS_FAST[0] * declared_size < product < AS_FAST[1] * declared_size:
+        return f"changes {product / declared_size:.3g} times as fast as"
+    return ""
+
+
 def _moved(state: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
     """A state over a run, and the same by its derivative, each less its mean."""
     said = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
     return state - state.mean(), said - said.mean()
+
+
+def _without_line(values: Floats) -> Floats:
+    """Values less their regression on a constant and time (n,)."""
+    time = np.arange(len(values)) - 0.5 * (len(values) - 1)
+    rest: Floats = values - values.mean()
+    return rest - time * (float(time @ rest) / max(float(time @ time), 1.0))
