@@ -199,6 +199,15 @@ def test_a_log_that_was_told_is_not_told_twice_and_what_was_expected_stands_besi
     assert float(last.split()[1].strip("(")) == pytest.approx(predicted.states[-1, 0], abs=0.2)
 
 
+def test_a_gain_that_is_fixed_stands_on_the_sheet_with_its_unit(folder):
+    text = (folder / "rig.toml").read_text(encoding="utf-8")
+    fixed = text.replace('"angle.ki" = [0.0, 6.0]', '"angle.ki" = 0.0').replace('"angle.ki" = 2.0\n', "")
+    (folder / "rig.toml").write_text(fixed, encoding="utf-8")
+    asked = run("ask", "rig.db")
+    assert asked.exit_code == 0 and "N m/(rad s)" in asked.stdout and fixed != text
+    assert json.loads(run("ask", "rig.db", "--json").stdout)["gains"]["angle.ki"] == 0.0
+
+
 def test_rows_that_are_missing_within_a_flight_are_no_flight_that_was_stopped(folder):
     run("ask", "rig.db")
     flown(look().tests[0])

@@ -170,7 +170,7 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quali
         file: where its columns are.
         quality: what is minimised.
     """
-    signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.gains}
+    signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
     ends = zip(signals.states, test.initial_state.tolist(), test.target_state.tolist(), strict=True)
     states = [[state.name, start, target, state.unit] for state, start, target in ends]
