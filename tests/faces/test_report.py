@@ -279,6 +279,13 @@ def test_two_campaigns_stand_side_by_side(good, bad, tmp_path):
     assert "good against bad" in (tmp_path / "both.html").read_text(encoding="utf-8")
 
 
+def test_campaigns_of_one_name_are_told_apart_by_their_stores(good, bad, tmp_path):
+    for campaign, name in ((good, "good"), (bad, "bad")):
+        campaign.save(tmp_path / f"{name}.db", "campaign")
+    head = run("compare", tmp_path / "good.db", tmp_path / "bad.db").stdout.splitlines()[0]
+    assert "good.db" in head and "bad.db" in head and "campaign" not in head.split()
+
+
 def test_what_is_no_campaign_is_refused_in_a_sentence(tmp_path):
     other, broken = tmp_path / "other.json", tmp_path / "broken.json"
     other.write_text('{"kind": "test"}')

@@ -15,6 +15,7 @@ from twinloop.faces.report.comparison import compared, comparison, comparison_pa
 from twinloop.faces.report.page import source_page, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.text import table
+from twinloop.store import shown_name
 
 
 @click.command()
@@ -82,6 +83,8 @@ def compare(first: str, second: str, names: tuple[str, ...], output: Path | None
     chosen = (names or (None,)) * 2 if len(names) < 2 else names
     sources = [source(where, name) for where, name in zip((first, second), chosen, strict=False)]
     names_shown, answers = [each.name for each in sources], compared(sources)
+    if len(set(names_shown)) == 1:  # such as "campaign", which each has that nobody named
+        names_shown = [shown_name(where) for where in (first, second)]
     found = comparison(names_shown, answers)
     answer({"campaigns": names_shown, "answers": answers}, table(list(found.head), found.rows), as_json)
     if output is not None:
