@@ -234,4 +234,4 @@ def _without_line(values: Floats) -> Floats:
     """Values less their regression on a constant and time (n,)."""
     time = np.arange(len(values)) - 0.5 * (len(values) - 1)
     rest: Floats = values - values.mean()
-    return rest - time * (float(time @ rest) / max(float(time @ time), 1.0))
+    return rest - time * (float((time * rest).sum()) / max(float(np.square(time).sum()), 1.0))
