@@ -162,3 +162,14 @@ def test_the_nearest_name_is_offered_where_a_derivative_or_a_body_names_no_state
             0.1,
             kinematics=body,
         )
+
+
+@pytest.mark.parametrize(("angle", "rate"), [("deg", "rad/s"), ("rad", "deg/s")])
+def test_a_rate_is_not_declared_in_another_unit_than_its_angle(angle, rate):
+    command = tl.Command("u", "N m", (-1.0, 1.0))
+    states = [tl.State("tilt", angle, 1.0), tl.State("turn", rate, 1.0, derivative_of="tilt")]
+    with pytest.raises(
+        tl.InvalidInput, match=rf"'turn' in {angle}/s, the derivative of 'tilt' in {angle}, found"
+    ):
+        tl.Signals(states, [command], 0.01)
+    tl.Signals([states[0], tl.State("turn", f"{angle}/s", 1.0, derivative_of="tilt")], [command], 0.01)

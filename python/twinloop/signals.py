@@ -195,6 +195,7 @@ class Signals(Recorded, kind="signals"):
                     f"Signals: expected at most one derivative of {of!r}, found several; "
                     "keep `derivative_of` on one of them."
                 )
+            self._check_unit(name, of)
             seen, up = {name}, of
             while up is not None:
                 if up in seen:
@@ -204,6 +205,16 @@ class Signals(Recorded, kind="signals"):
                     )
                 seen.add(up)
                 up = parents[up]  # type: ignore[assignment]
+
+    def _check_unit(self, rate: str, angle: str) -> None:
+        """Refuses a rate in one unit of angles that is the derivative of an angle in the other."""
+        units = {state.name: state.unit for state in self.states}
+        for one, other in (("deg", "rad"), ("rad", "deg")):
+            if units[angle] == one and units[rate].startswith(f"{other}/s"):
+                raise InvalidInput(
+                    f"Signals: expected {rate!r} in {one}/s, the derivative of {angle!r} in {one}, found it in"
+                    f" {units[rate]}; declare both in the unit that the log has, or convert one of them."
+                )
 
     @property
     def n_x(self) -> int:

@@ -90,6 +90,11 @@ def campaign_picture(campaign: Campaign, path: Path, quality: str = "quality") -
         _save(figure, path)
 
 
+def _legend_below(axes: Any) -> None:
+    """Where it lies on no line, however the lines go."""
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), fontsize=8.0, ncols=3)
+
+
 def _normalised(campaign: Campaign) -> dict[int, list[tuple[float, float]]]:
     """(iteration, normalised closed-loop error) of each test."""
     return {
@@ -122,7 +127,7 @@ def _errors_by_experiment(axes: Any, campaign: Campaign) -> None:
         label = "_again"
     axes.set_xlabel("experiments learnt")
     axes.set_title("Error of the twin (1: a model that never moves)", loc="left")
-    axes.legend(loc="best", fontsize=8.0)
+    _legend_below(axes)
     axes.margins(0.08, 0.15)
 
 
@@ -154,7 +159,7 @@ def _qualities(axes: Any, campaign: Campaign, label: str) -> None:
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.margins(x=0.1)
     axes.set_title("Quality of the flights (lower is better)", loc="left")
-    axes.legend(loc="best", fontsize=8.0)
+    _legend_below(axes)
 
 
 def iterations_picture(errors: Mapping[int, Sequence[tuple[float, float]]], title: str, path: Path) -> None:
