@@ -18,6 +18,7 @@ from lives import SIGNALS, SMALL
 from sameness import same
 from twinloop.campaign.campaign_file import _toml, read_file, template
 from twinloop.faces.cli import main
+from twinloop.faces.sheet import foretold
 from twinloop.faces.telling import numbered
 from twinloop.logs import write_columns
 
@@ -411,3 +412,18 @@ def test_no_log_and_an_archive_of_something_else_are_refused(tmp_path):
     np.savez(tmp_path / "log.npz", t=np.array([object()], dtype=object), states=[0], commands=[0])
     with pytest.raises(tl.InvalidInput, match="file of NumPy"):
         tl.load(tmp_path / "log.npz", SIGNALS)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "spread", "words"),
+    [
+        (0.16604, 0.006641, "0.166 ± 0.00664"),
+        (0.5, None, "0.5"),
+        (float("inf"), float("inf"), "diverges on the twin"),
+    ],
+)
+def test_a_prediction_is_said_in_words_where_there_is_no_number(predicted, spread, words):
+    signals = tl.Signals([tl.State("x", "m", 1.0)], [tl.Command("u", "N", (-1.0, 1.0))], 0.1)
+    family = tl.controllers.PID([("x", None)], {"x.kp": (0.0, 1.0), "x.ki": 0.0, "x.kd": 0.0}).bind(signals)
+    test = tl.Test(family, family.genes({"x.kp": 0.5}), [0.0], [1.0], 5, predicted=predicted, spread=spread)
+    assert words in foretold(test) and "inf" not in foretold(test)

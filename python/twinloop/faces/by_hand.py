@@ -19,7 +19,7 @@ from twinloop.faces.answering import answer, json_option
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
-from twinloop.faces.sheet import columns, facts, sheet
+from twinloop.faces.sheet import columns, facts, foretold, sheet
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import numbered, tell_failed
 from twinloop.faces.telling import tell as tell_flight
@@ -245,10 +245,9 @@ def _as_expected(campaign: Campaign, test: Test) -> str:
     runs = [run.quality for run in campaign.experiments if run.number == test.number]
     if not runs or runs[-1] is None:
         return ""
-    expected = "" if test.predicted is None else f", predicted {test.predicted:.4g}"
-    spread = "" if test.predicted is None or test.spread is None else f" ± {test.spread:.3g}"
+    expected = "" if test.predicted is None else f", predicted {foretold(test)}"
     unit = quality_unit(campaign.setup.quality)
-    return f", quality {runs[-1]:.4g}{expected}{spread}{f' {unit}' if unit else ''}"
+    return f", quality {runs[-1]:.4g}{expected}{f' {unit}' if unit else ''}"
 
 
 def _campaign(store: str, threads: int | None = None) -> Campaign:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,17 @@ def reason(test: Test, flown: bool) -> str:
         else "what is known comes from other flights."
     )
     return f"The controller that you already trust{gentle}: {known}"
+
+
+def foretold(test: Test) -> str:
+    """The predicted quality with its spread; that there is none where the flight diverges on the twin.
+
+    Args:
+        test: that something was predicted of.
+    """
+    if test.predicted is None or not isfinite(test.predicted):
+        return "none, as the flight diverges on the twin"
+    return f"{test.predicted:.4g}" + ("" if test.spread is None else f" ± {test.spread:.3g}")
 
 
 def unknown_risk(test: Test) -> str:
@@ -186,10 +198,9 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quali
         *_held_back(test, file),
     ]
     if test.predicted is not None and predicted is not None:
-        spread = "" if test.spread is None else f" ± {test.spread:.3g}"
         measure = quality_words(quality.kind, quality_unit(quality))
         lines.append(
-            f"Predicted quality, {measure}: {test.predicted:.4g}{spread}; the predicted run with its band: {file}."
+            f"Predicted quality, {measure}: {foretold(test)}; the predicted run with its band: {file}."
         )
     if test.excitation is not None or predicted is not None:
         lines += ["", _expected(test, predicted), ""]
