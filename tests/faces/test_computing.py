@@ -66,14 +66,14 @@ def test_the_controller_to_fly_has_its_prediction_as_a_series(foretold):
 def test_the_twin_flies_each_flight_once_however_many_faces_show_it(foretold, monkeypatch, tmp_path):
     campaign, _ = foretold
     tests = {run.test.number for run in campaign.experiments}
-    campaign._shown_twin, seen, simulate = None, [], Twin.simulate
+    campaign._shown_twin, seen, simulate = None, [], Twin._simulated
 
-    def counted(twin, test, *others):
+    def counted(twin, test):
         if twin is campaign.twin and test.number in tests and test.excitation is not None:
             seen.append(test.number)
-        return simulate(twin, test, *others)
+        return simulate(twin, test)
 
-    monkeypatch.setattr(Twin, "simulate", counted)
+    monkeypatch.setattr(Twin, "_simulated", counted)
     summary(campaign, {"name": "x"}, {})
     campaign.plot(tmp_path / "picture.svg")
     campaign.plot.flights()
