@@ -15,7 +15,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.proposals.storage import storage
+from twinloop.identification.proposals.storage import shows, storage
 from twinloop.identification.records import Run, stages
 from twinloop.identification.starts import starts
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
@@ -181,3 +181,13 @@ def test_a_hypothesis_with_storage_comes_back_from_its_record():
     assert found and all(one.actuation.stored for one in found)
     record = through_json(found[0].to_record())
     assert same(Hypothesis.from_record(record, JOINT), found[0])
+
+
+@pytest.mark.parametrize(
+    ("states", "time", "shown"), [((0,), 0.019, False), ((0,), 0.02, True), ((), 0.019, True)]
+)
+def test_what_motion_fills_and_a_period_empties_is_no_state(states, time, shown):
+    quick = HiddenState((0,) if not states else (), False, 0.0, time, states, False)
+    slow = HiddenState((), False, 0.0, 0.5, (1,), False)
+    assert shows((slow, quick), 0.02) is shown
+    assert shows((), 0.02)

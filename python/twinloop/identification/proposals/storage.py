@@ -54,7 +54,22 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     bare = smoothed(context, hypothesis) or replace(hypothesis, fit=None)
     for variant in (bare, *_at_once(context, bare)):
         for found in filled_by_motion(context, variant):
-            yield fitted(context, from_both_sides(context, found, found.sums))
+            told = fitted(context, from_both_sides(context, found, found.sums))
+            if shows(told.actuation.hidden, context.signals.dt):
+                yield told
+
+
+def shows(hidden: Sequence[HiddenState], period: float) -> bool:
+    """Whether readings can show what motion fills: not what has emptied before the next of them.
+
+    Less what fills it, such a state is the slope of that over a period. Where one gust moves two states, the slope of
+    the one foretells the other, and would be taken for a law.
+
+    Args:
+        hidden: states, with their tuned times.
+        period: of the readings, s.
+    """
+    return all(one.time >= period for one in hidden if one.states)
 
 
 def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
