@@ -18,7 +18,16 @@ from twinloop.campaign.examination.poles import Pole
 from twinloop.campaign.examination.steps import StepAnswer
 from twinloop.campaign.examination.unseen import Unseen
 from twinloop.campaign.examination.use import Effort, GainSlope
-from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, Progress, TestLoop
+from twinloop.campaign.history import (
+    Experiment,
+    Failure,
+    Iteration,
+    Lesson,
+    Planned,
+    Progress,
+    TestLoop,
+    Withdrawal,
+)
 from twinloop.law.accuracy import ErrorTable, FitTable, StateFit, TestErrors
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 from twinloop.law.expressions import Expressions
@@ -80,4 +89,5 @@ __all__ = [
     "TestLoop",
     "Unseen",
     "Use",
+    "Withdrawal",
 ]

@@ -26,7 +26,15 @@ from twinloop.campaign.examination.examination import Earlier, Examination
 from twinloop.campaign.examination.loops import loops_around
 from twinloop.campaign.flying import checked_budget, checked_risk, fly
 from twinloop.campaign.guarding import guard_of
-from twinloop.campaign.history import Experiment, Failure, Iteration, Lesson, Planned, Progress
+from twinloop.campaign.history import (
+    Experiment,
+    Failure,
+    Iteration,
+    Lesson,
+    Planned,
+    Progress,
+    Withdrawal,
+)
 from twinloop.campaign.persistence import Persistent
 from twinloop.campaign.presets import AnyOptions
 from twinloop.campaign.ranking import ranked
@@ -271,6 +279,28 @@ class Campaign(Shown, Persistent, kind="campaign"):
         """
         with self._entering():
             self._book.abandon(test)
+
+    def withdraw(self, which: int | Test | Experiment | Failure, reason: str) -> None:
+        """Takes back a flight that was told or attached by mistake: wrong unit, exchanged columns, wrong file.
+
+        Its record stays, marked with the reason, and counts in the cost. Nothing that was learnt with it is used any
+        more: the next look or `ask` learns again from what is left, as if the flight had not been told. That takes
+        as long as all learning so far, if a test was asked for since. Its test is "asked" again: tell the right log.
+        Tests that were planned with it and still wait are abandoned, and what was predicted of those that were flown
+        counts no more.
+
+        Args:
+            which: number of the test, or the test: its failure, or its last run; or one of `experiments` or `failures`.
+            reason: what was wrong with the flight, in a few words.
+
+        Raises:
+            InvalidInput: no such flight, one that was withdrawn before, or no reason; nothing has changed.
+        """
+        with self._entering():
+            known = standing.known_when_asked(self._book, self._method.learnt_by)
+            entry = self._book.withdraw(which, reason, known)
+            self._method.forget(self._book, asked_since=bool(entry.planned))
+        self.interrupted = False
 
     def status(self, test: Test) -> str:
         """Where a test is in its life.
@@ -591,6 +621,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
     def failures(self) -> tuple[Failure, ...]:
         """Failed tests, in the order of `tell_failed`."""
         return tuple(self._book.failures)
+
+    @property
+    def withdrawals(self) -> tuple[Withdrawal, ...]:
+        """Flights that were withdrawn, in order; they are neither in `experiments` nor in `failures`."""
+        return tuple(self._book.withdrawals)
 
     @property
     def rmse(self) -> Floats:

@@ -109,6 +109,29 @@ class Failure(Recorded, kind="failure", given=("test",)):
 
 
 @dataclass(frozen=True)
+class Withdrawal(Recorded, kind="withdrawal"):
+    """A flight that was told or attached by mistake: its record stays, and nothing is learnt from it any more.
+
+    Args:
+        reason: what was wrong with it, in a few words.
+        test: number of its test; None for an attached flight.
+        run: its place among all runs that were recorded, from 0; None for a failure without a record.
+        failure: its place among all failures, from 0; None where the test did not fail.
+        recorded: number of all runs that were recorded by then.
+        known: of each test that was asked for by then, how many of the runs that are left it was planned from.
+        planned: numbers of the tests that were planned with it: what was predicted of them counts no more.
+    """
+
+    reason: str
+    test: int | None
+    run: int | None
+    failure: int | None
+    recorded: int
+    known: tuple[int, ...]
+    planned: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class TestLoop(Recorded, kind="test_loop"):
     """One turn of the test loop.
 

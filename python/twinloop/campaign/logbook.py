@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.entering import Judge, flown_test, partial_run, replay_of_record, with_run
-from twinloop.campaign.history import Experiment, Failure, Planned, TestLoop
+from twinloop.campaign.history import Experiment, Failure, Planned, TestLoop, Withdrawal
 from twinloop.campaign.setup import Setup
+from twinloop.campaign.withdrawing import as_it_counts, check_withdrawals, withdrawal_of
 from twinloop.errors import InvalidInput
 from twinloop.records import Record, Recorded, checked_record, plain, read
 from twinloop.test import Test, check_signals
@@ -20,24 +21,37 @@ from twinloop.trajectory import Trajectory, check_recorded
 class Logbook(Recorded, kind="logbook"):
     """Tests by number, experiments in the order of `tell`.
 
+    `recorded` and `reported` hold all runs and failures, in their order; `experiments` and `failures` those that count,
+    because they were not withdrawn.
+
     Args:
         setup: of the campaign.
     """
 
+    VERSION = 2
+
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
         self.tests: list[Test] = []
+        self.recorded: list[Experiment] = []
         self.experiments: list[Experiment] = []
         self.asked: list[tuple[int, TestLoop | Planned]] = []
+        self.reported: list[Failure] = []
         self.failures: list[Failure] = []
         self.abandoned: list[int] = []
+        self.withdrawals: list[Withdrawal] = []
         self.selected = setup.none_selected()
         self.identity = uuid.uuid4().hex  # tells campaigns apart; nothing that is computed depends on it
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
         """Names of the fields that a record has, in order."""
-        return "identity", "tests", "experiments", "asked", "failures", "abandoned"
+        return "identity", "tests", "experiments", "asked", "failures", "abandoned", "withdrawals"
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version, in which no flight could be withdrawn."""
+        return {"withdrawals": [], **super().renewed(record)}
 
     def to_record(self) -> Record:
         """All entries: experiments and failures with the number of their test, what was asked with the iteration's."""
@@ -49,14 +63,15 @@ class Logbook(Recorded, kind="logbook"):
         Args:
             known: how many of the first ones are left out, by list.
         """
-        runs = self.experiments[known.get("experiments", 0) :]
-        failures = self.failures[known.get("failures", 0) :]
+        runs = self.recorded[known.get("experiments", 0) :]
+        failures = self.reported[known.get("failures", 0) :]
         return {
             "tests": plain(self.tests[known.get("tests", 0) :]),
             "experiments": [[run.number, run.to_record()] for run in runs],
             "asked": plain(self.asked[known.get("asked", 0) :]),
             "failures": [[failure.test.number, failure.to_record()] for failure in failures],
             "abandoned": plain(self.abandoned[known.get("abandoned", 0) :]),
+            "withdrawals": plain(self.withdrawals[known.get("withdrawals", 0) :]),
         }
 
     @classmethod
@@ -82,7 +97,7 @@ class Logbook(Recorded, kind="logbook"):
         failures = read(list[tuple[int, Any]], found["failures"], f"{where}.failures")
         for i, (number, failure) in enumerate(failures):
             at = f"{where}.failures[{i}]"
-            book.failures.append(Failure.from_record(failure, book._numbered(number, at)))
+            book._report(Failure.from_record(failure, book._numbered(number, at)))
         book.abandoned = read(list[int], found["abandoned"], f"{where}.abandoned")
         for i, number in enumerate(book.abandoned):
             book._numbered(number, f"{where}.abandoned[{i}]")
@@ -91,6 +106,9 @@ class Logbook(Recorded, kind="logbook"):
             raise InvalidInput(
                 f"Record {where}.asked: expected numbers of tests that there are, found others."
             )
+        book.withdrawals = read(list[Withdrawal], found["withdrawals"], f"{where}.withdrawals")
+        check_withdrawals(book, f"{where}.withdrawals")
+        book._recount()
         return book
 
     def first(self, told: int) -> Logbook:
@@ -108,23 +126,60 @@ class Logbook(Recorded, kind="logbook"):
                 " another campaign."
             )
         book = self.copied()
-        book.experiments, book.selected = [], self.setup.none_selected()
-        for run in self.experiments[:told]:
-            book.enter(run)
+        book.recorded, book.withdrawals = self.experiments[:told], []
+        book.reported = list(self.failures)
+        book._recount()
         return book
+
+    def when_asked(self, known: int, test: int) -> Logbook:
+        """The book as it was when a test was asked for, without what was withdrawn since.
+
+        Failures without a record are in it if their tests were made before: the book has no other order of both.
+
+        Args:
+            known: how many of the experiments there were.
+            test: number of the test.
+        """
+        book = self.first(known)
+        tests = {run.number for run in book.experiments}
+        book.reported = [
+            failure
+            for failure in self.failures
+            if (failure.test.number in tests if failure.recorded else failure.test.number < test)
+        ]
+        book._recount()
+        return book
+
+    def to_learn_again(self, learnt: int) -> list[Logbook]:
+        """The books of the tests that were asked for before the last withdrawal, as they would have been without.
+
+        Args:
+            learnt: number of experiments that were known at the last `ask` that is remembered; those books are left
+                out.
+        """
+        known = self.withdrawals[-1].known if self.withdrawals else ()
+        asked = [(count, entry.test) for count, (_, entry) in zip(known, self.asked, strict=False)]
+        return [self.when_asked(count, test) for count, test in asked if count > learnt]
+
+    def same_flights(self, other: Logbook) -> bool:
+        """Whether as many experiments and failures count as in another state of the book."""
+        mine, others = (len(book.experiments) for book in (self, other))
+        return mine == others and len(self.failures) == len(other.failures)
 
     def copied(self) -> Logbook:
         """The same entries in a book of its own."""
         book = Logbook(self.setup)
-        book.tests, book.experiments, book.asked = list(self.tests), list(self.experiments), list(self.asked)
-        book.failures, book.abandoned = list(self.failures), list(self.abandoned)
+        book.tests, book.asked, book.abandoned = list(self.tests), list(self.asked), list(self.abandoned)
+        book.recorded, book.experiments = list(self.recorded), list(self.experiments)
+        book.reported, book.failures = list(self.reported), list(self.failures)
+        book.withdrawals = list(self.withdrawals)
         book.selected, book.identity = self.selected, self.identity
         return book
 
     @property
     def revision(self) -> int:
         """Number of entries; it grows with each."""
-        return len(self.tests) + len(self.experiments) + len(self.failures) + len(self.abandoned)
+        return len(self.tests) + len(self.abandoned) + self.outcomes
 
     def new_test(
         self,
@@ -190,8 +245,10 @@ class Logbook(Recorded, kind="logbook"):
         Args:
             run: of a test of this campaign, or an attached run.
         """
-        self.selected = with_run(self.selected, run.replayed, run.trajectory)
-        self.experiments.append(run)
+        counting = as_it_counts(run, len(self.recorded), self.withdrawals)
+        self.selected = with_run(self.selected, counting.replayed, counting.trajectory)
+        self.recorded.append(run)
+        self.experiments.append(counting)
 
     def fail(self, test: object, reason: str, partial: Trajectory | None, judge: Judge) -> None:
         """Enters that a test failed on the system.
@@ -209,7 +266,7 @@ class Logbook(Recorded, kind="logbook"):
         recorded = partial_run(partial, reason)
         if recorded is not None:
             self.enter(flown_test(self.setup, own, recorded, judge, least=1))
-        self.failures.append(Failure(own, reason, recorded=recorded is not None))
+        self._report(Failure(own, reason, recorded=recorded is not None))
 
     def abandon(self, test: object) -> None:
         """Enters that a test will not be flown.
@@ -228,6 +285,43 @@ class Logbook(Recorded, kind="logbook"):
             )
         self.abandoned.append(own.number)
 
+    def withdraw(self, which: object, reason: str, known: Sequence[int]) -> Withdrawal:
+        """Enters that a flight counts no more; tests that were planned with it and wait are abandoned.
+
+        Args:
+            which: test, its number, an experiment or a failure.
+            reason: what was wrong with it.
+            known: of each test that was asked for, how many of the experiments it was planned from.
+
+        Returns:
+            The entry.
+
+        Raises:
+            InvalidInput: nothing of that kind counts, or no reason.
+        """
+        withdrawal = withdrawal_of(self, which, reason, known)
+        self.withdrawals.append(withdrawal)
+        self._recount()
+        self.abandoned += [test.number for test in self.waiting() if test.number in withdrawal.planned]
+        return withdrawal
+
+    def _report(self, failure: Failure) -> None:
+        self.reported.append(failure)
+        self.failures.append(failure)
+
+    def _recount(self) -> None:
+        """What counts, of all that was entered."""
+        runs, failures = ({getattr(each, key) for each in self.withdrawals} for key in ("run", "failure"))
+        self.experiments = [
+            as_it_counts(run, place, self.withdrawals)
+            for place, run in enumerate(self.recorded)
+            if place not in runs
+        ]
+        self.failures = [failure for place, failure in enumerate(self.reported) if place not in failures]
+        self.selected = self.setup.none_selected()
+        for run in self.experiments:
+            self.selected = with_run(self.selected, run.replayed, run.trajectory)
+
     @property
     def flown(self) -> set[int]:
         """Numbers of the tests that were flown, whatever became of them."""
@@ -236,14 +330,19 @@ class Logbook(Recorded, kind="logbook"):
 
     @property
     def outcomes(self) -> int:
-        """Number of experiments and failures; it grows with each."""
-        return len(self.experiments) + len(self.failures)
+        """Number of runs, failures and withdrawals; it grows with each."""
+        return len(self.recorded) + len(self.reported) + len(self.withdrawals)
 
     @property
     def runs(self) -> int:
-        """Runs of tests on the system, the failed ones too."""
+        """Runs of tests on the system, the failed ones too, and withdrawn ones until their test is told anew."""
         told = sum(run.test is not None for run in self.experiments)
-        return told + sum(not failure.recorded for failure in self.failures)
+        return told + sum(not failure.recorded for failure in self.failures) + len(self.only_withdrawn)
+
+    @property
+    def only_withdrawn(self) -> set[int]:
+        """Numbers of tests of which everything that was told was withdrawn: they were flown all the same."""
+        return {each.test for each in self.withdrawals if each.test is not None} - self.flown
 
     def waiting(self) -> list[Test]:
         """Tests from `ask` that wait for their run: neither told nor abandoned, in order."""

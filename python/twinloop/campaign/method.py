@@ -44,6 +44,25 @@ class Method(Protocol):
         """Number of the turn of the loop that is running or was the last."""
         ...
 
+    def learnt_by(self, iteration: int) -> int:
+        """Number of experiments that a turn of the loop has learnt, after which a test was asked for.
+
+        Args:
+            iteration: its number.
+        """
+        ...
+
+    def forget(self, book: Logbook, asked_since: bool) -> None:
+        """Forgets a flight that was withdrawn, and all that was learnt with it.
+
+        What was learnt at each `ask` is learnt again from what is left by the next call of `learn`.
+
+        Args:
+            book: without the flight.
+            asked_since: whether a test was asked for after it was told.
+        """
+        ...
+
     def learn(self, book: Logbook, at_once: bool = False) -> None:
         """Learns all runs, starting from the state at the last `ask`.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -146,13 +146,36 @@ def with_asked(book: Logbook, turns: Sequence[Turn]) -> tuple[Turn, ...]:
         book: of the campaign.
         turns: in order.
     """
-    return tuple(replace(turn, asked=_asked_after(book, turn.iteration)) for turn in turns)
+    return tuple(replace(turn, asked=_asked_after(book, turn)) for turn in turns)
 
 
-def _asked_after(book: Logbook, iteration: int) -> tuple[Any, ...]:
-    """Of the kind that the preset asks for: a campaign has no other."""
+def known_when_asked(book: Logbook, learnt: Callable[[int], int]) -> list[int]:
+    """Of each test that was asked for, how many of the experiments that count it was planned from.
+
+    Args:
+        book: of the campaign.
+        learnt: number of experiments that a turn of the loop has learnt, by its number.
+    """
+    known = list(book.withdrawals[-1].known) if book.withdrawals else []
+    return known + [learnt(iteration) for iteration, _ in book.asked[len(known) :]]
+
+
+def _asked_after(book: Logbook, turn: Turn) -> tuple[Any, ...]:
+    """Of the kind that the preset asks for: a campaign has no other.
+
+    A withdrawal has renumbered the turns of before: there the number of learnt experiments tells. What was planned
+    with a withdrawn flight is of no turn that is left.
+    """
+    known = book.withdrawals[-1].known if book.withdrawals else ()
+    gone = {number for each in book.withdrawals for number in each.planned}
+    after = [
+        turn.iteration > 0 and known[i] == len(turn.tests) if i < len(known) else turn.iteration == iteration
+        for i, (iteration, _) in enumerate(book.asked)
+    ]
     return tuple(
-        replace(asked, flown=measured(book, asked.test)) for after, asked in book.asked if after == iteration
+        replace(asked, flown=measured(book, asked.test))
+        for (_, asked), is_after in zip(book.asked, after, strict=True)
+        if is_after and asked.test not in gone
     )
 
 

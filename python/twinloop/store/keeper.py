@@ -33,6 +33,7 @@ class Stored:
         created: when, in UTC.
         sessions: versions and processor each time it was opened to be written.
         told_at: time of each `tell`, in UTC.
+        withdrawn_at: time of each `withdraw`, in UTC.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Stored:
     created: str
     sessions: tuple[Record, ...]
     told_at: tuple[str, ...]
+    withdrawn_at: tuple[str, ...] = ()
 
 
 def listed(store: Store) -> list[dict[str, Any]]:
@@ -119,7 +121,7 @@ def found(store: Store, name: str | None) -> Stored | None:
     return Stored(
         name=row.name,
         setup=from_text(row.setup, what),
-        logbook={"kind": "logbook", "version": 1, "identity": row.identity, **logbook},
+        logbook={"kind": "logbook", "version": 2, "identity": row.identity, **logbook},
         memory=None if memory is None else from_text(memory, what),
         system=None if row.system is None else from_text(row.system, what),
         runs=runs[-1].runs if runs else None,
@@ -127,6 +129,7 @@ def found(store: Store, name: str | None) -> Stored | None:
         created=row.created,
         sessions=tuple({"started": s.started, **from_text(s.provenance, what)} for s in opened),
         told_at=tuple(run.told for run in runs),
+        withdrawn_at=tuple(each.withdrawn for each in entries["withdrawals"]),
     )
 
 
@@ -237,6 +240,8 @@ class Keeper:
                     row = {"campaign": self._id, "number": grown[name], "record": to_text(record)}
                     if name == "experiments":
                         row |= {"told": now, "sha256": _hash(str(row["record"])), "runs": runs}
+                    if name == "withdrawals":
+                        row["withdrawn"] = now
                     connection.execute(_entries()[name].insert(), row)
                     grown[name] += 1
             if memory is not None:

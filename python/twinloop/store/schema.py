@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import Column, ForeignKey, Integer, MetaData, String, Table, Text
 
-REVISION = "0003"
+REVISION = "0004"
 """Of these tables; the newest migration makes them."""
 
 metadata = MetaData()
@@ -56,7 +56,9 @@ failures = _entries("failures")
 """Tests that failed, behind their number."""
 abandoned = _entries("abandoned")
 """Numbers of tests that will not be flown."""
-ENTRIES = {table.name: table for table in (tests, asked, experiments, failures, abandoned)}
+withdrawals = _entries("withdrawals", Column("withdrawn", String(40), nullable=False))
+"""Flights that count no more, each with its reason and the time; their own rows stay as they were."""
+ENTRIES = {table.name: table for table in (tests, asked, experiments, failures, abandoned, withdrawals)}
 """Lists of a logbook that only grow, by their names there."""
 
 approvals = Table(

@@ -86,8 +86,26 @@ class Coevolution:
         latest = self.memory.latest
         return 0 if latest is None else latest.iteration
 
+    def learnt_by(self, iteration: int) -> int:
+        """Number of tests of an iteration."""
+        latest = self.memory.latest
+        assert latest is not None  # a test was asked for after it
+        return next(len(record.tests) for record in latest.finished if record.iteration == iteration)
+
+    def forget(self, book: Logbook, asked_since: bool) -> None:
+        """Back to the last `ask`, or to the random population if that had learnt the flight."""
+        asked = None if asked_since else self.memory.asked
+        self.memory = Memory(asked, asked)
+
     def learn(self, book: Logbook, at_once: bool = False) -> None:
-        """One iteration on all runs since the last `ask`."""
+        """One iteration on all runs since the last `ask`; after a withdrawal first those of the asks before."""
+        asked = self.memory.asked
+        for past in [] if at_once else book.to_learn_again(0 if asked is None else len(asked.experiments)):
+            self._learn(past)
+            self.memory = Memory(self.memory.latest, self.memory.latest)
+        self._learn(book, at_once)
+
+    def _learn(self, book: Logbook, at_once: bool = False) -> None:
         self._experiments = told = len(book.experiments)
         latest = self.memory.latest
         if at_once and latest is not None:

@@ -98,8 +98,41 @@ class IdentifyAndPlan:
         """Number of experiments that are learnt."""
         return 0 if self.memory.latest is None else self.memory.latest.experiments
 
+    def learnt_by(self, iteration: int) -> int:
+        """The number of an identification is that of its experiments."""
+        return iteration
+
+    def forget(self, book: Logbook, asked_since: bool) -> None:
+        """Back to the last `ask`, or to nothing if that had learnt the flight."""
+        asked = None if asked_since else self.memory.asked
+        latest = None if asked is None else replace(asked, gains=None)
+        self.memory = Memory(asked=asked, latest=latest)
+        if asked is not None:
+            self._keep_gains(book, book.when_asked(asked.experiments, book.asked[-1][1].test))
+
     def learn(self, book: Logbook, at_once: bool = False) -> None:
         """Identifies from all that was told, beginning with what was known at the last `ask`."""
+        asked = self.memory.asked
+        again = [] if at_once else book.to_learn_again(0 if asked is None else asked.experiments)
+        for past in again:
+            self._learn_again(past)
+        if again:
+            self._keep_gains(book, again[-1])
+        self._learn(book, at_once)
+
+    def _learn_again(self, past: Logbook) -> None:
+        """What was learnt when a test was asked for, from what is left."""
+        self._learn(past)
+        gains = self._gains(past) if self.options.tests == "ask" else None
+        self.memory = replace(self.memory, asked=replace(self._latest(), gains=gains), under_way=None)
+
+    def _keep_gains(self, book: Logbook, asked: Logbook) -> None:
+        """The gains of the last `ask` are those of now if nothing was told since."""
+        known = self.memory.asked
+        if known is not None and known.gains is not None and book.same_flights(asked):
+            self.memory = replace(self.memory, gains=(book.outcomes, known.gains))
+
+    def _learn(self, book: Logbook, at_once: bool = False) -> None:
         latest = self.memory.latest
         if latest is not None and (at_once or latest.experiments == len(book.experiments)):
             return

@@ -1,0 +1,168 @@
+"""Withdrawing: which record of a flight counts no more, and what then counts no more of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from twinloop.campaign.history import Experiment, Failure, Withdrawal
+from twinloop.errors import InvalidInput
+from twinloop.test import Test
+from twinloop.trajectory import equal_runs
+
+if TYPE_CHECKING:
+    from twinloop.campaign.logbook import Logbook
+
+Place = tuple[int | None, int | None]
+"""Of a run among all that were recorded and of a failure among all; None where there is none."""
+
+
+def withdrawal_of(book: Logbook, which: object, reason: str, known: Sequence[int]) -> Withdrawal:
+    """What is entered where a flight is withdrawn.
+
+    Args:
+        book: of the campaign, before.
+        which: test, its number, an experiment or a failure.
+        reason: what was wrong with it.
+        known: of each test that was asked for, how many of the experiments it was planned from.
+
+    Raises:
+        InvalidInput: nothing of that kind counts, or no reason.
+    """
+    if not isinstance(reason, str) or not reason.strip():
+        raise InvalidInput(
+            f"Campaign.withdraw, reason: expected what was wrong, in words, found {reason!r}; such as"
+            ' "columns exchanged".'
+        )
+    run, failure = _place(book, which)
+    if run is None:
+        assert failure is not None
+        test: int | None = book.reported[failure].test.number
+        aware = [entry.test > book.reported[failure].test.number for _, entry in book.asked]
+        left = list(known)
+    else:
+        test, before = book.recorded[run].number, _counting(book)[0].index(run)
+        aware = [before < count for count in known]
+        left = [count - (before < count) for count in known]
+    planned = [entry.test for (_, entry), knew in zip(book.asked, aware, strict=True) if knew]
+    return Withdrawal(reason, test, run, failure, len(book.recorded), tuple(left), tuple(planned))
+
+
+def as_it_counts(run: Experiment, place: int, withdrawals: Sequence[Withdrawal]) -> Experiment:
+    """A run without what was predicted of it by a twin that had learnt a withdrawn flight.
+
+    Args:
+        run: as it was recorded.
+        place: among all that were.
+        withdrawals: of the campaign.
+    """
+    test = run.test
+    if test is not None and any(test.number in each.planned for each in withdrawals):
+        run = replace(run, replayed=replace(test, predicted=None, spread=None, risk=None))
+    if any(
+        each.planned and each.run is not None and each.run < place < each.recorded for each in withdrawals
+    ):
+        run = replace(run, before=None)
+    return run
+
+
+def check_withdrawals(book: Logbook, where: str) -> None:
+    """Refuses entries of flights that there are not, or that were withdrawn before.
+
+    Args:
+        book: of the campaign.
+        where: how to call them in an error.
+
+    Raises:
+        InvalidInput: such an entry.
+    """
+    for key, there in (("run", len(book.recorded)), ("failure", len(book.reported))):
+        places = [place for each in book.withdrawals if (place := getattr(each, key)) is not None]
+        if len(set(places)) < len(places) or not all(0 <= place < there for place in places):
+            raise InvalidInput(
+                f"Record {where}: expected each {key} once, by a place from 0 to {there - 1}, found {places}."
+            )
+    for each in book.withdrawals:
+        if (each.run is None and each.failure is None) or len(each.known) > len(book.asked):
+            raise InvalidInput(f"Record {where}: expected a run or a failure of this campaign, found none.")
+
+
+def _counting(book: Logbook) -> tuple[list[int], list[int]]:
+    """Places of the runs and of the failures that count."""
+    runs, failures = {each.run for each in book.withdrawals}, {each.failure for each in book.withdrawals}
+    return (
+        [place for place in range(len(book.recorded)) if place not in runs],
+        [place for place in range(len(book.reported)) if place not in failures],
+    )
+
+
+def _place(book: Logbook, which: object) -> Place:
+    if isinstance(which, Experiment):
+        return _of_experiment(book, which)
+    if isinstance(which, Failure):
+        return _of_failure(book, which)
+    if isinstance(which, Test):
+        return _of_test(book, book.own(which).number)
+    if isinstance(which, int) and not isinstance(which, bool):
+        return _of_test(book, which)
+    raise InvalidInput(
+        "Campaign.withdraw: expected a test, its number, or one of campaign.experiments or campaign.failures, found"
+        f" {type(which).__name__}."
+    )
+
+
+def _of_test(book: Logbook, number: int) -> Place:
+    """The failure of a test, or the run that was told last."""
+    runs, failures = _counting(book)
+    failed = [place for place in failures if book.reported[place].test.number == number]
+    if failed:
+        return _of_failure(book, book.reported[failed[-1]])
+    told = [place for place in runs if book.recorded[place].number == number]
+    if not told:
+        told_of = sorted(book.flown)
+        of = f"one of {', '.join(map(str, told_of))}" if told_of else "a flight that was told"
+        raise InvalidInput(
+            f"Campaign.withdraw: expected the number of a test with a recorded flight, {of}, found {number};"
+            " there is nothing to withdraw."
+        )
+    return told[-1], None
+
+
+def _of_failure(book: Logbook, failure: Failure) -> Place:
+    runs, failures = _counting(book)
+    places = [place for place in failures if book.reported[place] is failure]
+    if not places:
+        raise InvalidInput(
+            "Campaign.withdraw: expected one of campaign.failures, found another failure, or a withdrawn one."
+        )
+    if not failure.recorded:
+        return None, places[0]
+    parts = [place for place in runs if _is_record_of(book.recorded[place], failure)]
+    return (parts[-1] if parts else None), places[0]
+
+
+def _of_experiment(book: Logbook, run: Experiment) -> Place:
+    runs, failures = _counting(book)
+    counted = list(zip(runs, book.experiments, strict=True))
+    itself = [place for place, each in counted if each is run]
+    places = itself or [
+        place
+        for place, each in counted
+        if each.number == run.number and equal_runs(each.trajectory, run.trajectory)
+    ]
+    if not places:
+        raise InvalidInput(
+            "Campaign.withdraw: expected one of campaign.experiments, found another one, or a withdrawn one."
+        )
+    of = [
+        place
+        for place in failures
+        if book.reported[place].recorded and _is_record_of(run, book.reported[place])
+    ]
+    return places[0], (of[-1] if of else None)
+
+
+def _is_record_of(run: Experiment, failure: Failure) -> bool:
+    """Whether a run is what was recorded until a test failed."""
+    return run.number == failure.test.number and run.trajectory.reason == failure.reason
