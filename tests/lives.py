@@ -38,6 +38,22 @@ LIFE = ("tell", "tell", "ask", "ask", "tell", "tell", "ask", "tell", "own", "own
 FULL_LIFE = ("tell", "attach", "ask", "fail", "ask", "ask", "abandon", "tell", "attach", "attach")
 """The same with flights that nobody asked for, a test that failed and one that was never flown."""
 
+WITHDRAWN_LIFE = (
+    "tell",
+    "tell",
+    "ask",
+    "tell",
+    "ask",
+    "withdraw",
+    "ask",
+    "tell",
+    "withdraw",
+    "tell",
+    "ask",
+    "own",
+)
+"""With flights that were recorded by mistake: one that was learnt already, and one that was not."""
+
 
 def new(preset, seed=0):
     return tl.Campaign(
@@ -60,6 +76,8 @@ def lived(campaign, life, look=lambda campaign, step: campaign):
             campaign.tell_failed(waiting.pop(0), "the motor cut out")
         elif event == "abandon":
             campaign.abandon(waiting.pop(0))
+        elif event == "withdraw":
+            campaign.withdraw(campaign.experiments[-1], "the log of another flight")
         else:
             test = campaign.test(OTHER_GAINS) if event == "own" else waiting.pop(0)
             run = plant.run(test)

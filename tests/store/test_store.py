@@ -19,7 +19,7 @@ from sqlalchemy import event
 import twinloop as tl
 from conftest import TINY
 from faults import killed_and_resumed
-from lives import LIFE, OTHER_GAINS, SMALL, flown, lived, plain, stored
+from lives import LIFE, OTHER_GAINS, SMALL, WITHDRAWN_LIFE, flown, lived, plain, stored
 from sameness import same
 from twinloop.campaign import keeping
 from twinloop.records import to_text
@@ -106,14 +106,15 @@ def test_what_is_under_way_is_kept_now_and_then_and_goes_on_from_there(path, pen
 # Resumed
 
 
+@pytest.mark.parametrize("life", [LIFE, WITHDRAWN_LIFE])
 @pytest.mark.parametrize("preset", ["paper", "default"])
-def test_a_campaign_that_is_opened_anew_after_each_event_is_the_one_that_was_not(path, preset):
+def test_a_campaign_that_is_opened_anew_after_each_event_is_the_one_that_was_not(path, preset, life):
     def reopened(campaign, step):
         campaign.close()
         return tl.Campaign.load(path, threads=1) if step % 2 else stored(path, preset)
 
-    whole = lived(stored(path.with_name("whole.db"), preset), LIFE)
-    moved = lived(stored(path, preset), LIFE, reopened)
+    whole = lived(stored(path.with_name("whole.db"), preset), life)
+    moved = lived(stored(path, preset), life, reopened)
     assert plain(moved) == plain(whole)
     assert same(moved.best_test.genes, whole.best_test.genes)
 
@@ -174,6 +175,65 @@ def test_a_tell_that_is_killed_before_any_of_its_statements_is_kept_whole_or_not
         assert plain(again) == expected
         again.close()
     assert killed >= 3
+
+
+def test_the_record_of_a_withdrawn_flight_stays_with_the_reason_and_the_time(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    before = rows(path, "experiments")
+    campaign.withdraw(0, "the log of another rig")
+    ((_, number, record, withdrawn),) = rows(path, "withdrawals")
+    assert number == 0 and "the log of another rig" in record and withdrawn.startswith("20")
+    assert rows(path, "experiments") == before
+    campaign.close()
+    again = tl.Campaign.load(path, read_only=True)
+    assert again.experiments == () and again.withdrawals[0].reason == "the log of another rig"
+    copy = path.with_name("copy.db")
+    again.save(copy)
+    assert plain(tl.Campaign.load(copy)) == plain(again)
+
+
+def test_a_withdrawal_that_the_store_refuses_has_not_happened(path, pendulum, monkeypatch):
+    campaign = flown(stored(path), pendulum)
+    before = plain(campaign)
+
+    def full(*_):
+        raise tl.StoreFailure("no room")
+
+    monkeypatch.setattr(Keeper, "keep", full)
+    with pytest.raises(tl.StoreFailure):
+        campaign.withdraw(0, "why")
+    assert plain(campaign) == before and rows(path, "withdrawals") == []
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_a_withdraw_that_is_killed_before_any_of_its_statements_is_kept_whole_or_not_at_all(path, preset):
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import twinloop as tl\n"
+        "from faults import die_at_statement\n"
+        "campaign = tl.Campaign.load(sys.argv[2], threads=1)\n"
+        "die_at_statement(int(sys.argv[3]))\n"
+        "campaign.withdraw(campaign.experiments[-1], 'the log of another flight')\n"
+    )
+    begun = WITHDRAWN_LIFE.index("withdraw")
+    lived(stored(path, preset), WITHDRAWN_LIFE[:begun]).close()
+    kept_before = path.read_bytes()
+    either = [tl.Campaign.load(path, read_only=True)]
+    either.append(lived(stored(path.with_name("whole.db"), preset), WITHDRAWN_LIFE[: begun + 1]))
+    either = [plain(campaign) for campaign in either]
+    ends, statement, code_of_child = set(), 0, None
+    while code_of_child != 0:
+        statement += 1
+        for leftover in path.parent.glob(f"{path.name}*"):
+            leftover.unlink()
+        path.write_bytes(kept_before)
+        tests = str(Path(__file__).parents[1])
+        child = subprocess.run([sys.executable, "-c", code, tests, str(path), str(statement)], check=False)
+        code_of_child = child.returncode
+        assert code_of_child in (0, -signal.SIGKILL)
+        again = tl.Campaign.load(path, read_only=True)
+        ends.add(either.index(plain(again)))
+    assert statement > 3 and ends == {0, 1}
 
 
 def test_a_clock_that_jumps_changes_nothing(path, pendulum, monkeypatch):

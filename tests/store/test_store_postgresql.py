@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import twinloop as tl
-from lives import FULL_LIFE, LIFE, PLANT, begun, flown, lived, plain, stored
+from lives import FULL_LIFE, LIFE, PLANT, WITHDRAWN_LIFE, begun, flown, lived, plain, stored
 from old_store import old_store
 from sameness import same
 from twinloop.faces.cli import main
@@ -59,16 +59,17 @@ def fresh(server, name):
     return server.replace("/postgres?", f"/{name}?")
 
 
+@pytest.mark.parametrize("life", [LIFE, WITHDRAWN_LIFE])
 @pytest.mark.parametrize("preset", ["paper", "default"])
-def test_a_campaign_on_a_server_is_the_one_in_a_file(server, tmp_path, preset):
-    address = fresh(server, f"same_{preset}")
+def test_a_campaign_on_a_server_is_the_one_in_a_file(server, tmp_path, preset, life):
+    address = fresh(server, f"same_{preset}_{len(life)}")
 
     def reopened(campaign, step):
         campaign.close()
         return tl.Campaign.load(address, threads=1) if step % 2 else stored(address, preset)
 
-    in_file = lived(stored(tmp_path / "hover.db", preset), LIFE)
-    on_server = lived(stored(address, preset), LIFE, reopened)
+    in_file = lived(stored(tmp_path / "hover.db", preset), life)
+    on_server = lived(stored(address, preset), life, reopened)
     assert plain(on_server) == plain(in_file)
     assert same(on_server.best_test.genes, in_file.best_test.genes)
     on_server.close()

@@ -29,6 +29,7 @@ from twinloop.faces.report.command import compare, report
 from twinloop.faces.settings import settings
 from twinloop.faces.stored import learn, resume, show
 from twinloop.faces.terminal import prepared
+from twinloop.faces.withdrawing import withdraw
 from twinloop.faces.working import answers, check_answer, patient, work
 from twinloop.planning.planner import GOALS
 from twinloop.planning.quality import KINDS
@@ -225,7 +226,7 @@ def run(
     )
 
 
-for command in (new, ask, tell, attach, abandon):
+for command in (new, ask, tell, attach, abandon, withdraw):
     main.add_command(command)
 main.add_command(check)
 main.add_command(identify)

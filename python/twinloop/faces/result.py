@@ -84,6 +84,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
             {"test": failure.test.number, "gains": failure.test.parameters, "reason": failure.reason}
             for failure in campaign.failures
         ],
+        "withdrawn": [{"test": each.test, "reason": each.reason} for each in campaign.withdrawals],
         "cost": _cost(campaign.cost),
         "controller": None if best is None else _controller(campaign, best, found.planned, identified),
         "no_controller": found.no_controller or None,

@@ -19,6 +19,7 @@ from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
+from twinloop.faces.withdrawing import named
 from twinloop.faces.working import answers, check_answer, described, knows_nothing, patient, work
 from twinloop.store import Stored, listed, opened, shown_name
 from twinloop.systems import BUILT_IN, Quadrotor
@@ -165,6 +166,10 @@ def _facts(held: Stored, campaign: Campaign) -> dict[str, object]:
         "waiting": [test.number for test in campaign.waiting],
         "failed": [failure.test.number for failure in campaign.failures],
         "abandoned": [test.number for test in campaign.tests if campaign.status(test) == "abandoned"],
+        "withdrawn": [
+            {"test": each.test, "reason": each.reason, "at": at}
+            for each, at in zip(campaign.withdrawals, held.withdrawn_at, strict=False)
+        ],
         "sessions": list(held.sessions),
     }
 
@@ -186,6 +191,8 @@ def _sentences(store: str, facts: dict[str, Any]) -> str:
         if facts[key]:
             numbers = ", ".join(str(number) for number in facts[key])
             lines.append(f"Test{'s' if len(facts[key]) > 1 else ''} {words}: {numbers}.")
+    for each in facts["withdrawn"]:
+        lines.append(f"Withdrawn at {each['at']}: {named(each['test'])} ({each['reason']}).")
     return "\n".join(lines) + "\n"
 
 

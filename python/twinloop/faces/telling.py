@@ -108,10 +108,16 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
         The test.
 
     Raises:
-        InvalidInput: no such test, no reason, or a log that cannot be used.
+        InvalidInput: no such test, one with a recorded flight, no reason, or a log that cannot be used.
         StoreFailure: the store cannot be written.
     """
     test = numbered(campaign, number)
+    status = campaign.status(test)
+    if status in ("flown", "aborted"):
+        raise InvalidInput(
+            f"Test {number}: expected one without a recorded flight, found one that was {status}; if that was recorded"
+            f" by mistake, withdraw it first: twinloop withdraw STORE {number} --reason WHY."
+        )
     run = None if log is None else load(log, campaign.signals, ended="aborted", reason=reason)
     campaign.tell_failed(test, reason, run)
     return test

@@ -117,6 +117,7 @@ def report_page(
         ),
         next=_next(campaign, result),
         failures=campaign.failures,
+        withdrawals=campaign.withdrawals,
         sessions=sessions,
         version=_core.__version__,
     )  # fmt: skip

@@ -101,6 +101,7 @@ def _flights(result: Mapping[str, Any]) -> str:
     reasons += [
         f"Test {failure['test']} failed: {failure['reason']}." for failure in result.get("failures", ())
     ]
+    reasons += [_withdrawn(each) for each in result.get("withdrawn", ())]
     measure = result["quality"]
     title = (
         f"FLIGHTS\nQuality: {quality_words(measure['kind'], measure['unit'])}; lower is better.\n"
@@ -117,6 +118,11 @@ def _of_run(run: Mapping[str, Any]) -> str:
     if run["test"] is None:
         return f"A run of {run['steps']} steps, attached."
     return f"Test {run['test']}: {run['why'] or _own(run)}"
+
+
+def _withdrawn(flight: Mapping[str, Any]) -> str:
+    of = "An attached flight" if flight["test"] is None else f"A flight of test {flight['test']}"
+    return f"{of} was withdrawn: {flight['reason']}."
 
 
 def _own(run: Mapping[str, Any]) -> str:

@@ -1,0 +1,111 @@
+"""The command `withdraw`: by the number of a test, by a log, by the place of an attached flight; and what shows it."""
+
+import json
+import re
+
+import pytest
+from click.testing import CliRunner
+
+import twinloop as tl
+from conftest import pendulum_step
+from lives import SIGNALS, SMALL, by_hand
+from twinloop.campaign.campaign_file import _toml, template
+from twinloop.faces.cli import main
+from twinloop.logs import write_columns
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, list(arguments))
+
+
+def look():
+    return tl.Campaign.load("rig.db", read_only=True)
+
+
+def written(flight, file):
+    """A flight as a person would record it."""
+    columns = {"t": flight.t, "angle": flight.states[:, 0], "rate": flight.states[:, 1]}
+    write_columns(file, {**columns, "torque": flight.commands[:, 0]})
+
+
+def flown(test, file):
+    written(tl.systems.Simulated(SIGNALS, pendulum_step).run(test), file)
+
+
+@pytest.fixture
+def flights(tmp_path, monkeypatch):
+    """An attached flight, a test with a flight, and a test that was planned with both."""
+    monkeypatch.chdir(tmp_path)
+    options = "\n".join(f"{name} = {_toml(value)}" for name, value in SMALL.items())
+    text = f"{template('rig.db').partition('[options]')[0]}[options]\n{options}\n"
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    written(by_hand(30), tmp_path / "old.csv")
+    for arguments in (("attach", "rig.db", "old.csv"), ("ask", "rig.db")):
+        assert run(*arguments).exit_code == 0
+    flown(look().tests[0], tmp_path / "flight0.csv")
+    for arguments in (("tell", "rig.db", "0", "flight0.csv"), ("ask", "rig.db")):
+        assert run(*arguments).exit_code == 0
+    return tmp_path
+
+
+def withdrawn(which, *more):
+    return run("withdraw", "rig.db", which, "--reason", "columns exchanged", *more)
+
+
+def test_a_flight_is_withdrawn_by_its_test_which_then_waits_for_its_log(flights):
+    said = withdrawn("0")
+    assert said.exit_code == 0, said.output
+    assert "Saved: the flight of test 0 withdrawn; 1 experiment in rig.db." in said.stdout
+    assert "Test 1 abandoned: planned with it." in said.stdout
+    assert "twinloop tell rig.db 0 FLIGHT.csv" in said.stdout
+    campaign = look()
+    assert [campaign.status(test) for test in campaign.tests] == ["asked", "abandoned"]
+    assert "TEST 0 of rig.db" in run("ask", "rig.db").stdout
+    # The same log, with its mistake or without, may be told again.
+    assert run("tell", "rig.db", "0", "flight0.csv").exit_code == 0
+    assert look().cost.runs == 1
+
+
+@pytest.mark.parametrize("which", ["old.csv", "attached-1"])
+def test_an_attached_flight_is_withdrawn_by_its_log_or_its_place(flights, which):
+    facts = json.loads(withdrawn(which, "--json").stdout)
+    assert facts == {"test": None, "reason": "columns exchanged", "abandoned": [1], "experiments": 1}
+    assert [run.number for run in look().experiments] == [0]
+
+
+def test_show_says_what_was_withdrawn_when_and_why(flights):
+    withdrawn("attached-1")
+    shown = run("show", "rig.db").stdout
+    assert ": an attached flight (columns exchanged)." in shown and "Withdrawn at 20" in shown
+    assert run("learn", "rig.db").exit_code == 0
+    assert "An attached flight was withdrawn: columns exchanged." in run("show", "rig.db").stdout
+    facts = json.loads(run("show", "rig.db", "--json").stdout)
+    assert facts["store"]["withdrawn"][0]["reason"] == "columns exchanged"
+    assert facts["result"]["cost"]["withdrawn"] == 1
+    assert run("report", "rig.db", "-o", "rig.html").exit_code == 0
+    assert "<li>An attached flight: columns exchanged</li>" in (flights / "rig.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("which", "sentence"),
+    [
+        ("7", "number of a test with a recorded flight, one of 0, found 7"),
+        ("attached-2", r"or attached-1 \(30 steps\), found attached-2"),
+        ("other.csv", "found other.csv"),
+        ("flight1.csv", "found flight1.csv"),
+    ],
+)
+def test_a_flight_that_there_is_not_is_refused(flights, which, sentence):
+    flown(look().tests[1], flights / "flight1.csv")
+    said = withdrawn(which)
+    assert said.exit_code == 2
+    assert re.search(sentence, said.stderr), said.stderr
+    assert look().withdrawals == ()
+
+
+def test_a_test_with_a_flight_has_not_failed_until_that_is_withdrawn(flights):
+    said = run("tell", "rig.db", "0", "--failed", "oops")
+    assert said.exit_code == 2 and "withdraw it first: twinloop withdraw STORE 0 --reason WHY" in said.stderr
+    withdrawn("0")
+    assert run("tell", "rig.db", "0", "--failed", "oops").exit_code == 0
+    assert look().status(look().tests[0]) == "failed"
