@@ -39,20 +39,10 @@ FULL_LIFE = ("tell", "attach", "ask", "fail", "ask", "ask", "abandon", "tell", "
 """The same with flights that nobody asked for, a test that failed and one that was never flown."""
 
 WITHDRAWN_LIFE = (
-    "tell",
-    "tell",
-    "ask",
-    "tell",
-    "ask",
-    "withdraw",
-    "ask",
-    "tell",
-    "withdraw",
-    "tell",
-    "ask",
-    "own",
+    *("tell", "tell", "ask", "tell", "ask", "withdraw"),
+    *("own", "ask", "tell", "withdraw", "tell", "ask"),
 )
-"""With flights that were recorded by mistake: one that was learnt already, and one that was not."""
+"""With flights that were recorded by mistake: one that a question had learnt, and one that none had."""
 
 
 def new(preset, seed=0):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
-from lives import FULL_LIFE, LIFE, PLANT, StopAt, lived, new, outcome, stored
+from lives import FULL_LIFE, LIFE, PLANT, WITHDRAWN_LIFE, StopAt, lived, new, outcome, stored
 from sameness import same
 from twinloop.faces.result import summary
 from twinloop.planning.planner import Planner
@@ -68,14 +68,17 @@ def test_looking_at_a_campaign_of_default_changes_no_bit(looks):
     assert seen("default", looks) == unseen("default")
 
 
-def test_looking_changes_no_bit_of_what_follows_attached_failed_and_abandoned_flights():
+@pytest.mark.parametrize(
+    ("preset", "life"), [("default", FULL_LIFE), ("default", WITHDRAWN_LIFE), ("paper", WITHDRAWN_LIFE)]
+)
+def test_looking_changes_no_bit_of_what_follows_attached_failed_abandoned_and_withdrawn_flights(preset, life):
     def look(campaign, step):
         for what in ("controller", "twin", "printing"):
             LOOKS[what](campaign)
         return copy.copy(campaign)
 
-    expected = outcome(lived(new("default"), FULL_LIFE))
-    assert outcome(lived(new("default"), FULL_LIFE, look)) == expected
+    expected = outcome(lived(new(preset), life))
+    assert outcome(lived(new(preset), life, look)) == expected
 
 
 @pytest.mark.parametrize("preset", ["paper", "default"])

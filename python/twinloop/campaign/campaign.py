@@ -694,8 +694,11 @@ class Campaign(Shown, Persistent, kind="campaign"):
             warn(latest.remarks, stacklevel=3)
 
     def _error_so_far(self, alone: _core.SelectedTests) -> float | None:
-        """On a new run, of the model at the last `ask`: a look must not change it."""
-        model = self._method.asked_model
+        """On a new run, of the model at the last `ask`: a look must not change it.
+
+        None where that model had learnt a flight that is withdrawn: only a look has learnt again what is left.
+        """
+        model = None if self._book.forgot_last_ask else self._method.asked_model
         return None if model is None else float(closed_loop([model], alone, self._workers)[0, 0])
 
     @contextmanager

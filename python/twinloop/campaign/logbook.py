@@ -161,6 +161,11 @@ class Logbook(Recorded, kind="logbook"):
         asked = [(count, entry.test) for count, (_, entry) in zip(known, self.asked, strict=False)]
         return [self.when_asked(count, test) for count, test in asked if count > learnt]
 
+    @property
+    def forgot_last_ask(self) -> bool:
+        """Whether what was known at the last `ask` was learnt with a flight that was withdrawn since."""
+        return any(each.planned and len(each.known) == len(self.asked) for each in self.withdrawals)
+
     def same_flights(self, other: Logbook) -> bool:
         """Whether as many experiments and failures count as in another state of the book."""
         mine, others = (len(book.experiments) for book in (self, other))
