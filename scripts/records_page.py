@@ -22,6 +22,7 @@ FIELDS = {
         "asked": "`[iteration, planned or test_loop]` of each test that was asked for",
         "failures": "tests that failed, each behind its number",
         "abandoned": "numbers of tests that will not be flown",
+        "withdrawals": "flights that count no more: their experiments and failures are still in the lists above",
     },
     "pool": {
         "inputs": "how many inputs a program has",
