@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from lives import OTHER_GAINS, PENDULUM_GAINS, PLANT, by_hand, cut, new, plain
+from lives import OTHER_GAINS, PENDULUM_GAINS, PLANT, StopAt, by_hand, cut, new, plain
 from sameness import same
 
 
@@ -137,6 +137,26 @@ def test_what_is_learnt_later_begins_where_it_was_learnt_again():
     assert plain(campaign) == plain(other)
 
 
+@pytest.mark.parametrize("preset", ["default", "paper"])
+def test_learning_again_that_is_interrupted_anywhere_goes_on_with_the_same_bits(preset):
+    whole, test = begun(preset)
+    whole.tell(test, noisy(test, 3))
+    second = whole.ask()
+    whole.tell(second, noisy(second, 4))
+    whole.withdraw(0, "the first flight was that of another rig")
+    start = whole.to_record()
+    looks = []
+    whole.progress = looks.append
+    whole.ask()
+    for call in sorted({1, *range(4, len(looks), max(1, len(looks) // 6))}):
+        campaign = tl.Campaign.from_record(start, threads=1, progress=StopAt(call))
+        with pytest.raises(KeyboardInterrupt):
+            campaign.ask()
+        campaign = tl.Campaign.from_record(campaign.to_record(), threads=1)
+        campaign.ask()
+        assert plain(campaign) == plain(whole)
+
+
 def test_the_right_log_may_be_told_and_the_wrong_one_counts_as_no_second_flight():
     campaign, test = begun("default")
     campaign.tell(test, wrong(test))
@@ -152,6 +172,18 @@ def test_the_right_log_may_be_told_and_the_wrong_one_counts_as_no_second_flight(
     straight.tell(same_test, noisy(same_test, 5))
     assert campaign.experiments[-1].before == straight.experiments[-1].before
     asks_the_same(campaign, straight)
+
+
+def test_a_test_that_was_planned_with_a_withdrawn_flight_is_not_flown_again():
+    """Its risk is that of a wrong twin; the log of its flight may still be told."""
+    campaign, test = begun("default")
+    campaign.tell(test, noisy(test, 5))
+    campaign.withdraw(0, "the log of another rig")
+    assert campaign.status(test) == "flown"
+    campaign.withdraw(test, "that too")
+    assert campaign.status(test) == "abandoned" and campaign.waiting == ()
+    campaign.tell(test, noisy(test, 6))
+    assert campaign.status(test) == "flown"
 
 
 def test_a_failure_is_withdrawn_with_its_record():

@@ -307,7 +307,9 @@ class Logbook(Recorded, kind="logbook"):
         withdrawal = withdrawal_of(self, which, reason, known)
         self.withdrawals.append(withdrawal)
         self._recount()
-        self.abandoned += [test.number for test in self.waiting() if test.number in withdrawal.planned]
+        # Their risk was predicted by a twin that had learnt a withdrawn flight; this one's own test may be among them.
+        doubtful = {number for each in self.withdrawals for number in each.planned}
+        self.abandoned += [test.number for test in self.waiting() if test.number in doubtful]
         return withdrawal
 
     def _report(self, failure: Failure) -> None:

@@ -39,9 +39,8 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
         withdrawn = campaign.withdrawals[-1]
         given_up = [test.number for test in campaign.tests if _given_up(campaign, withdrawn, test.number)]
         told = len(campaign.experiments)
-        waits = withdrawn.test is not None and campaign.status(campaign.tests[withdrawn.test]) == "asked"
         facts = {"test": withdrawn.test, "reason": reason, "abandoned": given_up, "experiments": told}
-        answer(facts, _sentences(withdrawn, given_up, waits, told, shown_name(store)), as_json)
+        answer(facts, _sentences(withdrawn, given_up, told, shown_name(store)), as_json)
 
 
 def chosen(campaign: Campaign, which: str) -> int | Experiment:
@@ -91,15 +90,13 @@ def _names(attached: list[Experiment]) -> str:
     return ", ".join(runs)
 
 
-def _sentences(withdrawn: Withdrawal, given_up: list[int], waits: bool, told: int, store: str) -> str:
+def _sentences(withdrawn: Withdrawal, given_up: list[int], told: int, store: str) -> str:
     lines = [
         f"Saved: {named(withdrawn.test)} withdrawn; {told} experiment{'' if told == 1 else 's'} in {store}."
     ]
     if given_up:
         tests = f"Test{'s' if len(given_up) > 1 else ''} {', '.join(map(str, given_up))}"
         lines.append(f"{tests} abandoned: planned with it.")
-    if waits:
-        lines.append(
-            f"Test {withdrawn.test} waits for its log: twinloop tell {store} {withdrawn.test} FLIGHT.csv"
-        )
+    if withdrawn.test is not None:
+        lines.append(f"Its right log, if there is one: twinloop tell {store} {withdrawn.test} FLIGHT.csv")
     return "\n".join(lines)
