@@ -451,11 +451,14 @@ def replay(
     *,
     noise: ArrayLike | None = None,
     disturbance: ArrayLike | None = None,
+    anchors: ArrayLike | None = None,
     workers: Workers | None = None,
 ) -> Runs:
     """Free runs from a state (n_x,) under commands (n, n_u), without a controller: m of them.
 
-    noise (m, n + 1, n_x) is added to what is read, disturbance (m, n, n_x) to the true state after each step.
+    noise (m, n + 1, n_x) is added to what is read, disturbance (m, n, n_x) to the true state after each step. A run
+    goes on from its anchors (m, n + 1, n_x) where these are no NaN, and is read there; memories go on as they are, and
+    the true state that is kept is what the run came to before.
     """
 
 def rollout(

@@ -37,6 +37,8 @@ pub struct Influences<'a> {
     pub hold_back: Option<&'a HoldBack>,
     /// What is added to the true state after each step, n × n_x a run.
     pub disturbance: &'a [&'a [f64]],
+    /// True states from which a run goes on wherever one is given, (n + 1) × n_x a run; NaN where none is.
+    pub anchors: &'a [&'a [f64]],
 }
 
 impl<'a> Influences<'a> {
@@ -48,6 +50,7 @@ impl<'a> Influences<'a> {
             excitation: part(self.excitation),
             hold_back: self.hold_back,
             disturbance: part(self.disturbance),
+            anchors: part(self.anchors),
         }
     }
 }
@@ -86,7 +89,7 @@ pub fn record_one<D: Dynamics>(
 }
 
 /// Free runs from a state (n_x) under recorded commands (n × n_u, n at least 1), without a controller: as many as there
-/// are rows of noise or of disturbance, or one.
+/// are rows of noise, disturbance or anchors, or one. Of an anchored state, what is kept is what the run came to before.
 pub fn replay(
     dynamics: AnyDynamics<'_>,
     limits: &Limits,
@@ -95,7 +98,8 @@ pub fn replay(
     influences: Influences<'_>,
     width: Width,
 ) -> Vec<Trajectory> {
-    let count = influences.noise.len().max(influences.disturbance.len()).max(1);
+    let Influences { noise, disturbance, anchors, .. } = influences;
+    let count = noise.len().max(disturbance.len()).max(anchors.len()).max(1);
     let steps = commands.len() / limits.signals().commands();
     let (source, limits) = (Source::Record(commands), limits.magnitudes());
     let runs = groups(count).into_iter().flat_map(|group| {
@@ -189,7 +193,7 @@ impl<'a> Runs<'a> {
             noise: &pack::<V>(self.influences.noise),
             disturbance: &pack::<V>(self.influences.disturbance),
         };
-        recorded(&start, self.initial, read, self.count, fly)
+        recorded(&start, self.initial, read, self.count, self.influences.anchors, fly)
     }
 }
 
@@ -200,6 +204,7 @@ fn recorded<V: Vector>(
     initial: &[f64],
     read: Vec<f64>,
     count: usize,
+    anchors: &[&[f64]],
     fly: impl FnOnce(&Start<'_, V>, &mut Recorder<'_>) -> Vec<usize>,
 ) -> Vec<Trajectory> {
     let empty = || Trajectory {
@@ -210,7 +215,7 @@ fn recorded<V: Vector>(
         lasted: 0,
     };
     let mut runs: Vec<_> = (0..count).map(|_| empty()).collect();
-    let lasted = fly(start, &mut Recorder(&mut runs));
+    let lasted = fly(start, &mut Recorder { runs: &mut runs, anchors });
     for (l, run) in runs.iter_mut().enumerate() {
         let (states, seen) = (initial.len(), run.measured.len());
         for j in 0..states {
@@ -230,12 +235,32 @@ fn first_read<D: Dynamics>(dynamics: &D, initial: &[f64]) -> Vec<f64> {
 }
 
 /// Keeps every step of the lanes that a run is wanted of.
-struct Recorder<'a>(&'a mut [Trajectory]);
+struct Recorder<'a> {
+    runs: &'a mut [Trajectory],
+    /// Of each run, (n + 1) × n_x; NaN where it goes on as it is.
+    anchors: &'a [&'a [f64]],
+}
 
 impl<V: Vector> Watch<V> for Recorder<'_> {
     #[inline(always)]
+    fn correct(&mut self, at: usize, state: &mut [V]) {
+        if self.anchors.is_empty() {
+            return;
+        }
+        let (width, mut lanes) = (state.len(), [0.0; 64]);
+        for (i, value) in state.iter_mut().enumerate() {
+            value.store(&mut lanes);
+            for (lane, anchors) in lanes.iter_mut().zip(self.anchors) {
+                let anchor = anchors[at * width + i];
+                *lane = if anchor.is_nan() { *lane } else { anchor };
+            }
+            *value = V::load(&lanes);
+        }
+    }
+
+    #[inline(always)]
     fn see(&mut self, seen: Seen<'_, V>) {
-        let runs = &mut *self.0;
+        let runs = &mut *self.runs;
         let mut lanes = [0.0; 64];
         for value in seen.reading {
             value.store(&mut lanes);

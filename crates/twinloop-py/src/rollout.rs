@@ -122,7 +122,7 @@ pub fn rollout(
     let hold_back = hold_back.map(|found| &found.0);
     hold_back.map_or(Ok(()), |found| found.check(states)).map_err(crate::error::CoreError::from)?;
     let influences =
-        Influences { noise: &noise, excitation: &excitation, hold_back, disturbance: &disturbance };
+        Influences { noise: &noise, excitation: &excitation, hold_back, disturbance: &disturbance, anchors: &[] };
     let width = workers.width();
     let runs = if let Some(known) = known(dynamics, signals)? {
         flown(py, || record(known, setting, &parameters, task, influences, width))?
@@ -142,9 +142,10 @@ pub fn rollout(
     Ok(PyRuns { runs, steps, states, commands })
 }
 
-/// Free runs from a state under commands, each held for one period, without a controller.
+/// Free runs from a state under commands, each held for one period, without a controller; they go on from `anchors`
+/// where these are no NaN.
 #[pyfunction]
-#[pyo3(signature = (dynamics, limits, initial, commands, *, noise = None, disturbance = None, workers = None))]
+#[pyo3(signature = (dynamics, limits, initial, commands, *, noise = None, disturbance = None, anchors = None, workers = None))]
 #[expect(clippy::too_many_arguments, reason = "what a run needs, named by keyword in Python")]
 pub fn replay(
     py: Python<'_>,
@@ -154,6 +155,7 @@ pub fn replay(
     commands: Matrix<'_>,
     noise: Option<Cube<'_>>,
     disturbance: Option<Cube<'_>>,
+    anchors: Option<Cube<'_>>,
     workers: Option<&PyWorkers>,
 ) -> Result<PyRuns> {
     let width_of_lanes = or_default(workers)?.width();
@@ -162,10 +164,12 @@ pub fn replay(
     let (initial, commands) = (vector(&initial), rows("commands", &commands, width)?);
     let steps = commands.len();
     let known = known(dynamics, signals)?;
-    let runs = [&noise, &disturbance].into_iter().flatten().map(|draws| draws.as_array().shape()[0]).max();
+    let drawn = [&noise, &disturbance, &anchors];
+    let runs = drawn.into_iter().flatten().map(|draws| draws.as_array().shape()[0]).max();
     let count = runs.unwrap_or(1);
     let noise = optional_blocks("noise", noise, [count, steps + 1, states])?;
     let disturbance = optional_blocks("disturbance", disturbance, [count, steps, states])?;
+    let anchors = optional_blocks("anchors", anchors, [count, steps + 1, states])?;
     let drawn = noise.iter().chain(&disturbance).flatten();
     let numbers = initial.iter().chain(commands.iter().flatten()).chain(drawn);
     let fits = initial.len() == states && steps > 0 && numbers.copied().all(f64::is_finite);
@@ -177,9 +181,13 @@ pub fn replay(
         )));
     };
     let commands = commands.concat();
-    let (noise, disturbance) = (views(&noise), views(&disturbance));
-    let influences =
-        Influences { noise: &noise, excitation: &[], hold_back: None, disturbance: &disturbance };
+    let (noise, disturbance, anchors) = (views(&noise), views(&disturbance), views(&anchors));
+    let influences = Influences {
+        noise: &noise,
+        disturbance: &disturbance,
+        anchors: &anchors,
+        ..Influences::default()
+    };
     let fly = || twinloop_core::replay(dynamics, limits, &initial, &commands, influences, width_of_lanes);
     Ok(PyRuns { runs: py.detach(fly), steps, states, commands: width })
 }

@@ -17,6 +17,8 @@ class Replay:
         signals: of the system.
         initial_state: of the run (n_x,), SI units, radians.
         commands: at least one row (n, n_u), in their units, each held for a period and not clipped.
+        anchors: states from which a run begins again (n + 1, n_x), NaN where it goes on; None: it never does. They come
+            from readings, so what is drawn of the sensors' noise is added to them.
 
     Raises:
         InvalidInput: shapes that do not fit the signals, or numbers that are not finite.
@@ -25,6 +27,7 @@ class Replay:
     signals: Signals
     initial_state: Floats
     commands: Floats
+    anchors: Floats | None = None
 
     def __post_init__(self) -> None:
         state = floats("Replay.initial_state", self.initial_state, (self.signals.n_x,))

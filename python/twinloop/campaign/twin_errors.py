@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from twinloop import _core
 from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.replaying import free_errors
 from twinloop.law.accuracy import TestErrors
-from twinloop.objectives import closed_loop, normalised_error, open_loop
+from twinloop.objectives import open_loop
 
 
 def errors_of(model: _core.Model, book: Logbook, workers: _core.Workers) -> list[TestErrors]:
@@ -19,8 +20,8 @@ def errors_of(model: _core.Model, book: Logbook, workers: _core.Workers) -> list
     Returns:
         A row for each experiment, in the order of `tell`.
     """
-    steps, runs = (objective([model], book.selected, workers)[0] for objective in (open_loop, closed_loop))
+    steps, runs = open_loop([model], book.selected, workers)[0].tolist(), free_errors(model, book, workers)
     return [
-        TestErrors(run.number, step, free, normalised_error(free, run.frozen), run.before, free)
-        for run, step, free in zip(book.experiments, steps.tolist(), runs.tolist(), strict=True)
+        TestErrors(run.number, step, free.error, free.normalised, run.before, free.error)
+        for run, step, free in zip(book.experiments, steps, runs, strict=True)
     ]

@@ -78,16 +78,29 @@ def drawn_runs(
                     "Replay: expected a model or plant of the engine, found a function; fly a test."
                 )
             return _core.replay(
-                dynamics, limits.engine, test.initial_state, test.commands,
-                noise=noise, disturbance=disturbance, workers=workers,
+                dynamics, limits.engine, test.initial_state, test.commands, noise=noise, disturbance=disturbance,
+                anchors=_anchored(test, noise, disturbance), workers=workers,
             )  # fmt: skip
-        count = next((len(draws) for draws in (noise, disturbance) if draws is not None), 1)
+        count = _count(noise, disturbance)
         excitation = None if test.excitation is None else np.tile(test.excitation, (count, 1, 1))
         return _core.rollout(
             dynamics, limits.setting(test.family), np.tile(test.genes, (count, 1)), test.task,
             noise=noise, excitation=excitation, disturbance=disturbance, workers=workers,
             hold_back=None if test.hold_back is None else test.hold_back.engine,
         )  # fmt: skip
+
+
+def _count(*draws: Floats | None) -> int:
+    """Number of runs."""
+    return next((len(drawn) for drawn in draws if drawn is not None), 1)
+
+
+def _anchored(test: Replay, noise: Floats | None, disturbance: Floats | None) -> Floats | None:
+    """Where each run begins again (m, n + 1, n_x)."""
+    if test.anchors is None:
+        return None
+    seen = 0.0 if noise is None else noise
+    return np.tile(test.anchors, (_count(noise, disturbance), 1, 1)) + seen
 
 
 def _trajectory(runs: _core.Runs, steps: int, limits: Limits) -> Trajectory:

@@ -29,6 +29,7 @@ from twinloop.law.law import Law
 from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import Noise
+from twinloop.law.pieces import in_pieces, judged_length, left
 from twinloop.law.uncertainty import DRAWS, NINE_OF_TEN, committee_runs, spread_of
 from twinloop.records import Recorded, checked_record, from_text, read
 from twinloop.remarks import Remark, warn
@@ -36,8 +37,6 @@ from twinloop.signals import Signals
 from twinloop.test import Test, check_signals
 from twinloop.trajectory import Trajectory, check_recorded, continued
 
-WRONG = 0.5
-"""Share of the error of the model that never moves above which a flight is not followed."""
 STARTS = 5.0
 """Standard deviations of a sensor by which a flight's first reading may be off the state that its test asks for."""
 
@@ -149,7 +148,7 @@ class Twin(Shown, Recorded, kind="twin"):
         lost = 0
         for row in self.errors:
             frozen = row.closed_loop / row.normalised if row.normalised > 0.0 else math.inf
-            lost += not row.closed_loop - noise <= WRONG * max(frozen - noise, 2.0 * noise)
+            lost += left(row.closed_loop, frozen, noise)
         return 2 * lost <= len(self.errors)
 
     def export(
@@ -263,11 +262,12 @@ class Twin(Shown, Recorded, kind="twin"):
 
         Returns:
             The test; a state starts at its first reading if this is further from the test's start than sensor noise
-            explains.
+            explains. Recorded commands are flown in the pieces of `piece_of`, each from its own first reading.
         """
         begun = self.began(flown)
         if isinstance(test, Replay):
-            return dataclasses.replace(test, initial_state=begun)
+            whole = dataclasses.replace(test, initial_state=begun)
+            return in_pieces(whole, self.model, flown.states, self.piece_of(flown))
         explained = np.zeros_like(begun) if self.noise is None else STARTS * self.noise.sensors
         off = np.abs(self.signals.difference(begun, test.initial_state)) > explained
         return dataclasses.replace(test, initial_state=np.where(off, begun, test.initial_state))
@@ -449,8 +449,29 @@ class Twin(Shown, Recorded, kind="twin"):
         warn(far_beyond(self.flown, run, self.signals), stacklevel=2)
         return run if len(u) else Trajectory(np.zeros(1), run.states[:1], u, true_states=state[np.newaxis])
 
+    def piece_of(self, trajectory: Trajectory) -> int:
+        """Steps for which the twin is held against a record under its commands before it begins again at a reading.
+
+        All of them, unless the free run leaves the record and the system is unstable without its controller by the twin
+        itself: then as many as a right model could be followed.
+
+        Args:
+            trajectory: of the same signals, with at least one step.
+
+        Returns:
+            Steps, from 1 to all of the record.
+
+        Raises:
+            InvalidInput: other columns, or no step.
+        """
+        recorded = check_recorded(trajectory, self.limits, None, least=1)
+        sensors = np.zeros(self.signals.n_x) if self.noise is None else self.noise.sensors
+        return judged_length(self.model, recorded, sensors, self.limits)
+
     def fit(self, trajectory: Trajectory) -> FitTable:
         """How well the twin's free run under the recorded commands, from the first reading, follows a record.
+
+        On a system that is unstable without its controller it begins again at a reading after each `piece_of`.
 
         Args:
             trajectory: of the same signals, with at least one step.
@@ -462,7 +483,8 @@ class Twin(Shown, Recorded, kind="twin"):
             InvalidInput: other columns, or no step.
         """
         recorded = check_recorded(trajectory, self.limits, None, least=1)
-        sent = Replay(self.signals, self.began(recorded), recorded.commands)
+        whole = Replay(self.signals, self.began(recorded), recorded.commands)
+        sent = in_pieces(whole, self.model, recorded.states, self.piece_of(recorded))
         free = fly(self.model, sent, limits=self.limits).states
         read = continued(recorded, self.signals, recorded.states[0]).states[1:]
         return fit_table(self.signals, read, free[1:] if len(free) > len(read) else None)

@@ -204,7 +204,18 @@ def test_readings_of_nothing_but_noise_are_a_serious_remark():
 def test_what_no_controller_corrects_is_held_against_no_effect_alone():
     (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, False, STEPS, without_test=True)
     assert remark.code == "does-not-follow" and remark.serious
-    assert "unstable without its controller" in remark.sentence and "backlash" not in remark.sentence
+    assert "a right model of its stability" in remark.sentence and "backlash" not in remark.sentence
+
+
+def test_flights_that_were_followed_in_pieces_are_named():
+    runs, whole = [flown(), flown(1)], flown().trajectory.steps
+    (remark,) = diagnostics_of(runs, SIGNALS, True, STEPS, pieces=[whole, whole // 2])
+    assert (
+        remark.code == "in-pieces"
+        and not remark.serious
+        and "1 of the runs without a test was" in remark.sentence
+    )
+    assert diagnostics_of(runs, SIGNALS, True, STEPS, pieces=[whole, whole]) == []
 
 
 def test_a_bias_that_outgrows_a_fast_swing_is_no_contradiction_and_a_small_swing_is_enough_for_a_unit():

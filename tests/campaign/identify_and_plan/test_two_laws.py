@@ -68,7 +68,9 @@ def identified_as(name, actuator=AT_ONCE, remarks=(ROUGH,)):
 def answer(free, frozen=1.0, follows=True, name="a"):
     """Of one member with such free runs."""
     rows = np.atleast_2d(free)
-    followed = Following(rows, np.ones_like(rows), np.full(rows.shape[1], frozen))
+    followed = Following(
+        rows, np.ones_like(rows), np.full(rows.shape[1], frozen), np.ones(rows.shape[1], dtype=int)
+    )
     return Answer(identified_as(name), followed, follows, {}, (), True)
 
 

@@ -77,7 +77,7 @@ proptest! {
         let (noise, excitation, disturbance) = (slices(&noise), slices(&excitation), slices(&disturbance));
         let hold_back = HoldBack::new(&[(-0.2, 0.2); 3], &[(-0.6, 0.9); 3]).unwrap();
         let hold_back = Some(&hold_back);
-        let influences = Influences { noise: &noise, excitation: &excitation, hold_back, disturbance: &disturbance };
+        let influences = Influences { noise: &noise, excitation: &excitation, hold_back, disturbance: &disturbance, anchors: &[] };
         let runs = |width| record(model.into(), &setting, &slices(&gains), &task, influences, width);
         let equal = |a: &[Trajectory], b: &[Trajectory]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same_run(a, b))

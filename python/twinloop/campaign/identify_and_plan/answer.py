@@ -22,6 +22,7 @@ from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.settings import IdentificationOptions
+from twinloop.law.pieces import left
 
 FEWEST = 4
 """Members of a committee that are kept in any case."""
@@ -147,7 +148,7 @@ def _lost(
     scales = np.array([state.scale for state in setup.signals.states])
     noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
     free, frozen = followed.free[0], followed.frozen
-    lost = free - noise > WRONG * np.maximum(frozen - noise, 2.0 * noise)
+    lost = np.array([left(*row, noise) for row in zip(free.tolist(), frozen.tolist(), strict=True)])
     numbers: list[int] = np.flatnonzero(lost).tolist()
     pulsed = in_pulses([flights[j] for j in numbers])
     again = [j for j in numbers if flights[j].number in pulsed]

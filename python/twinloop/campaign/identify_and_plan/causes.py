@@ -31,11 +31,11 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.exactness import driven, may_be_inexactness, shows
-from twinloop.campaign.identify_and_plan.following import cut, start_of
 from twinloop.campaign.identify_and_plan.foretold import features_of, foretold, in_scales
 from twinloop.campaign.identify_and_plan.likeness import Likeness, in_pieces
 from twinloop.campaign.identify_and_plan.neighbours import alike_nearby
 from twinloop.campaign.identify_and_plan.selection import distinct
+from twinloop.campaign.replaying import cut, start_of
 from twinloop.errors import engine_input
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run

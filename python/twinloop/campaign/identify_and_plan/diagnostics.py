@@ -40,6 +40,7 @@ def diagnostics_of(
     recurring: Sequence[str] = (),
     unmoved: Sequence[str] = (),
     without_test: bool = False,
+    pieces: Sequence[int] = (),
 ) -> list[Remark]:
     """What speaks against the data or the twin.
 
@@ -53,6 +54,7 @@ def diagnostics_of(
         recurring: states whose disturbance comes again in flight after flight.
         unmoved: states that move though their equations say that nothing moves them.
         without_test: whether the flights that it does not follow are all without a test, replayed without a controller.
+        pieces: steps of those in which each experiment is followed; empty: all in whole.
 
     Returns:
         Remarks, none where nothing does.
@@ -64,6 +66,7 @@ def diagnostics_of(
         *from_other_controllers(others),
         *_unmoved(unmoved),
     ]
+    said += _in_pieces(experiments, pieces, signals.dt)
     if not follows:
         said += _does_not_follow(any(remark.serious for remark in said), without_test)
     elif misses:
@@ -103,9 +106,9 @@ def _does_not_follow(explained: bool, without_test: bool) -> Iterator[Remark]:
     elif without_test:
         cause = (
             "those that it leaves have no test, so their recorded commands are replayed and no controller corrects the"
-            " twin. If the system is unstable without its controller, every model leaves them, however right it is:"
-            " begin a campaign without these logs, and let tests be flown. Otherwise there is an effect that no term"
-            " describes"
+            " twin. It leaves them even as far as a right model of its stability could be followed. There is an effect"
+            " that no term describes, or the logs show too little motion beside the sensors' noise: log larger"
+            " motions, or begin a campaign without these logs"
         )
     else:
         cause = (
@@ -116,6 +119,23 @@ def _does_not_follow(explained: bool, without_test: bool) -> Iterator[Remark]:
         "does-not-follow",
         f"In free run the twin does not follow the runs that it was learnt from: {cause}.",
     )
+
+
+def _in_pieces(experiments: Sequence[Experiment], pieces: Sequence[int], dt: float) -> Iterator[Remark]:
+    """That flights without a test were followed in pieces, and in which."""
+    short = [
+        length
+        for run, length in zip(experiments, pieces, strict=bool(pieces))
+        if length < run.trajectory.steps
+    ]
+    if short:
+        least, most = (f"{length * dt:.2g}" for length in (min(short), max(short)))
+        yield note(
+            "in-pieces",
+            f"{len(short)} of the runs without a test {'was' if len(short) == 1 else 'were'} followed in pieces of"
+            f" {least if least == most else f'{least} to {most}'} s, each begun at its own reading: without its"
+            " controller the system is unstable, so no model could be followed for longer under recorded commands.",
+        )
 
 
 def _model_error(states: Sequence[str]) -> Iterator[Remark]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,10 +10,11 @@ import numpy as np
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
-from twinloop._ground.arrays import Floats
+from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
-from twinloop.errors import engine_input
+from twinloop.campaign.replaying import as_flown, lengths_of, start_of
 from twinloop.law.flight import drawn_runs
+from twinloop.law.pieces import held
 from twinloop.test import Test
 
 PIECES = 5
@@ -28,12 +28,15 @@ class Following:
     Args:
         free: mean squares over steps and states, in units of the states' scales (m, N); infinite where a run diverges.
         lasted: share of each flight that a run lasts (m, N).
-        frozen: mean squares of the model that never moves (N,).
+        frozen: mean squares of the model that never moves (N,), from where each piece begins.
+        lengths: steps of the pieces in which each flight is followed (N,); all of them, but for flights without a
+            controller that no model can follow in whole.
     """
 
     free: Floats
     lasted: Floats
     frozen: Floats
+    lengths: Integers
 
     def order(self) -> list[int]:
         """Models, the one that goes wrong least on its worst flight first; of the diverging, what lasts longest."""
@@ -61,8 +64,11 @@ def following(
 ) -> Following:
     """Flies each model as the system was flown, from where each flight began to where its record ends.
 
+    A flight without its controller is followed in pieces where the first model cannot be expected to follow it whole;
+    all models in the same pieces.
+
     Args:
-        models: m of them.
+        models: m of them, the first one to be judged.
         flights: N of them, at least one.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
@@ -72,15 +78,16 @@ def following(
     """
     free, lasted = np.empty((2, len(models), len(flights)))
     frozen = np.empty(len(flights))
+    lengths = lengths_of(models[0], flights, limits, workers)
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
-        frozen[j] = squares(states[1:], states[0], limits).mean()
+        frozen[j] = squares(states[1:], held(states, lengths[j]), limits).mean()
         for i, model in enumerate(models):
-            flown = cut(flight.replayed, start_of(model, states[0]), steps)
+            flown = as_flown(model, flight, lengths[j])
             missed, length = missed_by(model, flown, states[1:], limits, workers)
             lasted[i, j] = length / steps
             free[i, j] = missed.mean() if length == steps else np.inf
-    return Following(free, lasted, frozen)
+    return Following(free, lasted, frozen, lengths)
 
 
 def in_pieces(
@@ -149,21 +156,3 @@ def squares(states: Floats, others: Floats, limits: Limits) -> Floats:
     """Squares of differences between states, in units of their scales (…, n_x)."""
     scales = np.array([state.scale for state in limits.signals.states])
     return np.asarray(np.square(limits.signals.difference(states, others) / scales))
-
-
-def start_of(model: _core.Model, reading: Floats) -> Floats:
-    """The state of a model that is read so (n_x,)."""
-    with engine_input():
-        start: Floats = model.states_of(reading[np.newaxis])[0]
-    return start
-
-
-def cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:
-    """The first steps of what was flown, from a state."""
-    if isinstance(test, Replay):
-        return dataclasses.replace(test, initial_state=start, commands=test.commands[:steps])
-    target = test.target_state if test.target_state.ndim == 1 else test.target_state[: steps + 1]
-    excitation = None if test.excitation is None else test.excitation[:steps]
-    return dataclasses.replace(
-        test, initial_state=start, target_state=target, steps=steps, excitation=excitation
-    )

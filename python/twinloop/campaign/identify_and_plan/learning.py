@@ -22,12 +22,12 @@ from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
 from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
+from twinloop.campaign.replaying import free_errors
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.terms.directions import Direction, of_mixer
-from twinloop.objectives import closed_loop, normalised_error
 from twinloop.remarks import Remark, note, serious
 
 PLAIN = 1_000_000
@@ -172,14 +172,16 @@ class Learner:
 
     def _lesson(self, answer: Answer, book: Logbook) -> Lesson:
         identified, follows = answer.identified, answer.follows
-        free = closed_loop(identified.members[:1], book.selected, self.workers)[0].tolist()
+        free = free_errors(identified.members[0], book, self.workers)
         names = self.setup.signals.state_names
         recurring, undecided = (
             tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
             for kind in ("law", "undecided")
         )
         lost = [
-            run for run, error in zip(book.experiments, free, strict=True) if not error <= WRONG * run.frozen
+            run
+            for run, found in zip(book.experiments, free, strict=True)
+            if not found.error <= WRONG * found.frozen
         ]
         misses = answer.misses(book.experiments, self.setup, self.workers)
         explained = follows and not misses and not is_rough(identified)
@@ -198,10 +200,8 @@ class Learner:
             delays=tuple(actuator.delay for actuator in actuators),
             hidden=identified.actuation.hidden,
             offsets=tuple(identified.offsets.tolist()),
-            closed_loop=tuple(free),
-            normalised=tuple(
-                normalised_error(error, run.frozen) for error, run in zip(free, book.experiments, strict=True)
-            ),
+            closed_loop=tuple(found.error for found in free),
+            normalised=tuple(found.normalised for found in free),
             follows=follows,
             remarks=(
                 *identified.remarks,
@@ -217,6 +217,7 @@ class Learner:
                     recurring,
                     [names[state] for state in answer.unmoved],
                     without_test=bool(lost) and all(run.test is None for run in lost),
+                    pieces=[found.length for found in free],
                 ),
             ),
             recurring=recurring,

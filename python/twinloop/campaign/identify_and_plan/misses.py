@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop._experiment.limits import Limits
-from twinloop._ground.arrays import Floats
+from twinloop._ground.arrays import Floats, Integers
 from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Cause, Experiment
-from twinloop.campaign.identify_and_plan.following import Following, cut, missed_by, squares, start_of
+from twinloop.campaign.identify_and_plan.following import Following, missed_by, squares
 from twinloop.campaign.identify_and_plan.sent import in_pulses
+from twinloop.campaign.replaying import as_flown, lengths_of
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
+from twinloop.law.pieces import held
 
 DRAWS = 8
 """Of noise and disturbances, by which it is said how far these take a flight."""
@@ -74,12 +76,13 @@ def misses_of(
         limits: where a run counts as diverged.
         workers: how the work is carried out.
     """
-    off, frozen = _off(model, flights, limits, workers)
+    lengths = lengths_of(model, flights, limits, workers)
+    off, frozen = _off(model, lengths, flights, limits, workers)
     steered = np.array([[run.test is not None] for run in flights])
 
     def beyond(part: int, *causes_out: Cause) -> Floats:
         known = noise.without(_caused(causes, *causes_out))
-        expected = expected_misses(model, flights, known, unit.part(part), limits, workers)
+        expected = expected_misses(model, lengths, flights, known, unit.part(part), limits, workers)
         return unexplained(off, frozen, expected, steered)
 
     missed = beyond(0, "law", "undecided")
@@ -123,7 +126,8 @@ def misses_any(
         limits: where a run counts as diverged.
         workers: how the work is carried out.
     """
-    expected = expected_misses(model, flights, noise.without(_caused(causes, "law")), unit, limits, workers)
+    known = noise.without(_caused(causes, "law"))
+    expected = expected_misses(model, followed.lengths, flights, known, unit, limits, workers)
     steered = np.array([run.test is not None for run in flights])
     missed = unexplained(followed.free[0], followed.frozen, expected.mean(axis=1), steered)
     off = [run for run, times in zip(flights, missed, strict=True) if times]
@@ -132,6 +136,7 @@ def misses_any(
 
 def expected_misses(
     model: _core.Model,
+    lengths: Integers,
     flights: Sequence[Experiment],
     noise: Noise,
     unit: Unit,
@@ -142,6 +147,7 @@ def expected_misses(
 
     Args:
         model: that is flown.
+        lengths: steps of the pieces in which each flight is followed (N,).
         flights: N of them, at least one.
         noise: of the sensors, and disturbances.
         unit: of which the draws are a part.
@@ -158,7 +164,7 @@ def expected_misses(
         seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
         runs = drawn_runs(
             model,
-            cut(flight.replayed, start_of(model, flight.trajectory.states[0]), steps),
+            as_flown(model, flight, lengths[j]),
             limits,
             noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
             disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
@@ -197,14 +203,18 @@ def _caused(causes: Mapping[int, Cause], *by: Cause) -> list[int]:
 
 
 def _off(
-    model: _core.Model, flights: Sequence[Experiment], limits: Limits, workers: _core.Workers
+    model: _core.Model,
+    lengths: Integers,
+    flights: Sequence[Experiment],
+    limits: Limits,
+    workers: _core.Workers,
 ) -> tuple[Floats, Floats]:
     """Mean squares of each state's free run, infinite where that diverges, and of the one that never moves (N, n_x)."""
     off, frozen = np.empty((2, len(flights), limits.signals.n_x))
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
-        flown = cut(flight.replayed, start_of(model, states[0]), steps)
+        flown = as_flown(model, flight, lengths[j])
         missed, lasted = missed_by(model, flown, states[1:], limits, workers)
         off[j] = missed.mean(axis=0) if lasted == steps else np.inf
-        frozen[j] = squares(states[1:], states[0], limits).mean(axis=0)
+        frozen[j] = squares(states[1:], held(states, lengths[j]), limits).mean(axis=0)
     return off, frozen

@@ -1,0 +1,131 @@
+"""Replaying: models held against flights that were made, those without a controller in pieces where they must be."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinloop import _core
+from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats, Integers
+from twinloop.campaign.history import Experiment
+from twinloop.campaign.logbook import Logbook
+from twinloop.errors import engine_input
+from twinloop.identification.records import Run, guessed_noise
+from twinloop.law.flight import drawn_runs
+from twinloop.law.pieces import held, in_pieces, judged_length
+from twinloop.objectives import closed_loop, normalised_error
+from twinloop.test import Test
+
+
+@dataclass(frozen=True)
+class FreeError:
+    """What a free run of a model is off from a flight.
+
+    Args:
+        error: mean square over steps and components, SI units; infinite where it diverges.
+        frozen: of the model that never moves, from where each piece begins.
+        length: steps of a piece; all steps of the flight where it is followed in whole.
+    """
+
+    error: float
+    frozen: float
+    length: int
+
+    @property
+    def normalised(self) -> float:
+        """Error over that of the model that never moves."""
+        return normalised_error(self.error, self.frozen)
+
+
+def free_errors(model: _core.Model, book: Logbook, workers: _core.Workers) -> list[FreeError]:
+    """What the free runs of a model are off from each flight.
+
+    Args:
+        model: to be judged.
+        book: with the flights.
+        workers: how the work is carried out.
+    """
+    whole = closed_loop([model], book.selected, workers)[0].tolist()
+    limits = book.setup.limits
+    found = []
+    for run, error in zip(book.experiments, whole, strict=True):
+        flown, length = run.trajectory, length_of(model, run, limits, workers)
+        if length == flown.steps:
+            found.append(FreeError(error, run.frozen, length))
+            continue
+        runs = drawn_runs(model, as_flown(model, run, length), limits, workers=workers)
+        lasted = int(runs.lasted[0]) == flown.steps
+        off, still = (
+            float(np.square(limits.signals.difference(flown.states[1:], states)).mean())
+            for states in (np.asarray(runs.read[0])[1:], held(flown.states, length))
+        )
+        found.append(FreeError(off if lasted else np.inf, still, length))
+    return found
+
+
+def lengths_of(
+    model: _core.Model, flights: Sequence[Experiment], limits: Limits, workers: _core.Workers
+) -> Integers:
+    """Steps of the pieces in which a model is held against flights (N,).
+
+    Args:
+        model: to be judged.
+        flights: N of them.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    return np.array([length_of(model, flight, limits, workers) for flight in flights], dtype=np.int64)
+
+
+def length_of(model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers) -> int:
+    """Steps of the pieces in which a model is held against a flight: all, if its controller flies in the free run too.
+
+    Args:
+        model: to be judged.
+        flight: that was made.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    flown = flight.trajectory
+    if flight.test is not None:
+        return flown.steps
+    scales = np.array([state.scale for state in limits.signals.states])
+    noise = guessed_noise([Run.of(flown.states, flown.commands).continued(limits.signals)], scales)
+    return judged_length(model, flown, np.sqrt(noise), limits, workers)
+
+
+def as_flown(model: _core.Model, flight: Experiment, length: int) -> Test | Replay:
+    """What a model flies to be held against a flight.
+
+    Args:
+        model: that is flown.
+        flight: that was made.
+        length: steps of the pieces in which it is followed.
+    """
+    states = flight.trajectory.states
+    flown = cut(flight.replayed, start_of(model, states[0]), flight.trajectory.steps)
+    return in_pieces(flown, model, states, length) if isinstance(flown, Replay) else flown
+
+
+def start_of(model: _core.Model, reading: Floats) -> Floats:
+    """The state of a model that is read so (n_x,)."""
+    with engine_input():
+        start: Floats = model.states_of(reading[np.newaxis])[0]
+    return start
+
+
+def cut(test: Test | Replay, start: Floats, steps: int) -> Test | Replay:
+    """The first steps of what was flown, from a state."""
+    if isinstance(test, Replay):
+        anchors = None if test.anchors is None else test.anchors[: steps + 1]
+        return dataclasses.replace(test, initial_state=start, commands=test.commands[:steps], anchors=anchors)
+    target = test.target_state if test.target_state.ndim == 1 else test.target_state[: steps + 1]
+    excitation = None if test.excitation is None else test.excitation[:steps]
+    return dataclasses.replace(
+        test, initial_state=start, target_state=target, steps=steps, excitation=excitation
+    )

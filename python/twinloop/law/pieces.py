@@ -1,0 +1,187 @@
+"""Pieces: how far a flight can be followed without its controller, however right a model is.
+
+Nothing corrects a replay of recorded commands. On a system that is unstable by itself it leaves the flight, whatever
+the model: what the first reading is off grows along the record. So such a flight is judged in pieces, each begun at its
+own reading, while the memory of lags, delays and hidden states goes on. A piece is as long as possible, so long as a
+deviation of the size of the sensor's noise, grown by the model's own slopes along the record, stays small beside what
+the system itself moves in a piece. A model that grows it faster than the system moves has no such length, and follows
+nothing: shorter pieces would make no model right.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from twinloop import _core
+from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
+from twinloop._ground.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.law.flight import drawn_runs
+from twinloop.trajectory import Trajectory, continued
+
+WRONG = 0.5
+"""Share of the error of the model that never moves above which a flight is not followed."""
+SHARE = 0.05
+"""Of how far a state moves: by so much a right model is taken to be off from where a piece begins, if noise is less."""
+SMALL = 0.25
+"""Of what the system moves in a piece, mean squares, that such a deviation may have grown to."""
+LARGE = 100.0
+"""Mean square of a deviation, in units of how far states move, after which it is followed no further."""
+LEAST = 10
+"""Steps of a piece: one that foresees less foresees nothing."""
+STARTS = 64
+"""Readings, spread over the flight, from which the growth is followed."""
+
+
+def left(free: float, frozen: float, noise: float) -> bool:
+    """Whether a free run does not follow its flight.
+
+    Args:
+        free: its mean square error; infinite where it diverges.
+        frozen: that of the model that never moves.
+        noise: of the sensors, in the same unit.
+    """
+    return not free - noise <= WRONG * max(frozen - noise, 2.0 * noise)
+
+
+def in_pieces(replay: Replay, model: _core.Model, readings: Floats, length: int) -> Replay:
+    """A replay that begins again at the reading of each piece.
+
+    Args:
+        replay: of a flight (n steps).
+        model: that is to fly it.
+        readings: of the flight (n + 1, n_x).
+        length: steps of a piece.
+    """
+    if length >= replay.steps:
+        return replay
+    anchors = np.full((replay.steps + 1, readings.shape[1]), np.nan)
+    with engine_input():
+        anchors[:-1:length] = model.states_of(np.ascontiguousarray(readings[:-1:length]))
+    return dataclasses.replace(replay, anchors=anchors)
+
+
+def held(readings: Floats, length: int) -> Floats:
+    """What the model that never moves makes of readings after the first, held from where a piece begins (n, n_x)."""
+    return np.repeat(readings[:-1:length], length, axis=0)[: len(readings) - 1]
+
+
+def judged_length(
+    model: _core.Model,
+    flight: Trajectory,
+    sensors: Floats,
+    limits: Limits,
+    workers: _core.Workers | None = None,
+) -> int:
+    """Steps of the pieces in which a model is held against a flight without its controller.
+
+    Args:
+        model: to be judged.
+        flight: of at least one step.
+        sensors: standard deviations of their noise (n_x,).
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+
+    Returns:
+        All steps, if a free run follows the whole flight, or could be expected to, or if there is no useful length at
+        which the model could be followed.
+    """
+    signals = limits.signals
+    scales = np.array([state.scale for state in signals.states])
+    readings = continued(flight, signals, flight.states[0]).states
+    with engine_input():
+        start = model.states_of(readings[:1])[0]
+    whole = Replay(signals, start, flight.commands)
+    runs = drawn_runs(model, whole, limits, workers=workers)
+    free, frozen = (
+        float(np.square(signals.difference(readings[1:], states) / scales).mean())
+        for states in (np.asarray(runs.read[0])[1:], readings[0])
+    )
+    if int(runs.lasted[0]) < flight.steps:
+        free = np.inf
+    if not left(free, frozen, float(np.square(sensors / scales).mean())):
+        return flight.steps
+    length = followed_length(model, whole, readings, sensors, limits, workers)
+    return flight.steps if length < LEAST else -(-flight.steps // -(-flight.steps // length))
+
+
+def followed_length(
+    model: _core.Model,
+    whole: Replay,
+    readings: Floats,
+    sensors: Floats,
+    limits: Limits,
+    workers: _core.Workers | None = None,
+) -> int:
+    """Most steps of a piece at which a deviation of the sensors' size stays small beside what the system moves in it.
+
+    Args:
+        model: whose slopes let it grow.
+        whole: replay of the flight (n steps).
+        readings: of the flight (n + 1, n_x), periodic states continued.
+        sensors: standard deviations of their noise (n_x,).
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+
+    Returns:
+        Steps, at most n; 0: none.
+    """
+    scales = np.array([state.scale for state in limits.signals.states])
+    moves = np.maximum(readings.std(axis=0), np.maximum(sensors, 1e-9 * scales))
+    off = np.maximum(sensors, SHARE * moves)
+    slopes = _slopes(model, whole, readings, off, limits, workers)
+    if slopes is None:
+        return 0
+    slopes = slopes * moves / moves[:, np.newaxis]
+    starts = np.unique(np.linspace(0, len(slopes) - 1, STARTS).astype(int))
+    spread = np.tile(np.diag(np.square(off / moves)), (len(starts), 1, 1))
+    unseen = 2.0 * np.square(sensors / moves)
+    grown = moved = 0.0
+    length = 0
+    for step in range(1, len(slopes) + 1):
+        going = starts + step <= len(slopes)
+        starts, spread = starts[going], spread[going]
+        spread = _moved_on(slopes[starts + step - 1], spread)
+        now = np.trace(spread, axis1=1, axis2=2) / len(moves)
+        if not now.mean() < LARGE:
+            break
+        went = np.square((readings[starts + step] - readings[starts]) / moves) - unseen
+        grown, moved = grown + float(now.mean()), moved + float(went.mean())
+        if grown <= SMALL * moved:
+            length = step
+    return length
+
+
+def _moved_on(slopes: Floats, spread: Floats) -> Floats:
+    """Covariances (starts, n_x, n_x) a period later: S C Sᵀ, summed in a fixed order."""
+    half = (slopes[:, :, :, np.newaxis] * spread[:, np.newaxis, :, :]).sum(axis=2)
+    onward: Floats = (half[:, :, np.newaxis, :] * slopes[:, np.newaxis, :, :]).sum(axis=3)
+    return onward
+
+
+def _slopes(
+    model: _core.Model,
+    whole: Replay,
+    readings: Floats,
+    off: Floats,
+    limits: Limits,
+    workers: _core.Workers | None,
+) -> Floats | None:
+    """Slopes of each step along the record (n, n_x, n_x), over deviations (n_x,); None where a step is not finite."""
+    n_x = readings.shape[1]
+    with engine_input():
+        states = model.states_of(readings)
+    begun = np.concatenate([states[np.newaxis], states + np.diag(off)[:, np.newaxis, :]])
+    begun[:, -1] = np.nan  # where the last step ends nothing begins
+    with engine_input():
+        runs = _core.replay(
+            model, limits.engine, whole.initial_state, whole.commands, anchors=begun, workers=workers
+        )
+    if int(np.min(runs.lasted)) < whole.steps:
+        return None
+    ends = np.asarray(runs.states)[:, 1:]
+    slopes = limits.signals.difference(ends[1:], ends[0]) / off.reshape(n_x, 1, 1)
+    return np.ascontiguousarray(np.moveaxis(slopes, 0, 2))
