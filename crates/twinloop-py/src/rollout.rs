@@ -121,8 +121,13 @@ pub fn rollout(
     let (excitation, disturbance) = (views(&excitation), views(&disturbance));
     let hold_back = hold_back.map(|found| &found.0);
     hold_back.map_or(Ok(()), |found| found.check(states)).map_err(crate::error::CoreError::from)?;
-    let influences =
-        Influences { noise: &noise, excitation: &excitation, hold_back, disturbance: &disturbance, anchors: &[] };
+    let influences = Influences {
+        noise: &noise,
+        excitation: &excitation,
+        hold_back,
+        disturbance: &disturbance,
+        anchors: &[],
+    };
     let width = workers.width();
     let runs = if let Some(known) = known(dynamics, signals)? {
         flown(py, || record(known, setting, &parameters, task, influences, width))?
@@ -182,12 +187,8 @@ pub fn replay(
     };
     let commands = commands.concat();
     let (noise, disturbance, anchors) = (views(&noise), views(&disturbance), views(&anchors));
-    let influences = Influences {
-        noise: &noise,
-        disturbance: &disturbance,
-        anchors: &anchors,
-        ..Influences::default()
-    };
+    let influences =
+        Influences { noise: &noise, disturbance: &disturbance, anchors: &anchors, ..Influences::default() };
     let fly = || twinloop_core::replay(dynamics, limits, &initial, &commands, influences, width_of_lanes);
     Ok(PyRuns { runs: py.detach(fly), steps, states, commands: width })
 }
