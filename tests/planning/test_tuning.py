@@ -423,28 +423,6 @@ def test_a_gust_that_is_predicted_is_that_of_a_kalman_filter():
     assert np.corrcoef(gusts[:, 0], gust[:121])[0, 1] > 0.5
 
 
-def test_a_gust_moves_all_states_that_a_law_makes_of_what_it_drives():
-    """angle' = rate, by a law and not as it is declared; rate' = -4 rate + g under a gust g that stays."""
-    signals = _core.Signals(DT, [5.0, 5.0], [(-3.0, 3.0)], [1.0], [None, None])
-    page = ["r3 = r1 * 1.0", "r4 = r1 * -4.0", "r4 = r4 + r2"]
-    model = _core.Model(_core.Program.parse(program_text(3, 2, 5, [page])), "acceleration", signals)
-    limits = _core.Limits(signals, 10.0)
-    times, gust, damping = DT * np.arange(81), 2.0, 4.0
-    rate = gust / damping * (1.0 - np.exp(-damping * times))
-    readings = np.column_stack([gust / damping * times - rate / damping, rate])
-    disturbed = 1e-2
-    chains = [
-        ([0], [SENSOR], (disturbed, 0.0, 1.0), "acceleration"),
-        ([1], [SENSOR], (1e-8, 4.0, 1e3), "acceleration"),
-    ]
-    record = (readings, np.ones((81, 2)), np.zeros((80, 1)))
-    [(errors, _, gusts)] = _core.predictions(model, limits, chains, [record])
-    assert gusts[-1, 1] == pytest.approx(gust, rel=0.02)
-    # A step without the gust lacks half of g dt² of the angle, which is believed anew at each reading.
-    lacking = 0.5 * gust * DT * DT / np.sqrt(SENSOR + disturbed * DT)
-    assert np.abs(errors[40:, 0]).max() < 0.1 * lacking
-
-
 def test_only_what_is_free_moves_and_the_rest_stays_to_the_bit():
     start = (-0.8, 2.0, 0.12)
     tuned, left, *_ = _core.tune(lagging(*start), LIMITS, CHAIN, [flown(1)], free=[0], lags=[], iterations=30)

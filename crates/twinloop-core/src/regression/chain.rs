@@ -115,27 +115,10 @@ pub(crate) struct Motion {
     /// dt^m / m! from m = 1 on.
     pub(super) powers: [f64; LONGEST],
     /// How far each state is moved by a disturbance of 1 that is held.
-    pub(super) reach: [f64; LONGEST],
+    pub reach: [f64; LONGEST],
 }
 
 impl Motion {
-    /// How a disturbance of 1 that is held acts around a step in which a law moves the states: what it adds to the driven
-    /// one before the step, and to each state after it. Half before and half after, the law's step sees the disturbance as
-    /// it is on average, and so do states that are not of this chain (Strang 1968); the integrals, which the first half
-    /// moves with the step, lack the rest. Where the law pushes once a period there is nothing between.
-    pub fn around(&self) -> (f64, [f64; LONGEST]) {
-        if self.form != Form::Acceleration {
-            return (0.0, self.reach);
-        }
-        let half = 0.5 * self.reach[0];
-        let mut after = self.reach;
-        after[0] -= half;
-        for (after, power) in after[1..].iter_mut().zip(self.powers) {
-            *after -= half * power;
-        }
-        (half, after)
-    }
-
     /// Predicts the states one period ahead. After them there may be a correlated disturbance that drives them, with its
     /// `correlation` over a period.
     #[inline(always)]

@@ -233,7 +233,6 @@ impl<V: Vector> Watch<V> for Filters<'_, V> {
             self.run.states.extend(state.iter().map(|value| value.lane(0)));
             self.run.gusts.extend(self.gusts.iter().map(|gust| gust.lane(0)));
         }
-        self.begin_to_disturb(state);
     }
 
     #[inline(always)]
@@ -241,24 +240,13 @@ impl<V: Vector> Watch<V> for Filters<'_, V> {
 }
 
 impl<V: Vector> Filters<'_, V> {
-    /// Moves the driven states by what disturbs them at the start of a period, so that the law's step sees it.
-    #[inline(always)]
-    fn begin_to_disturb(&self, state: &mut [V]) {
-        for ((observed, whitening), &gust) in self.observer.iter().zip(self.whitenings).zip(&self.gusts) {
-            if whitening.inner > observed.states.len() {
-                let driven = observed.states[0];
-                state[driven] = state[driven] + gust * observed.chain.motion().around().0;
-            }
-        }
-    }
-
-    /// Moves the states on by the rest of what disturbed them in the period before, and the disturbances themselves.
+    /// Moves the states on by what disturbed them in the period before, and the disturbances themselves.
     #[inline(always)]
     fn disturb(&mut self, state: &mut [V]) {
         for ((observed, whitening), gust) in self.observer.iter().zip(self.whitenings).zip(&mut self.gusts) {
             if whitening.inner > observed.states.len() {
-                for (&i, after) in observed.states.iter().zip(observed.chain.motion().around().1) {
-                    state[i] = state[i] + *gust * after;
+                for (&i, reach) in observed.states.iter().zip(observed.chain.motion().reach) {
+                    state[i] = state[i] + *gust * reach;
                 }
                 *gust = *gust * whitening.correlation;
             }
