@@ -106,3 +106,34 @@ def test_misuse_is_refused_before_any_work(folder):
         assert refused.exit_code == 2 and words in refused.stderr
     missing = invoke("identify", str(folder / "0.csv"))
     assert missing.exit_code == 2 and "--config" in missing.stderr
+
+
+def held_up(seed):
+    """What a controller records that holds a pendulum up, while it is pushed."""
+    stream, dt = np.random.default_rng(seed), 0.05
+    pushes = np.repeat(stream.uniform(-0.3, 0.3, 60), 4)
+    state, states, commands = np.array([0.1, 0.0]), [], []
+    for push in pushes:
+        states.append(state + stream.normal(size=2) * [1e-3, 5e-3])
+        commands.append(np.clip(-4.0 * states[-1][0] - 1.2 * states[-1][1] + push, -2.0, 2.0))
+        for _ in range(50):
+            state = state + dt / 50 * np.array([state[1], 8.0 * np.sin(state[0]) + 4.0 * commands[-1]])
+    return np.array([*states, state]), np.array(commands)
+
+
+def test_logs_of_an_unstable_system_are_judged_in_pieces_and_its_twin_is_written(folder):
+    for number in (3, 4):
+        states, commands = held_up(number)
+        names = dict(zip(("angle", "rate"), states.T, strict=True))
+        t = 0.05 * np.arange(len(states))
+        write_columns(
+            folder / f"{number}.csv", {"t": t, **names, "torque": np.append(commands, commands[-1])}
+        )
+    done = identified(
+        folder, "--held-out", str(folder / "4.csv"), "-o", str(folder / "up.json"), "--json", logs=("3.csv",)
+    )
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["follows"] and all(0.5 <= log["piece"] < 0.5 * log["seconds"] for log in found["logs"])
+    assert all(fit > 70.0 for log in found["logs"] for fit in log["fit"].values())
+    assert "begins again at a reading every" in identified(folder, logs=("3.csv",)).stdout

@@ -28,7 +28,7 @@ def law(gravity=25.0, authority=-32.0, damping=-0.3):
     return _core.Model(_core.Program.parse(program_text(3, 1, 5, [page])), "acceleration", SIGNALS.engine)
 
 
-def flown(truth, seed=0):
+def flown(truth, seed=0, noise=NOISE):
     """What a controller that holds it records while it follows a target that moves."""
     family = tl.controllers.PID(
         [("lean", "rate")], {"lean.kp": (-20.0, 20.0), "lean.ki": 0.0, "lean.kd": (-4.0, 4.0)}
@@ -38,11 +38,11 @@ def flown(truth, seed=0):
     test = tl.Test(family, family.genes({"lean.kp": -8.0, "lean.kd": -1.0}), np.zeros(2), target, STEPS)
     run = fly(truth, test, limits=LIMITS)
     assert run.steps == STEPS
-    readings = run.states + NOISE * np.random.default_rng(seed).standard_normal(run.states.shape)
+    readings = run.states + noise * np.random.default_rng(seed).standard_normal(run.states.shape)
     return tl.Trajectory(run.t, readings, run.commands)
 
 
-def follows(model, flight, length):
+def follows(model, flight, length, noise=NOISE):
     """Whether a replay in pieces follows the flight."""
     scales = np.array([state.scale for state in SIGNALS.states])
     replay = in_pieces(Replay(SIGNALS, flight.states[0], flight.commands), model, flight.states, length)
@@ -53,7 +53,7 @@ def follows(model, flight, length):
         float(np.square((flight.states[1:] - states) / scales).mean())
         for states in (run.states[1:], held(flight.states, length))
     )
-    return not left(free, frozen, float(np.square(NOISE / scales).mean()))
+    return not left(free, frozen, float(np.square(noise / scales).mean()))
 
 
 def test_a_right_law_of_an_unstable_system_is_followed_in_pieces():
@@ -63,6 +63,38 @@ def test_a_right_law_of_an_unstable_system_is_followed_in_pieces():
     # 0.2 s is its time constant: noise of 0.002 rad grows to the motion's size within a few of them.
     assert 20 < length < 200
     assert follows(law(), flight, length)
+
+
+@pytest.mark.parametrize("times", [0.5, 2.0, 4.0])
+def test_under_any_noise_that_the_motion_exceeds_a_right_law_follows_and_a_wrong_one_does_not(times):
+    noise = times * NOISE
+    flight = flown(law(), noise=noise)
+    length = judged_length(law(), flight, noise, LIMITS)
+    assert follows(law(), flight, length, noise)
+    for wrong in (
+        {"gravity": 0.0},
+        {"gravity": 12.0},
+        {"gravity": 60.0},
+        {"authority": 32.0},
+        {"authority": -16.0},
+    ):
+        model = law(**wrong)
+        assert not follows(model, flight, judged_length(model, flight, noise, LIMITS), noise)
+
+
+def test_pieces_are_the_shorter_the_larger_the_noise():
+    lengths = [
+        judged_length(law(), flown(law(), noise=t * NOISE), t * NOISE, LIMITS) for t in (0.5, 1.0, 4.0)
+    ]
+    assert STEPS > lengths[0] > lengths[1] > lengths[2] > 20
+    # Of motion that is lost in noise nothing can be said: the whole flight is judged, and not followed.
+    assert judged_length(law(), flown(law(), noise=8.0 * NOISE), 8.0 * NOISE, LIMITS) == STEPS
+
+
+@pytest.mark.parametrize("share", [0.95, 1.05])
+def test_a_law_that_is_right_to_a_twentieth_follows(share):
+    flight, model = flown(law()), law(gravity=25.0 * share, authority=-32.0 / share)
+    assert follows(model, flight, judged_length(model, flight, NOISE, LIMITS))
 
 
 @pytest.mark.parametrize(

@@ -42,19 +42,22 @@ class FreeError:
         return normalised_error(self.error, self.frozen)
 
 
-def free_errors(model: _core.Model, book: Logbook, workers: _core.Workers) -> list[FreeError]:
+def free_errors(
+    model: _core.Model, book: Logbook, workers: _core.Workers, sensors: Floats | None = None
+) -> list[FreeError]:
     """What the free runs of a model are off from each flight.
 
     Args:
         model: to be judged.
         book: with the flights.
         workers: how the work is carried out.
+        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
     """
     whole = closed_loop([model], book.selected, workers)[0].tolist()
     limits = book.setup.limits
     found = []
     for run, error in zip(book.experiments, whole, strict=True):
-        flown, length = run.trajectory, length_of(model, run, limits, workers)
+        flown, length = run.trajectory, length_of(model, run, limits, workers, sensors)
         if length == flown.steps:
             found.append(FreeError(error, run.frozen, length))
             continue
@@ -69,7 +72,11 @@ def free_errors(model: _core.Model, book: Logbook, workers: _core.Workers) -> li
 
 
 def lengths_of(
-    model: _core.Model, flights: Sequence[Experiment], limits: Limits, workers: _core.Workers
+    model: _core.Model,
+    flights: Sequence[Experiment],
+    limits: Limits,
+    workers: _core.Workers,
+    sensors: Floats | None = None,
 ) -> Integers:
     """Steps of the pieces in which a model is held against flights (N,).
 
@@ -78,11 +85,20 @@ def lengths_of(
         flights: N of them.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
+        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
     """
-    return np.array([length_of(model, flight, limits, workers) for flight in flights], dtype=np.int64)
+    return np.array(
+        [length_of(model, flight, limits, workers, sensors) for flight in flights], dtype=np.int64
+    )
 
 
-def length_of(model: _core.Model, flight: Experiment, limits: Limits, workers: _core.Workers) -> int:
+def length_of(
+    model: _core.Model,
+    flight: Experiment,
+    limits: Limits,
+    workers: _core.Workers,
+    sensors: Floats | None = None,
+) -> int:
     """Steps of the pieces in which a model is held against a flight: all, if its controller flies in the free run too.
 
     Args:
@@ -90,13 +106,16 @@ def length_of(model: _core.Model, flight: Experiment, limits: Limits, workers: _
         flight: that was made.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
+        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
     """
     flown = flight.trajectory
     if flight.test is not None:
         return flown.steps
-    scales = np.array([state.scale for state in limits.signals.states])
-    noise = guessed_noise([Run.of(flown.states, flown.commands).continued(limits.signals)], scales)
-    return judged_length(model, flown, np.sqrt(noise), limits, workers)
+    if sensors is None:
+        scales = np.array([state.scale for state in limits.signals.states])
+        run = Run.of(flown.states, flown.commands).continued(limits.signals)
+        sensors = np.sqrt(guessed_noise([run], scales))
+    return judged_length(model, flown, sensors, limits, workers)
 
 
 def as_flown(model: _core.Model, flight: Experiment, length: int) -> Test | Replay:

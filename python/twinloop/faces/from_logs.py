@@ -112,6 +112,7 @@ def _facts(twin: Twin, files: Sequence[Path], runs: Sequence[Trajectory], learnt
                 "seconds": float(run.t[-1] - run.t[0]),
                 "fit": {row.name: row.fit for row in fits},
                 "rmse": {row.name: row.rmse for row in fits},
+                "piece": twin.piece_of(run) * twin.signals.dt,
             }
         )
     return plain_dict(
@@ -143,8 +144,17 @@ def _text(twin: Twin, found: dict[str, Any]) -> str:
     head = ["log", "", "length (s)", *(f"FIT {name} (%)" for name in names)]
     remarks = "".join(f"{each['severity']}: {each['sentence']}\n" for each in found["remarks"])
     errors = table(head, rows)
+    pieces = [log["piece"] for log in found["logs"] if log["piece"] < log["seconds"] - 0.5 * twin.signals.dt]
     note = "FIT: of the free run from the first reading; 100 is perfect, 0 no better than the mean."
+    if pieces:
+        note += f"\nThe free run of an unstable system begins again at a reading every {_span(pieces)} s."
     return (
         "\n".join([*found["equations"], "", errors, note, *([] if not remarks else ["", remarks.rstrip()])])
         + "\n"
     )
+
+
+def _span(values: Sequence[float]) -> str:
+    """From the least to the most."""
+    least, most = (f"{value:.2g}" for value in (min(values), max(values)))
+    return least if least == most else f"{least} to {most}"

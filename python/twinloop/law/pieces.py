@@ -4,8 +4,9 @@ Nothing corrects a replay of recorded commands. On a system that is unstable by 
 the model: what the first reading is off grows along the record. So such a flight is judged in pieces, each begun at its
 own reading, while the memory of lags, delays and hidden states goes on. A piece is as long as possible, so long as a
 deviation of the size of the sensor's noise, grown by the model's own slopes along the record, stays small beside what
-the system itself moves in a piece. A model that grows it faster than the system moves has no such length, and follows
-nothing: shorter pieces would make no model right.
+the system itself moves in a piece. Where noise leaves no such length, it is the one at which the two are furthest
+apart. A model that grows the deviation faster than the system moves has no length at all, and follows nothing: shorter
+pieces would make no model right.
 """
 
 from __future__ import annotations
@@ -24,10 +25,12 @@ from twinloop.trajectory import Trajectory, continued
 
 WRONG = 0.5
 """Share of the error of the model that never moves above which a flight is not followed."""
-SHARE = 0.05
+SHARE = 0.02
 """Of how far a state moves: by so much a right model is taken to be off from where a piece begins, if noise is less."""
-SMALL = 0.25
-"""Of what the system moves in a piece, mean squares, that such a deviation may have grown to."""
+SMALL = 0.02
+"""Of what the system moves in a piece, mean squares, that such a deviation may have grown to, if noise allows it."""
+MOST = 0.25
+"""The same in any case: above it no prediction that is long enough to be seen could be right."""
 LARGE = 100.0
 """Mean square of a deviation, in units of how far states move, after which it is followed no further."""
 LEAST = 10
@@ -116,7 +119,7 @@ def followed_length(
     limits: Limits,
     workers: _core.Workers | None = None,
 ) -> int:
-    """Most steps of a piece at which a deviation of the sensors' size stays small beside what the system moves in it.
+    """Steps of a piece in which a deviation of the sensors' size stays small beside what the system moves.
 
     Args:
         model: whose slopes let it grow.
@@ -127,7 +130,7 @@ def followed_length(
         workers: how the work is carried out.
 
     Returns:
-        Steps, at most n; 0: none.
+        The most at which it is small enough, otherwise those at which it is smallest; 0: there are none.
     """
     scales = np.array([state.scale for state in limits.signals.states])
     moves = np.maximum(readings.std(axis=0), np.maximum(sensors, 1e-9 * scales))
@@ -140,7 +143,7 @@ def followed_length(
     spread = np.tile(np.diag(np.square(off / moves)), (len(starts), 1, 1))
     unseen = 2.0 * np.square(sensors / moves)
     grown = moved = 0.0
-    length = 0
+    length, least = 0, MOST
     for step in range(1, len(slopes) + 1):
         going = starts + step <= len(slopes)
         starts, spread = starts[going], spread[going]
@@ -150,8 +153,8 @@ def followed_length(
             break
         went = np.square((readings[starts + step] - readings[starts]) / moves) - unseen
         grown, moved = grown + float(now.mean()), moved + float(went.mean())
-        if grown <= SMALL * moved:
-            length = step
+        if grown <= max(SMALL, least) * moved:
+            length, least = step, grown / moved if moved > 0.0 else 0.0
     return length
 
 

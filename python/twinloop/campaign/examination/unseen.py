@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
+from twinloop.law.pieces import held
 from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
 from twinloop.trajectory import Trajectory, continued
@@ -25,7 +26,8 @@ class Unseen:
         flown: the flight.
         predicted: by the twin, from the start of the flight, under the test's own controller; with a band if the
             committee of that time is known.
-        error: mean squared error over that of a model that never moves; infinite if the free run diverged.
+        error: mean squared error over that of a model that never moves, in the pieces of `Twin.piece_of` for a run
+            without a test; infinite if the free run diverged.
         rmse: of each state (n_x,), in its unit; infinite if the free run diverged.
         fit: FIT % of each state (n_x,); NaN if it never moved.
         inside: share of the readings inside the band; None without one.
@@ -80,12 +82,19 @@ def _beside(place: int, run: Experiment, before: TwinBefore) -> Unseen:
     lasted = bool(np.isfinite(rmse).all())
     squares = float(np.square(rmse).mean()) if lasted else float("inf")
     # Of whole flights as the campaign counts them, which is over all states.
-    error = (
-        normalised_error(squares, run.frozen)
-        if run.before is None
-        else normalised_error(run.before, run.frozen)
-    )
+    whole = squares if run.before is None else run.before
+    frozen = None if run.test is not None else _frozen_in_pieces(twin, run.trajectory)
+    error = normalised_error(whole, run.frozen) if frozen is None else normalised_error(squares, frozen)
     return Unseen(place, run.number, before.learnt, run.trajectory, predicted, error, rmse, fit, inside)
+
+
+def _frozen_in_pieces(twin: Twin, flown: Trajectory) -> float | None:
+    """Error of the model that never moves from where each piece of a record begins; None if it is followed whole."""
+    length = twin.piece_of(flown)
+    if length == flown.steps:
+        return None
+    moved = twin.signals.difference(flown.states[1:], held(flown.states, length))
+    return float(np.square(moved).mean())
 
 
 def followed(twin: Twin, flown: Trajectory, predicted: Trajectory) -> tuple[Floats, Floats, float | None]:

@@ -91,7 +91,8 @@ class Answer:
             workers: how the work is carried out.
             number: of the answer to these flights, which tells its draws from those of others.
         """
-        followed = following(identified.members, flights, setup.limits, workers)
+        sensors = identified.sensors(setup.signals.n_x)
+        followed = following(identified.members, flights, setup.limits, workers, sensors)
         unmoved = unmoved_states(identified, flights, setup)
         if not np.isfinite(identified.chi_squared):
             # Of a model that diverges no more is known.

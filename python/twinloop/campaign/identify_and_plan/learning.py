@@ -172,7 +172,9 @@ class Learner:
 
     def _lesson(self, answer: Answer, book: Logbook) -> Lesson:
         identified, follows = answer.identified, answer.follows
-        free = free_errors(identified.members[0], book, self.workers)
+        free = free_errors(
+            identified.members[0], book, self.workers, identified.sensors(self.setup.signals.n_x)
+        )
         names = self.setup.signals.state_names
         recurring, undecided = (
             tuple(names[state] for state, cause in answer.causes.items() if cause == kind)

@@ -286,7 +286,9 @@ class IdentifyAndPlan:
     def twin(self, book: Logbook) -> Twin:
         """The best model, with the committee and the sensors' noise for its band."""
         latest = self._latest()
-        errors = errors_of(latest.identified.model, book, self.workers)
+        identified = latest.identified
+        sensors = identified.sensors(self.setup.signals.n_x)
+        errors = errors_of(identified.model, book, self.workers, sensors)
         return Knowledge(self.setup, self.options, book).twin(latest, errors)
 
     @property

@@ -76,7 +76,7 @@ def misses_of(
         limits: where a run counts as diverged.
         workers: how the work is carried out.
     """
-    lengths = lengths_of(model, flights, limits, workers)
+    lengths = lengths_of(model, flights, limits, workers, noise.sensors)
     off, frozen = _off(model, lengths, flights, limits, workers)
     steered = np.array([[run.test is not None] for run in flights])
 
