@@ -8,7 +8,8 @@ import pytest
 import twinloop as tl
 from browser import SIZES, browser, kept, opened, serious
 from command import invoke
-from lives import RIG, by_hand
+from lives import RIG, SIGNALS, by_hand
+from twinloop.campaign.from_logs import learnt_from_logs
 from twinloop.logs import write_columns
 
 
@@ -137,3 +138,13 @@ def test_logs_of_an_unstable_system_are_judged_in_pieces_and_its_twin_is_written
     assert found["follows"] and all(0.5 <= log["piece"] < 0.5 * log["seconds"] for log in found["logs"])
     assert all(fit > 70.0 for log in found["logs"] for fit in log["fit"].values())
     assert "begins again at a reading every" in identified(folder, logs=("3.csv",)).stdout
+
+
+def test_a_log_of_an_unstable_system_that_was_held_out_is_foretold_in_pieces():
+    learnt, apart = (
+        tl.Trajectory(0.05 * np.arange(len(states)), states, commands[:, np.newaxis])
+        for states, commands in (held_up(3), held_up(4))
+    )
+    _, campaign = learnt_from_logs([learnt], SIGNALS, [apart], options={"committee_size": 4}, threads=1)
+    (flight,) = campaign.examine().unseen
+    assert flight.error < 0.1 and all(flight.fit > 70.0) and flight.inside > 0.75
