@@ -28,11 +28,11 @@ def cost_table(result: Mapping[str, Any], elapsed: float | None) -> Table:
         ],
     ]
     if cost["attached"]:
-        rows.insert(1, ["attached flights, not planned here", str(cost["attached"])])
+        rows.insert(2, ["attached flights, not planned here", str(cost["attached"])])
     if cost.get("withdrawn"):
-        rows.insert(1, ["flights that were withdrawn", str(cost["withdrawn"])])
+        rows.insert(2, ["flights that were withdrawn", str(cost["withdrawn"])])
     if cost["abandoned"]:
-        rows.insert(1, ["tests that were not flown", str(cost["abandoned"])])
+        rows.insert(2, ["tests that were not flown", str(cost["abandoned"])])
     if cost["given_away"] is not None:
         given = f"{shown_value(cost['given_away'])} {unit}".rstrip()
         rows.append(
