@@ -21,7 +21,7 @@ from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
 from twinloop.faces.sheet import columns, facts, foretold, sheet
 from twinloop.faces.telling import attach as attach_flight
-from twinloop.faces.telling import numbered, tell_failed
+from twinloop.faces.telling import counted, numbered, tell_failed
 from twinloop.faces.telling import tell as tell_flight
 from twinloop.logs import write_columns
 from twinloop.planning.quality import quality_unit
@@ -140,7 +140,7 @@ def tell(
                 otherwise=f"record a test that was stopped early: {_aborted(store, test, log, 'why')}",
             )
         text = (
-            f"Saved: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {_count(campaign)} in"
+            f"Saved: test {test} {campaign.status(asked)}{_as_expected(campaign, asked)}; {counted(campaign)} in"
             f" {shown_name(store)}."
         )
         runs = [run for run in campaign.experiments if run.number == asked.number]
@@ -197,7 +197,7 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
     """Add a recorded FLIGHT without a test, as CSV or .npz."""
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
-        text = f"Saved: {flight}; {_count(campaign)} in {shown_name(store)}."
+        text = f"Saved: {flight}; {counted(campaign)} in {shown_name(store)}."
         remarks = _against(campaign, campaign.experiments[-1])
         answer(
             {"file": str(flight), "experiments": len(campaign.experiments), "remarks": remarks}, text, as_json
@@ -233,11 +233,6 @@ def _standing(campaign: Campaign, test: Test) -> dict[str, object]:
     """Where a test is in its life, for a program."""
     told = len(campaign.experiments)
     return {"test": test.number, "status": campaign.status(test), "experiments": told}
-
-
-def _count(campaign: Campaign) -> str:
-    told = len(campaign.experiments)
-    return f"{told} experiment{'' if told == 1 else 's'}"
 
 
 def _as_expected(campaign: Campaign, test: Test) -> str:

@@ -17,6 +17,7 @@ from twinloop.faces.console import Watch
 from twinloop.faces.from_file import beside, run_file
 from twinloop.faces.result import summary, to_json
 from twinloop.faces.run_info import Stopwatch
+from twinloop.faces.telling import counted
 from twinloop.faces.terminal import is_utf_8
 from twinloop.faces.text import render, table
 from twinloop.faces.withdrawing import named
@@ -79,9 +80,8 @@ def learn(store: str, name: str | None, threads: int | None, as_json: bool) -> N
         _ = campaign.twin
         with suppress(NotAvailable):  # there may be no controller to fly yet
             _ = campaign.best_test
-        told = len(campaign.experiments)
-        text = f"Learnt from {told} experiment{'' if told == 1 else 's'}: twinloop show {shown_name(store)}\n"
-        _print({"learnt": told}, text, as_json)
+        text = f"Learnt from {counted(campaign)}: twinloop show {shown_name(store)}\n"
+        _print({"learnt": len(campaign.experiments)}, text, as_json)
 
 
 @click.command()

@@ -29,6 +29,16 @@ def numbered(campaign: Campaign, number: int) -> Test:
     return campaign.tests[number]
 
 
+def counted(campaign: Campaign) -> str:
+    """How many experiments it has, in words.
+
+    Args:
+        campaign: of them.
+    """
+    told = len(campaign.experiments)
+    return f"{told} experiment{'' if told == 1 else 's'}"
+
+
 def tell(
     campaign: Campaign,
     number: int,
@@ -62,10 +72,9 @@ def tell(
     run = load(log, campaign.signals, ended=ended, reason=aborted, name=called)
     if not aborted and run.steps < test.steps:
         if run.steps:
+            # Rows that are missing within it are no flight that was stopped.
             with at(f"Log {called}"):
-                check_period(
-                    run, campaign.signals
-                )  # rows that are missing within it are no flight that was stopped
+                check_period(run, campaign.signals)
         raise InvalidInput(
             f"Log {called}: expected the {test.steps} steps of test {number}, found {run.steps}; record it whole, or"
             f" {otherwise}."

@@ -12,6 +12,7 @@ from twinloop.campaign import Campaign
 from twinloop.campaign.history import Experiment, Withdrawal
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option
+from twinloop.faces.telling import counted
 from twinloop.logs import load
 from twinloop.store import shown_name
 from twinloop.trajectory import equal_runs
@@ -38,9 +39,10 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
         campaign.withdraw(chosen(campaign, which), reason)
         withdrawn = campaign.withdrawals[-1]
         given_up = [test.number for test in campaign.tests if _given_up(campaign, withdrawn, test.number)]
-        told = len(campaign.experiments)
-        facts = {"test": withdrawn.test, "reason": reason, "abandoned": given_up, "experiments": told}
-        answer(facts, _sentences(withdrawn, given_up, told, shown_name(store)), as_json)
+        facts = {
+            "test": withdrawn.test, "reason": reason, "abandoned": given_up, "experiments": len(campaign.experiments),
+        }  # fmt: skip
+        answer(facts, _sentences(withdrawn, given_up, counted(campaign), shown_name(store)), as_json)
 
 
 def chosen(campaign: Campaign, which: str) -> int | Experiment:
@@ -90,10 +92,8 @@ def _names(attached: list[Experiment]) -> str:
     return ", ".join(runs)
 
 
-def _sentences(withdrawn: Withdrawal, given_up: list[int], told: int, store: str) -> str:
-    lines = [
-        f"Saved: {named(withdrawn.test)} withdrawn; {told} experiment{'' if told == 1 else 's'} in {store}."
-    ]
+def _sentences(withdrawn: Withdrawal, given_up: list[int], told: str, store: str) -> str:
+    lines = [f"Saved: {named(withdrawn.test)} withdrawn; {told} in {store}."]
     if given_up:
         tests = f"Test{'s' if len(given_up) > 1 else ''} {', '.join(map(str, given_up))}"
         lines.append(f"{tests} abandoned: planned with it.")

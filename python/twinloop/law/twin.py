@@ -204,6 +204,11 @@ class Twin(Shown, Recorded, kind="twin"):
         """Between which values its flights have shown each state; beyond them its law is extrapolated."""
         return spans(self.signals, self.flights)
 
+    @property
+    def without_flights(self) -> Twin:
+        """The same model alone, without flights, errors and committee: it does not warn of runs beyond the flights."""
+        return Twin(self.model, self.signals, limits=self._limits, noise=self.noise)
+
     def equations(self, digits: int = 6) -> str:
         """The twin as text, which SymPy reads as well.
 
@@ -397,9 +402,7 @@ class Twin(Shown, Recorded, kind="twin"):
             NotAvailable: Gymnasium is not installed.
             InvalidInput: states or steps that cannot be used.
         """
-        # Without flights it does not say at every step that it is beyond them.
-        mover = Twin(self.model, self.signals, limits=self._limits, noise=self.noise)
-        return environment(mover, initial_state, target_state, steps, reward, noisy)
+        return environment(self.without_flights, initial_state, target_state, steps, reward, noisy)
 
     def linearise(self, at: ArrayLike, command: ArrayLike | None = None, discrete: bool = False) -> Linear:
         """The twin around a point, by exact derivatives of its equations.

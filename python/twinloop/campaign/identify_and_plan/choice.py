@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -157,8 +158,9 @@ class Choice:
         without = share_of(self.planner, self.committee, flown, self.draws)
         alone = None if measured is None else measured * without
         promised = over_promised(self.book.experiments)
+        of_others = partial(self._expected, self.book.of_task(tuned, flown.number), recorded[:, :, 0])
         if alone is not None and promised > 1.0:
-            predicted, _ = self._expected(self.book.of_task(tuned, flown.number), recorded[:, :, 0])
+            predicted, _ = of_others()
             if not predicted * promised < alone:
                 return (
                     f"the last two flights were worse than predicted, both by {100 * (promised - 1):.2g} % or more, and"
@@ -171,7 +173,7 @@ class Choice:
                 " than was measured, so its prediction is not used here"
             )
         if alone is not None and not confirmed(self.book.experiments):
-            predicted, spread = self._expected(self.book.of_task(tuned, flown.number), recorded[:, :, 0])
+            predicted, spread = of_others()
             if not predicted + SURE * spread < alone:
                 worth = f"{alone:.3g} was measured with these"
                 if flown.excitation is not None:

@@ -12,7 +12,7 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch
 from twinloop.campaign.history import Experiment, Lesson
-from twinloop.campaign.identify_and_plan.answer import WRONG, Answer
+from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
@@ -28,6 +28,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.terms.directions import Direction, of_mixer
+from twinloop.law.pieces import WRONG
 from twinloop.remarks import Remark, note, serious
 
 PLAIN = 1_000_000

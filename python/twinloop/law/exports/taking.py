@@ -29,11 +29,11 @@ def taken_twin(
             "Export: expected a twin that follows the flights that it was learnt from, found one that does not"
             " follow half of them; learn from more tests, or pass force=True (--force)."
         )
-    # Without flights: under recorded commands an unstable system goes far beyond them, which matters nothing here.
-    alone = type(twin)(twin.model, twin.signals, limits=twin.limits)
+    # Under recorded commands an unstable system goes far beyond its flights, which does not matter here.
+    quiet = twin.without_flights
     source = Source(
         twin.law,
-        lambda state, commands: compared(twin.law, alone.simulate_commands(state, commands)),
+        lambda state, commands: compared(twin.law, quiet.simulate_commands(state, commands)),
         twin.flights,
         to_text(twin.to_record()) if chosen == "json" else "",
         not force,
