@@ -135,6 +135,26 @@ def test_it_ends_within_the_room_that_the_task_leaves():
     assert HoldBack.between(free, [0.0], [1.0]) is None
 
 
+def test_a_rate_has_no_more_room_than_what_it_is_the_rate_of_in_the_time_of_a_swing():
+    signals = tl.Signals(
+        [
+            tl.State("x", "m", 1.0, envelope=(-2.0, 4.0)),
+            tl.State("v", "m/s", 1.0, derivative_of="x", envelope=(-90.0, 7.0)),
+            tl.State("free", "m", 1.0),
+            tl.State("w", "m/s", 1.0, derivative_of="free"),
+        ],
+        [tl.Command("u", "V", (-1.0, 1.0))],
+        0.1,
+    )
+    held = HoldBack.between(signals, np.zeros(4), [1.0, 0.0, 0.0, 0.0], 0.5)
+    assert np.array_equal(held.none[0], [-2.0 * ENDS, 1.0 + 3.0 * ENDS])
+    assert np.allclose(held.none[1], [-ENDS * 2.0 / 0.5, ENDS * 3.0 / 0.5])
+    assert np.allclose(held.full[1], [-BEGINS * 2.0 / 0.5, BEGINS * 3.0 / 0.5])
+    assert np.isinf(held.none[2:]).all()
+    # A shorter swing: its own envelope has the say.
+    assert HoldBack.between(signals, np.zeros(4), np.zeros(4), 0.1).none[1][1] == 7.0 * ENDS
+
+
 @pytest.mark.parametrize("beyond", [-1.5, 1.5])
 def test_a_task_beyond_its_envelope_is_held_back_on_the_other_side_only(beyond):
     signals = tl.Signals(
@@ -216,4 +236,4 @@ def test_a_mode_that_the_controller_does_not_know_is_not_driven_far():
 
     alone = used(True, None)
     assert max(used(False, seed=seed) for seed in range(6)) > 1.5 * alone
-    assert max(used(True, seed=seed) for seed in range(6)) < 1.1 * alone
+    assert max(used(True, seed=seed) for seed in range(6)) < 1.2 * alone

@@ -12,9 +12,9 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.records import Recorded
-from twinloop.signals import Signals
+from twinloop.signals import Signals, State
 
-BEGINS, ENDS = 0.4, 0.6
+BEGINS, ENDS = 0.2, 0.4
 """Shares of the room between a task and the envelope at which an excitation begins to be held back, and is nothing."""
 
 
@@ -66,34 +66,53 @@ class HoldBack(Recorded, kind="hold_back"):
         }
 
     @classmethod
-    def between(cls, signals: Signals, initial_state: ArrayLike, target_state: ArrayLike) -> HoldBack | None:
+    def between(
+        cls, signals: Signals, initial_state: ArrayLike, target_state: ArrayLike, swing: float | None = None
+    ) -> HoldBack | None:
         """Keeps an excitation away from the ends of the envelope.
 
         The room of a state, on each side, reaches from the farthest point of its task (the start and all targets) to
-        the end of its envelope. An excitation is held back from 0.4 of that room on, and is zero at 0.6.
+        the end of its envelope. A derivative, or a body rate, has no more room than its state divided by `swing`: how
+        far a rate may go is seldom known as well as how far an angle may. An excitation is held back from 0.2 of that
+        room on, and is zero at 0.4.
 
         Args:
             signals: of the system; a periodic state, or one without an envelope, does not count.
             initial_state: of the flight (n_x,), SI units, radians.
             target_state: of the flight (n_x,), or a row for each state (n + 1, n_x), the same units.
+            swing: time in which a state may use up its room, s; None: derivatives have the room of their envelopes.
 
         Returns:
             The ranges; None if no state counts.
         """
         points = np.vstack([np.atleast_2d(initial_state), np.atleast_2d(target_state)])
-        full = np.tile([-np.inf, np.inf], (signals.n_x, 1))
-        none = full.copy()
-        for i, state in enumerate(signals.states):
-            if state.envelope is None or state.periodic:
-                continue
-            for end, (farthest, bound) in enumerate(
-                zip((points[:, i].min(), points[:, i].max()), state.envelope, strict=True)
-            ):
-                room = bound - farthest
-                # A task that leads to the end of the envelope leaves no room to speak of.
-                if (room > 0.0) == bool(end) and room != 0.0:
-                    full[i, end], none[i, end] = farthest + BEGINS * room, farthest + ENDS * room
+        farthest = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
+        rooms = np.array([_rooms(state, ends) for state, ends in zip(signals.states, farthest, strict=True)])
+        if swing is not None:
+            place = signals.state_names.index
+            for rate, of in _rates(signals).items():
+                rooms[place(rate)] = np.minimum(rooms[place(rate)], rooms[place(of)] / swing)
+        outwards = np.array([-1.0, 1.0])
+        full, none = (farthest + outwards * share * rooms for share in (BEGINS, ENDS))
         return cls(full, none) if np.isfinite(none).any() else None
+
+
+def _rates(signals: Signals) -> dict[str, str]:
+    """Of what each state is the rate, by name: its declared derivative, or a body rate about the angle's axis."""
+    declared = {
+        state.name: state.derivative_of for state in signals.states if state.derivative_of is not None
+    }
+    body = signals.kinematics
+    return declared if body is None else {**dict(zip(body.rates, body.angles, strict=True)), **declared}
+
+
+def _rooms(state: State, farthest: Floats) -> Floats:
+    """From the farthest points of a task to the ends of a state's envelope (2,); infinite where an end has no say."""
+    if state.envelope is None or state.periodic:
+        return np.full(2, np.inf)
+    rooms = np.array([farthest[0] - state.envelope[0], state.envelope[1] - farthest[1]])
+    # A task that leads to the end of the envelope leaves no room to speak of.
+    return np.where(rooms > 0.0, rooms, np.inf)
 
 
 def _ends(row: Floats) -> list[float | None]:

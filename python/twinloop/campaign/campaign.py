@@ -145,7 +145,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             gains: all gains by name, or (size,) in order; in their units and bounds.
             excitation: signal that is added to the controller's commands (steps, n_u), in their units; the sum is
                 clipped to the commands' bounds. None: no excitation. The default is the preset's own: a gentle one
-                that fades out, and is held back near the ends of the envelope; the preset "paper" has none.
+                that grows, is held back once the states answer, and fades out; the preset "paper" has none.
 
         Returns:
             The test; fly it, then `tell` its run.

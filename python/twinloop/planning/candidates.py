@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.planning.excitation import chirps
+from twinloop.planning.excitation import chirps, growing_chirps
 from twinloop.planning.judging import Ends, Judge
 from twinloop.planning.proposal import Flown
 from twinloop.planning.settings import PlanningOptions
-
-STRONGER = 4.0
-"""Ratio of an excitation to the one before where that taught no law and the next is held back."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +88,14 @@ def candidates(
     excitation = np.zeros((count, steps, judge.signals.n_u))
     most = options.excitation_most
     if most > 0.0 and options.excitation > 0.0:
-        # Gains that have flown bear more of it than before, and once more the same would tell little. What told too
-        # little for a law, and is held back again, may be stronger at once.
-        growth = STRONGER if options.hold_back and not trusted else 2.0
-        stronger = min(growth ** max(1, flown.times) * options.excitation, most)
+        # Gains that have flown bear more of it than before, and once more the same would tell little.
+        stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
         for i in range(1, count):
-            amplitude = stronger if i >= count - again else most * stream.uniform()
+            repeated = i >= count - again
+            if repeated and options.hold_back and not trusted:
+                excitation[i] = unknown_excitation(judge, options, flown.best, flown.times, stream)
+                continue
+            amplitude = stronger if repeated else most * stream.uniform()
             excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)
     return Candidates(genes, excitation, _ends(judge, options, number, count), count - again)
 
@@ -114,3 +114,22 @@ def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> En
             states[1:] += off if middle.ndim == 1 else off[:, np.newaxis]
         ends.append(states)
     return ends[0], ends[1]
+
+
+def unknown_excitation(
+    judge: Judge, options: PlanningOptions, genes: Floats, flights: int, stream: _core.Stream
+) -> Floats:
+    """An excitation of a flight of the campaign's task of which no model can say where it leads (n, n_u).
+
+    Args:
+        judge: of the campaign: family and task.
+        options: of the planning; where nothing holds it back, it does not grow.
+        genes: gains that fly (size,).
+        flights: of these gains that have taught no law.
+        stream: of random numbers.
+    """
+    most = options.excitation_unknown if options.hold_back else options.excitation
+    target = np.atleast_2d(judge.task.target_state)[0]
+    return growing_chirps(
+        judge.family, genes, target, judge.task.steps, options.excitation, most, options.fade, stream, flights
+    )

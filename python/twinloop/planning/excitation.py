@@ -1,6 +1,6 @@
-"""Excitation: a gentle chirp on every command that fades out, so that a flight tells more than its task.
+"""Excitation: gentle chirps on the commands that fade out, so that a flight tells more than its task.
 
-That of a first flight is sized by its controller, the only thing that is known then, and grows from nothing.
+While no law is known, the controller says how strongly they begin, and what the states answer how far they grow.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop._ground.elementary import sin
+from twinloop._ground.elementary import exp, log, sin
 from twinloop.controllers import Family
 from twinloop.signals import Signals
 
@@ -17,53 +17,81 @@ SLOWEST, FASTEST = (0.5, 2.0), (4.0, 10.0)
 """Cycles per flight at which a chirp begins and ends, the range that is drawn from."""
 SHORTEST = 8.0
 """Periods of a cycle at least: faster ones look like noise to a model in steps."""
-SHARE = 0.15
-"""Share of the envelope that a state must be off for a controller to answer a first flight's largest excitation."""
+SHARE = 0.08
+"""Share of the envelope that a state must be off for a controller to answer the first excitation."""
 FIRST = (2.0, 4.0)
-"""Cycles per flight at which a first flight's chirps begin: slower ones are where loops resonate."""
-GROWTH = 0.25
-"""Share of a first flight, at its beginning, over which its excitation grows from nothing."""
+"""Cycles per flight at which the chirps of such a flight begin: slower ones are where loops resonate."""
+ENTERING = 0.1
+"""Share of such a flight, at its beginning, over which its excitation grows from nothing."""
+GROWTH = 8.0
+"""Ratio of its excitation at the end, before it fades, to that at the beginning."""
 NEARBY = 1.0 / 1024.0
 """Share of the envelope by which a state is off where the answer of a controller is asked for: a power of two."""
 UNUSED = 1e-6
 """Share of the strongest direction in command space, squared, below which a controller has no use for one."""
 
 
-def first_chirps(
+def growing_chirps(
     family: Family,
     genes: Floats,
     target: Floats,
     steps: int,
     amplitude: float,
+    most: float,
     fade: float,
     stream: _core.Stream,
+    flights: int = 0,
 ) -> Floats:
-    """Chirps for a first flight: only the controller is known.
+    """Chirps for a flight of a system of which no law is known: only the controller is.
 
     A controller that one trusts is made for the authority of its commands: ten times the authority, a tenth of the
-    gain. So the size is measured by what the controller itself would do: whatever the phases of the chirps are, it
-    would send the same commands for states that are off by at most `SHARE` of their envelopes.
+    gain. So each direction has a chirp of the size that the controller itself would send along it for states that are
+    off by `SHARE` of their envelopes; where it sends nothing, the smallest of the others. How much more the system
+    bears, the flight itself shows: the chirps grow from cycle to cycle, and are held back once the states answer. The
+    next flight begins where the last one ended.
 
     Args:
         family: of the controllers.
         genes: of the one that flies (size,).
         target: that it leads to (n_x,).
         steps: of the test.
-        amplitude: at most, in units of each command's scale.
+        amplitude: at which the first flight begins, at most, in units of each command's scale.
+        most: amplitude at the end of any flight, at most.
         fade: share of the flight, at its end, over which the chirps fade to nothing.
         stream: of random numbers.
+        flights: before this one that have taught no law.
 
     Returns:
         What is to be added to the commands (steps, n_u), in their units.
     """
-    off = answered(family, genes, target)
-    held = amplitude if off * amplitude <= SHARE else SHARE / off
-    growing = np.minimum(1.0, np.arange(steps) / max(GROWTH * steps, 1.0))
-    return chirps(family.signals, steps, held, fade, stream, FIRST) * growing[:, np.newaxis]
+    vectors, answers = directions(family, genes, target)
+    first = np.minimum(amplitude, SHARE * answers)
+    first = np.where(answers > 0.0, first, first.min(where=answers > 0.0, initial=amplitude))
+    begin, end = (np.maximum(first, np.minimum(first * GROWTH**k, most)) for k in (flights, flights + 1))
+    passed = np.arange(steps)[:, np.newaxis] / steps
+    entering = np.minimum(1.0, passed / ENTERING)
+    into = np.clip((passed - ENTERING) / max(1.0 - fade - ENTERING, 1.0 / steps), 0.0, 1.0)
+    signals = family.signals
+    swings = _swings(signals, steps, len(answers), fade, stream, FIRST)
+    swings *= entering * begin * exp(log(end / begin) * into)
+    added = np.zeros((steps, signals.n_u))
+    for swing, vector in zip(swings.T, vectors, strict=True):
+        added += swing[:, np.newaxis] * vector
+    sent: Floats = added * np.array([command.size for command in signals.commands])
+    return sent
 
 
-def answered(family: Family, genes: Floats, target: Floats) -> float:
-    """For how large an error a controller would send an excitation of one scale on every command.
+def swing_of(duration: float) -> float:
+    """Seconds in which a state that swings with the slowest of such chirps covers its amplitude at its largest rate.
+
+    Args:
+        duration: of the flight, s.
+    """
+    return duration / (2.0 * np.pi * FIRST[0])
+
+
+def directions(family: Family, genes: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Directions in command space, and what a controller at rest sends along them.
 
     Args:
         family: of the controllers.
@@ -71,19 +99,14 @@ def answered(family: Family, genes: Floats, target: Floats) -> float:
         target: around which it is asked (n_x,).
 
     Returns:
-        The largest share of the envelope (of the scale, where a state has none) by which a state is off, over all signs
-        of the commands; of all errors that it answers so, the smallest. 0 where it answers no error at all.
+        Unit vectors, a row each, in scales of the commands (n_u, n_u). For each, what is sent at most for states that
+        are off by their envelopes (by the scale, where a state has none), all together as one unit vector (n_u,): the
+        singular values; 0 where the controller has no use for a direction.
     """
     sent = slopes(family, genes, target)
-    products = (sent[:, np.newaxis, :] * sent[np.newaxis, :, :]).sum(axis=2)
-    values, vectors = _core.eigen(products)
+    values, vectors = _core.eigen((sent[:, np.newaxis, :] * sent[np.newaxis, :, :]).sum(axis=2))
     used = values > UNUSED * values[-1] if values[-1] > 0.0 else np.zeros(len(values), bool)
-    # Pseudo-inverse: sentᵀ (sent sentᵀ)⁺, and the sum of each row's magnitudes.
-    inverse = np.zeros_like(sent.T)
-    for value, vector in zip(values[used], vectors[used], strict=True):
-        along = (sent * vector[:, np.newaxis]).sum(axis=0) / value
-        inverse += along[:, np.newaxis] * vector[np.newaxis, :]
-    return float(np.abs(inverse).sum(axis=1).max())
+    return vectors, np.sqrt(np.where(used, values, 0.0))
 
 
 def slopes(family: Family, genes: Floats, target: Floats) -> Floats:
@@ -101,14 +124,7 @@ def slopes(family: Family, genes: Floats, target: Floats) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def chirps(
-    signals: Signals,
-    steps: int,
-    amplitude: float,
-    fade: float,
-    stream: _core.Stream,
-    slowest: tuple[float, float] = SLOWEST,
-) -> Floats:
+def chirps(signals: Signals, steps: int, amplitude: float, fade: float, stream: _core.Stream) -> Floats:
     """A chirp for each command.
 
     Args:
@@ -117,22 +133,12 @@ def chirps(
         amplitude: in units of each command's scale.
         fade: share of the flight, at its end, over which the chirps fade to nothing.
         stream: of random numbers.
-        slowest: cycles per flight at which it begins, the range that is drawn from.
 
     Returns:
         What is to be added to the commands (steps, n_u), in their units.
     """
-    duration = steps * signals.dt
-    t = signals.dt * np.arange(steps)
-    fading = _fading(signals, steps, fade)
-    columns = []
-    for command in signals.commands:
-        first = stream.uniform(*slowest) / duration
-        last = min(stream.uniform(*FASTEST) / duration, 1.0 / (SHORTEST * signals.dt))
-        phase = stream.uniform(0.0, 2.0 * np.pi)
-        angle = 2.0 * np.pi * (first * t + (last - first) * t * t / (2.0 * duration)) + phase
-        columns.append(amplitude * command.size * sin(angle) * fading)
-    return np.stack(columns, axis=1)
+    sizes = amplitude * np.array([command.size for command in signals.commands])
+    return _swings(signals, steps, signals.n_u, fade, stream, SLOWEST) * sizes
 
 
 def binary(signals: Signals, steps: int, amplitude: float, fade: float, stream: _core.Stream) -> Floats:
@@ -154,6 +160,23 @@ def binary(signals: Signals, steps: int, amplitude: float, fade: float, stream: 
     fading = _fading(signals, steps, fade)[:, np.newaxis]
     added: Floats = amplitude * sizes * np.repeat(signs, held, axis=0)[:steps] * fading
     return added
+
+
+def _swings(
+    signals: Signals, steps: int, count: int, fade: float, stream: _core.Stream, slowest: tuple[float, float]
+) -> Floats:
+    """Chirps of amplitude 1, faded, which begin with so many cycles per flight (steps, count)."""
+    duration = steps * signals.dt
+    t = signals.dt * np.arange(steps)
+    fading = _fading(signals, steps, fade)
+    columns = []
+    for _ in range(count):
+        first = stream.uniform(*slowest) / duration
+        last = min(stream.uniform(*FASTEST) / duration, 1.0 / (SHORTEST * signals.dt))
+        phase = stream.uniform(0.0, 2.0 * np.pi)
+        angle = 2.0 * np.pi * (first * t + (last - first) * t * t / (2.0 * duration)) + phase
+        columns.append(sin(angle) * fading)
+    return np.stack(columns, axis=1)
 
 
 def _fading(signals: Signals, steps: int, fade: float) -> Floats:

@@ -14,9 +14,9 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Purpose
 from twinloop.controllers import Family
-from twinloop.planning.candidates import candidates
+from twinloop.planning.candidates import candidates, unknown_excitation
 from twinloop.planning.comparison import Comparison
-from twinloop.planning.excitation import binary, chirps, first_chirps
+from twinloop.planning.excitation import binary, chirps, swing_of
 from twinloop.planning.gains import scores_of, tune_gains
 from twinloop.planning.judging import Committee, Judge, Task
 from twinloop.planning.proposal import Flown, Proposal, Wanted
@@ -120,21 +120,26 @@ class Planner(Judge):
     # Proposing
 
     def first_excitation(self, number: int, genes: Floats) -> tuple[Floats | None, HoldBack | None]:
-        """The gentle excitation of a test with gains of the user's own (size,), and what holds it back.
+        """The excitation of a test with gains of the user's own (size,), and what holds it back.
 
         None where they are switched off.
         """
-        options = self.options
-        if options.excitation <= 0.0:
+        if self.options.excitation <= 0.0:
             return None, None
         stream = self.unit.part(number).stream("excitation")
-        target = np.atleast_2d(self.task.target_state)[0]
-        added = first_chirps(
-            self.family, genes, target, self.task.steps, options.excitation, options.fade, stream
-        )
-        if not options.hold_back:
-            return added, None
-        return added, HoldBack.between(self.signals, self.task.initial_state, self.task.target_state)
+        added = unknown_excitation(self, self.options, genes, 0, stream)
+        return added, self.held_back(self.task.initial_state, self.task.target_state)
+
+    def held_back(self, start: Floats, target: Floats) -> HoldBack | None:
+        """What holds back an excitation of which no model can say where it leads; None where that is off.
+
+        Args:
+            start: of the flight (n_x,).
+            target: of it, (n_x,) or a row for each state.
+        """
+        if not self.options.hold_back:
+            return None
+        return HoldBack.between(self.signals, start, target, swing_of(self.task.steps * self.signals.dt))
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""

@@ -14,9 +14,12 @@ class PlanningOptions:
     Args:
         tests: "ask": the committee's disagreement; "random": random gains, gently excited; "chirp" and "prbs": the
             first controller with a chirp or a binary sequence of the largest excitation.
-        excitation: amplitude of the first test's excitation, in units of each command's scale; 0: none.
-        hold_back: whether the first test's excitation is held back during the flight as the states approach the ends
-            of their envelopes.
+        excitation: amplitude at which the first test's excitation begins, at most, in units of each command's scale;
+            0: none.
+        excitation_unknown: largest amplitude to which it grows, from cycle to cycle and from test to test, until a law
+            is known; only where it is held back.
+        hold_back: whether such an excitation is held back during the flight as the states approach the ends of their
+            envelopes.
         excitation_most: largest amplitude of a later test.
         fade: share of a flight, at its end, over which excitation fades out.
         initial_range: largest distance of a test's start from the campaign's initial state, in either direction
@@ -59,6 +62,7 @@ class PlanningOptions:
 
     tests: str = "ask"
     excitation: float = 0.02
+    excitation_unknown: float = 0.3
     hold_back: bool = True
     excitation_most: float = 0.08
     fade: float = 0.25

@@ -25,16 +25,17 @@ FAMILY = tl.controllers.PID(
 SETUP = SimpleNamespace(signals=SIGNALS, family=FAMILY, target_state=np.zeros(3))
 
 
-def found(rate, motion):
+def found(rate, motion, sensor=SENSOR):
     """What is unmoved if the first output is `rate` and the second one nothing, and every state moves by `motion`."""
     program = _core.Program.parse(program_text(4, 2, 6, [[rate, "r5 = r5 + 0.0"]]))
     identified = SimpleNamespace(
         model=_core.Model(program, "acceleration", SIGNALS.engine),
-        sensors=lambda n_x: np.full(n_x, SENSOR),
+        sensors=lambda n_x: np.full(n_x, sensor),
         sums=[SimpleNamespace(chain=SimpleNamespace(states=states)) for states in ((1, 0), (2,))],
     )
     noise = SENSOR * np.random.default_rng(0).standard_normal((STEPS + 1, 3))
-    flight = SimpleNamespace(trajectory=SimpleNamespace(states=noise + motion[:, np.newaxis]))
+    states = noise + motion[:, np.newaxis]
+    flight = SimpleNamespace(trajectory=SimpleNamespace(states=states, commands=np.zeros((STEPS, 1))))
     return unmoved_states(identified, [flight], SETUP)
 
 
@@ -48,3 +49,8 @@ def test_an_empty_equation_of_a_state_that_moves_and_that_the_controller_answers
 def test_noise_and_a_straight_line_are_no_motion():
     assert found("r4 = r4 + 0.0", np.linspace(0.0, 5.0, STEPS + 1)) == []
     assert found("r4 = r4 + 0.0", np.zeros(STEPS + 1)) == []
+
+
+def test_motion_that_was_taken_for_noise_is_still_motion():
+    turning = np.sin(np.linspace(0.0, 3.0, STEPS + 1))
+    assert found("r4 = r4 + 0.0", turning, sensor=0.5) == [1]

@@ -10,7 +10,8 @@ import numpy as np
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.identify_and_plan.diagnostics import against_derivatives, from_other_controllers
+from twinloop.campaign.identify_and_plan.declared import against_derivatives
+from twinloop.campaign.identify_and_plan.diagnostics import from_other_controllers
 from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.errors import InvalidInput

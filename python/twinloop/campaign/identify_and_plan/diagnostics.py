@@ -4,28 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
-from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.declared import against_derivatives
 from twinloop.campaign.identify_and_plan.misses import Miss
 from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.selection import distinct
-from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
-from twinloop.trajectory import Trajectory
 
-MOVED = 20.0
-"""Standard deviations of its noise that a state must have moved before it is held against its derivative."""
-BENT = 5.0
-"""The same about a line, which is all that a biased rate adds."""
-WALKED = 3.0
-"""Standard deviations of the random walk, which noise becomes when a rate is integrated, that this must have moved."""
-AS_FAST = (0.5, 2.0)
-"""Times as fast as its derivative says, between which a state is taken to do what was declared."""
-ALIKE = 0.5
-"""Correlation with its integrated derivative below which a state is taken to do something else."""
 NAMED = 3
 """States that are named of those that a free run misses, those that it misses most."""
 
@@ -192,66 +178,3 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
         "free-run",
         f"In free run over the {runs} run{'s' if runs > 1 else ''} that it was learnt from, the twin {what}. {why}",
     )
-
-
-def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]:
-    """States that do not change as their declared derivatives say.
-
-    Args:
-        recorded: runs, periodic states among them as they were wrapped.
-        signals: of the system.
-    """
-    runs = [Run.of(run.states, run.commands) for run in recorded]
-    noise = guessed_noise(runs, np.array([state.scale for state in signals.states]))
-    for i, rate in enumerate(signals.states):
-        if rate.derivative_of is None:
-            continue
-        j = signals.state_names.index(rate.derivative_of)
-        pairs = [_moved(run.states[:, j], run.states[:, i], signals.dt) for run in runs]
-        # Integrated, white noise is a random walk: about its line it has a fifteenth of its last variance.
-        walks = sum(float(noise[i]) * (signals.dt * run.steps) ** 2 / 15.0 for run in recorded)
-        how = _against(
-            [tuple(map(_without_line, pair)) for pair in pairs], BENT**2 * noise[j], WALKED**2 * walks
-        )
-        if how is None:
-            how = _against(pairs, MOVED**2 * noise[j], 0.0)
-        if how:
-            yield serious(
-                "derivative",
-                f"{rate.derivative_of} {how} {rate.name}, its declared derivative, says: check their units and signs,"
-                " the order of the columns, and what is declared.",
-            )
-
-
-def _against(pairs: Sequence[tuple[Floats, ...]], least: float, least_declared: float) -> str | None:
-    """How states contradict what their derivatives say: "" if they do not, None if they moved too little to tell.
-
-    Args:
-        pairs: of each run, the state and the same by its derivative.
-        least: mean square that the state must have.
-        least_declared: sum of squares that its integrated derivative must have.
-    """
-    moved, declared = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    size, declared_size, product = (
-        float(values.sum()) for values in (np.square(moved), np.square(declared), moved * declared)
-    )
-    if size <= len(moved) * least or declared_size <= least_declared:
-        return None
-    if product * product < ALIKE * ALIKE * size * declared_size:
-        return "does not change as"
-    if not AS_FAST[0] * declared_size < product < AS_FAST[1] * declared_size:
-        return f"changes {product / declared_size:.3g} times as fast as"
-    return ""
-
-
-def _moved(state: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
-    """A state over a run, and the same by its derivative, each less its mean."""
-    said = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
-    return state - state.mean(), said - said.mean()
-
-
-def _without_line(values: Floats) -> Floats:
-    """Values less their regression on a constant and time (n,)."""
-    time = np.arange(len(values)) - 0.5 * (len(values) - 1)
-    rest: Floats = values - values.mean()
-    return rest - time * (float((time * rest).sum()) / max(float(np.square(time).sum()), 1.0))

@@ -178,7 +178,9 @@ class IdentifyAndPlan:
             reason=found.reason,
             initial_state=found.initial_state,
             target_state=found.target_state,
-            hold_back=None if committee.trusted else self._held_back(found),
+            hold_back=None
+            if committee.trusted or found.excitation is None
+            else self.planner.held_back(found.initial_state, found.target_state),
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
@@ -206,12 +208,6 @@ class IdentifyAndPlan:
             setup.limits,
             self.workers,
         )
-
-    def _held_back(self, found: Proposal) -> HoldBack | None:
-        """What holds back an excitation of which no model can say where it leads, as in a first flight."""
-        if found.excitation is None or not self.options.hold_back:
-            return None
-        return HoldBack.between(self.setup.signals, found.initial_state, found.target_state)
 
     def _asked_of_nobody(self, book: Logbook) -> Test:
         """A test that no committee chose."""

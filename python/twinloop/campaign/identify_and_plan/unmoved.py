@@ -14,9 +14,11 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
+from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.sensors.chains import driven_states
 from twinloop.law.law import Law
 from twinloop.planning.excitation import slopes
+from twinloop.signals import Signals
 
 MOVED = 3.0
 """Standard deviations of its sensor by which a state deviates from a straight line if it moves."""
@@ -31,7 +33,8 @@ def unmoved_states(identified: Identified, experiments: Sequence[Experiment], se
         setup: of the campaign.
     """
     signals, model = setup.signals, identified.model
-    law, sensors = Law.of(model, signals), identified.sensors(signals.n_x)
+    law = Law.of(model, signals)
+    sensors = np.minimum(identified.sensors(signals.n_x), _at_most(experiments, signals))
     target = np.atleast_2d(setup.target_state)[0]
     middle = np.array([0.5 * (gain.low + gain.high) for gain in setup.family.gains])
     answered = (slopes(setup.family, middle, target) != 0.0).any(axis=0)
@@ -43,6 +46,13 @@ def unmoved_states(identified: Identified, experiments: Sequence[Experiment], se
         and answered[by_first[first]].any()
         and any(_moved(run.trajectory.states[:, first], sensors[first]) for run in experiments)
     ]
+
+
+def _at_most(experiments: Sequence[Experiment], signals: Signals) -> Floats:
+    """Largest standard deviation of each sensor (n_x,): what seems more than readings scatter is motion."""
+    runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in experiments]
+    guess: Floats = np.sqrt(guessed_noise(runs, np.array([state.scale for state in signals.states])))
+    return guess
 
 
 def _moved(readings: Floats, sensor: float) -> bool:
