@@ -74,7 +74,7 @@ def test_a_campaign_is_flown_by_hand_as_from_python(folder):
 def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     first = run("ask", "rig.db").stdout
     assert "angle.kp" in first and "N m/rad" in first and "twinloop tell rig.db 0 FLIGHT.csv" in first
-    assert "The controller that you already trust, with a gentle excitation" in first
+    assert "The controller that you already trust, with an excitation" in first
     assert "nothing is known of the system before it" in first
     said = json.loads(run("ask", "rig.db", "--json").stdout)
     assert said["risk"] is None and f"Risk of leaving the envelope: {said['risk_unknown']}\n" in first

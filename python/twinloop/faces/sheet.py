@@ -68,13 +68,13 @@ def reason(test: Test, flown: bool) -> str:
     """
     if test.reason:
         return test.reason
-    gentle = "" if test.excitation is None else ", with a gentle excitation that shows what the commands do"
+    excited = "" if test.excitation is None else ", with an excitation that shows what the commands do"
     known = (
         "nothing is known of the system before it."
         if not flown
         else "what is known comes from other flights."
     )
-    return f"The controller that you already trust{gentle}: {known}"
+    return f"The controller that you already trust{excited}: {known}"
 
 
 def foretold(test: Test) -> str:
