@@ -1,13 +1,15 @@
 """Where tests are in their lives and how they have fared, beside a plain list of what happened to each."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 
 from logbooks import SETUPS, events, genes_of, planned, run_of, written
+from twinloop._experiment.hold_back import HoldBack
 from twinloop.campaign import standing
 from twinloop.campaign.logbook import Logbook
 
@@ -49,6 +51,21 @@ def test_gains_have_flown_as_often_as_there_are_runs_of_any_test_with_them(wante
     for gains in range(3):
         runs = sum(len(life.runs) for life in lives if life.gains == gains)
         assert standing.times_flown(book, genes_of(gains)) == runs
+
+
+@given(events)
+def test_excitations_were_borne_by_the_last_tests_that_were_held_back_and_flew(wanted):
+    book, lives, _ = written(wanted)
+    held = HoldBack(*(np.tile([-far, far], (book.setup.signals.n_x, 1)) for far in (1.0, 2.0)))
+    for number, test in enumerate(book.tests):
+        if number % 3:
+            book.tests[number] = replace(test, hold_back=held)
+    fared = [
+        life.flies
+        for number, life in enumerate(lives)
+        if number % 3 and status_of(life) not in ("asked", "abandoned")
+    ]
+    assert standing.borne(book) == len(list(takewhile(bool, reversed(fared))))
 
 
 def best_of(lives, order, groups):

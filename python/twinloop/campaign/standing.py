@@ -117,6 +117,22 @@ def unfit(book: Logbook) -> list[Floats]:
     return [book.tests[number].genes for number in sorted(book.flown) if not finishes(book, number)]
 
 
+def borne(book: Logbook) -> int:
+    """How many of the last tests in a row that were held back are known to fly: each bore a stronger excitation.
+
+    Args:
+        book: of the campaign.
+    """
+    count = 0
+    for test in reversed(book.tests):
+        if test.hold_back is None or status(book, test) in ("asked", "abandoned"):
+            continue
+        if not flies(book, test.number):
+            break
+        count += 1
+    return count
+
+
 def times_flown(book: Logbook, genes: Floats) -> int:
     """How often some gains have flown, with any excitation.
 

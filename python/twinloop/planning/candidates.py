@@ -93,7 +93,7 @@ def candidates(
         for i in range(1, count):
             repeated = i >= count - again
             if repeated and options.hold_back and not trusted:
-                excitation[i] = unknown_excitation(judge, options, flown.best, flown.times, stream)
+                excitation[i] = unknown_excitation(judge, options, flown.best, flown.borne, stream)
                 continue
             amplitude = stronger if repeated else most * stream.uniform()
             excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)
@@ -125,7 +125,7 @@ def unknown_excitation(
         judge: of the campaign: family and task.
         options: of the planning; where nothing holds it back, it does not grow.
         genes: gains that fly (size,).
-        flights: of these gains that have taught no law.
+        flights: before this one that have borne such an excitation.
         stream: of random numbers.
     """
     most = options.excitation_unknown if options.hold_back else options.excitation

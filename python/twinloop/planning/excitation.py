@@ -47,8 +47,8 @@ def growing_chirps(
     A controller that one trusts is made for the authority of its commands: ten times the authority, a tenth of the
     gain. So each direction has a chirp of the size that the controller itself would send along it for states that are
     off by `SHARE` of their envelopes; where it sends nothing, the smallest of the others. How much more the system
-    bears, the flight itself shows: the chirps grow from cycle to cycle, and are held back once the states answer. The
-    next flight begins where the last one ended.
+    bears, the flight itself shows: the chirps grow from cycle to cycle, and are held back once the states answer. A
+    flight that has borne them lets the next begin where it ended.
 
     Args:
         family: of the controllers.
@@ -59,7 +59,7 @@ def growing_chirps(
         most: amplitude at the end of any flight, at most.
         fade: share of the flight, at its end, over which the chirps fade to nothing.
         stream: of random numbers.
-        flights: before this one that have taught no law.
+        flights: before this one that have borne such an excitation.
 
     Returns:
         What is to be added to the commands (steps, n_u), in their units.

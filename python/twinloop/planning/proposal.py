@@ -20,6 +20,7 @@ class Flown:
             worse.
         failed: genes of tests that failed on the system, or were cut.
         times: how often the best gains have flown.
+        borne: how many of the last flights whose excitation was held back kept the envelope.
         seen: smallest and largest reading of each state so far (2, n_x), where no prediction has come true yet.
     """
 
@@ -29,6 +30,7 @@ class Flown:
     good: float
     failed: Sequence[Floats] = ()
     times: int = 1
+    borne: int = 1
     seen: Floats | None = None
 
 

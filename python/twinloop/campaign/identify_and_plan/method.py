@@ -233,6 +233,7 @@ class IdentifyAndPlan:
             float("inf") if good is None else good,
             standing.unfit(book),
             1 if best is None else standing.times_flown(book, best.genes),
+            standing.borne(book),
             None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
         )
 
