@@ -68,6 +68,23 @@ def test_excitations_were_borne_by_the_last_tests_that_were_held_back_and_flew(w
     assert standing.borne(book) == len(list(takewhile(bool, reversed(fared))))
 
 
+@given(events)
+def test_gains_have_reached_what_their_flights_that_kept_the_envelope_have_read(wanted):
+    book, _, _ = written(wanted)
+    for gains in range(3):
+        genes = genes_of(gains)
+        read = [
+            run.trajectory.states
+            for run in book.experiments
+            if run.test is not None and run.kept_envelope and (run.test.genes == genes).all()
+        ]
+        found = standing.reached(book, genes)
+        assert (found is None) == (not read)
+        if read:
+            states = np.concatenate(read)
+            assert (found == [states.min(axis=0), states.max(axis=0)]).all()
+
+
 def best_of(lives, order, groups):
     """The number of the best test: the lowest quality in the first group with any; else the first that was flown."""
     measured = [number for number in dict.fromkeys(order) if number is not None and lives[number].qualities]

@@ -155,6 +155,30 @@ def test_a_rate_has_no_more_room_than_what_it_is_the_rate_of_in_the_time_of_a_sw
     assert HoldBack.between(signals, np.zeros(4), np.zeros(4), 0.1).none[1][1] == 7.0 * ENDS
 
 
+def test_where_the_controller_leads_by_itself_nothing_is_held_back_as_long_as_a_fifth_of_the_room_is_left():
+    signals = tl.Signals(
+        [
+            tl.State("x", "m", 1.0, envelope=(-2.0, 4.0)),
+            tl.State("v", "m/s", 1.0, derivative_of="x", envelope=(-9.0, 9.0)),
+            tl.State("free", "m", 1.0),
+        ],
+        [tl.Command("u", "V", (-1.0, 1.0))],
+        0.1,
+    )
+    start, target = np.zeros(3), [1.0, 0.0, 0.0]
+    # Of x's upper room, 3, it has used 1; its lower end is within the task. Of v it has used nearly all.
+    held = HoldBack.between(signals, start, target, 0.5, [[0.5, -8.9, -7.0], [2.0, 1.0, 7.0]])
+    assert np.allclose(held.full[0], [-BEGINS * 2.0, 2.0 + BEGINS * 2.0])
+    assert np.allclose(held.none[0], [-ENDS * 2.0, 2.0 + ENDS * 2.0])
+    # A fifth of 9 is left below, and less than 2 / 0.5 above.
+    assert np.allclose(held.none[1], [-7.2 - ENDS * 1.8, 1.0 + ENDS * 2.0 / 0.5])
+    assert np.isinf(held.none[2]).all()
+    # Beyond the envelope it still has a say.
+    assert np.allclose(HoldBack.between(signals, start, target, None, [[-5.0] * 3, [9.0] * 3]).none[0], [
+        -1.6 - ENDS * 0.4, 1.0 + 2.4 + ENDS * 0.6
+    ])  # fmt: skip
+
+
 @pytest.mark.parametrize("beyond", [-1.5, 1.5])
 def test_a_task_beyond_its_envelope_is_held_back_on_the_other_side_only(beyond):
     signals = tl.Signals(

@@ -16,6 +16,8 @@ from twinloop.signals import Signals, State
 
 BEGINS, ENDS = 0.2, 0.4
 """Shares of the room between a task and the envelope at which an excitation begins to be held back, and is nothing."""
+LEFT = 0.2
+"""Share of that room that remains room at least, wherever a controller leads by itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,12 @@ class HoldBack(Recorded, kind="hold_back"):
 
     @classmethod
     def between(
-        cls, signals: Signals, initial_state: ArrayLike, target_state: ArrayLike, swing: float | None = None
+        cls,
+        signals: Signals,
+        initial_state: ArrayLike,
+        target_state: ArrayLike,
+        swing: float | None = None,
+        reached: ArrayLike | None = None,
     ) -> HoldBack | None:
         """Keeps an excitation away from the ends of the envelope.
 
@@ -81,6 +88,9 @@ class HoldBack(Recorded, kind="hold_back"):
             initial_state: of the flight (n_x,), SI units, radians.
             target_state: of the flight (n_x,), or a row for each state (n + 1, n_x), the same units.
             swing: time in which a state may use up its room, s; None: derivatives have the room of their envelopes.
+            reached: smallest and largest value of each state in flights of the same controller that kept the envelope
+                (2, n_x); None: there were none. What the controller does anyway is no reason to hold back: the room
+                begins there, but has a fifth of what the task leaves at least.
 
         Returns:
             The ranges; None if no state counts.
@@ -88,11 +98,15 @@ class HoldBack(Recorded, kind="hold_back"):
         points = np.vstack([np.atleast_2d(initial_state), np.atleast_2d(target_state)])
         farthest = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
         rooms = np.array([_rooms(state, ends) for state, ends in zip(signals.states, farthest, strict=True)])
+        outwards = np.array([-1.0, 1.0])
+        if reached is not None:
+            beyond = outwards * (np.asarray(reached, dtype=np.float64).T - farthest)
+            beyond = np.clip(beyond, 0.0, (1.0 - LEFT) * rooms)
+            farthest, rooms = farthest + outwards * beyond, rooms - beyond
         if swing is not None:
             place = signals.state_names.index
             for rate, of in _rates(signals).items():
                 rooms[place(rate)] = np.minimum(rooms[place(rate)], rooms[place(of)] / swing)
-        outwards = np.array([-1.0, 1.0])
         full, none = (farthest + outwards * share * rooms for share in (BEGINS, ENDS))
         return cls(full, none) if np.isfinite(none).any() else None
 

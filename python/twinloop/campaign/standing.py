@@ -133,6 +133,25 @@ def borne(book: Logbook) -> int:
     return count
 
 
+def reached(book: Logbook, genes: Floats) -> Floats | None:
+    """Smallest and largest reading of each state (2, n_x) in flights of some gains that kept the envelope, if any did.
+
+    Args:
+        book: of the campaign.
+        genes: of them (size,).
+    """
+    signals, start = book.setup.signals, book.setup.initial_state
+    read = [
+        signals.continued(run.trajectory.states, start=start)
+        for run in book.experiments
+        if run.test is not None and run.kept_envelope and run.test.genes.tobytes() == genes.tobytes()
+    ]
+    if not read:
+        return None
+    states = np.concatenate(read)
+    return np.stack([states.min(axis=0), states.max(axis=0)])
+
+
 def times_flown(book: Logbook, genes: Floats) -> int:
     """How often some gains have flown, with any excitation.
 

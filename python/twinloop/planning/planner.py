@@ -130,16 +130,18 @@ class Planner(Judge):
         added = unknown_excitation(self, self.options, genes, 0, stream)
         return added, self.held_back(self.task.initial_state, self.task.target_state)
 
-    def held_back(self, start: Floats, target: Floats) -> HoldBack | None:
+    def held_back(self, start: Floats, target: Floats, reached: Floats | None = None) -> HoldBack | None:
         """What holds back an excitation of which no model can say where it leads; None where that is off.
 
         Args:
             start: of the flight (n_x,).
             target: of it, (n_x,) or a row for each state.
+            reached: smallest and largest value of each state under the same gains (2, n_x); None: they have not flown.
         """
         if not self.options.hold_back:
             return None
-        return HoldBack.between(self.signals, start, target, swing_of(self.task.steps * self.signals.dt))
+        swing = swing_of(self.task.steps * self.signals.dt)
+        return HoldBack.between(self.signals, start, target, swing, reached)
 
     def baseline(self, number: int, first: Floats) -> tuple[Floats, Floats | None]:
         """Genes and excitation of a test that no committee chose."""

@@ -180,7 +180,9 @@ class IdentifyAndPlan:
             target_state=found.target_state,
             hold_back=None
             if committee.trusted or found.excitation is None
-            else self.planner.held_back(found.initial_state, found.target_state),
+            else self.planner.held_back(
+                found.initial_state, found.target_state, standing.reached(book, found.genes)
+            ),
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
