@@ -80,6 +80,15 @@ def calibrated(spread: float, predicted: float, flights: Iterable[Experiment]) -
     Returns:
         The standard deviation to be told; infinite where the prediction is.
     """
+    return max(spread, OF_A_MISS * missed(flights) * abs(predicted)) if isfinite(predicted) else spread
+
+
+def missed(flights: Iterable[Experiment]) -> float:
+    """Share of a quality by which predictions have missed it of late.
+
+    Args:
+        flights: told so far, with the predictions that they were flown on.
+    """
     misses = [
         abs(run.test.predicted - run.quality) / abs(run.quality)
         for run in flights
@@ -90,8 +99,7 @@ def calibrated(spread: float, predicted: float, flights: Iterable[Experiment]) -
     ]
     # Predictions get better from flight to flight: the last two tell, and the geometric mean follows them down.
     before, last = [FIRST_MISS, FIRST_MISS, *misses][-2:]
-    share = OF_A_MISS * sqrt(before * last)
-    return max(spread, share * abs(predicted)) if isfinite(predicted) else spread
+    return sqrt(before * last)
 
 
 def residuals_of_flights(model: _core.Model, flights: Iterable[Experiment], limits: Limits) -> Floats:

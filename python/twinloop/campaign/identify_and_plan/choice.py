@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.alone import share_of
-from twinloop.campaign.identify_and_plan.calibration import calibrated
+from twinloop.campaign.identify_and_plan.calibration import calibrated, missed
 from twinloop.campaign.identify_and_plan.gusts import Moved
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotAvailable
@@ -31,7 +31,6 @@ NEARLY = 0.1
 """Share of a quality by which a prediction may be off it and still have come true."""
 WORTH = 0.005
 """Share of a quality by which gains that have not flown must be better to be worth it."""
-MORE = f"{100 * WORTH:g} % or more"
 UNKNOWN = "No controller to fly: "
 
 
@@ -45,7 +44,7 @@ class Choice:
         book: of the campaign.
         draws: of the sensors' noise.
         confidence: share of members and draws that must find tuned gains better than the best flown, by half a percent
-            or more.
+            or more; on a twin that misses its own flights, by more than its predictions have missed of late.
         gusts: what disturbances do to the quality of a flight.
     """
 
@@ -85,12 +84,13 @@ class Choice:
             return self._tuned(tuned, judged, recorded, reason)
         flies = standing.flies(self.book, flown.number)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
-        better = float((new < (1.0 - WORTH) * old).mean())
+        better = float((new < (1.0 - self._worth) * old).mean())
         if flies and not refused:
             refused = self._not_preferred(members, recorded, tuned, flown, better)
         if not refused:
             share = f"{100 * better:.3g} %"
-            reason = f"Tuned on the twin: better than the best flown gains by {MORE} in {share} of its predictions."
+            found = f"by {self._more} in {share} of its predictions"
+            reason = f"Tuned on the twin: better than the best flown gains {found}."
             if not flies:
                 reason = (
                     "Tuned on the twin: no model predicts that they leave the envelope, as the best flown gains"
@@ -104,6 +104,16 @@ class Choice:
         return self._flown(flown, judged, recorded, reason)
 
     # Inside
+
+    @cached_property
+    def _worth(self) -> float:
+        """Share of a quality by which tuned gains must be better: more than a twin misses that is known to be wrong."""
+        least = 0.0 if self.committee.explains else missed(self.book.experiments)
+        return max(WORTH, least)
+
+    @property
+    def _more(self) -> str:
+        return f"{100.0 * self._worth:.2g} % or more"
 
     def _measured_better(self, flown: Test) -> str:
         """Which flight was measured better than that of the best gains: an excitation helped it, or cost these."""
@@ -145,8 +155,8 @@ class Choice:
         if better < self.confidence:
             sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
             return (
-                f"newly tuned ones are better by {MORE} in only {sure} of the twin's predictions, and proven gains are"
-                f" replaced from {asked} on"
+                f"newly tuned ones are better by {self._more} in only {sure} of the twin's predictions, and proven"
+                f" gains are replaced from {asked} on"
             )
         return ""
 
