@@ -11,9 +11,9 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.declared import against_derivatives
-from twinloop.campaign.identify_and_plan.diagnostics import from_other_controllers
+from twinloop.campaign.identify_and_plan.diagnostics import from_another_excitation, from_other_controllers
 from twinloop.campaign.identify_and_plan.readings import suspicious
-from twinloop.campaign.identify_and_plan.sent import other_commands
+from twinloop.campaign.identify_and_plan.sent import excited, other_commands
 from twinloop.errors import InvalidInput
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
@@ -131,11 +131,13 @@ def against(flight: Experiment, signals: Signals) -> list[Remark]:
         signals: declared signals.
 
     Returns:
-        Serious remarks, none where nothing does.
+        Serious remarks, and a note where an excitation was not flown; none where nothing does.
     """
     run = flight.trajectory
     found = check_log(run.t, run.states, run.commands, signals).remarks
-    return [*(each for each in found if each.serious), *from_other_controllers(other_commands([flight]))]
+    others = from_other_controllers(other_commands([flight]))
+    excitations = () if flight.test is None else from_another_excitation(flight.test.number, excited(flight))
+    return [*(each for each in found if each.serious), *others, *excitations]
 
 
 def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:

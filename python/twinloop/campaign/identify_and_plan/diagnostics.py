@@ -9,6 +9,7 @@ from twinloop.campaign.identify_and_plan.declared import against_derivatives
 from twinloop.campaign.identify_and_plan.misses import Miss
 from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.selection import distinct
+from twinloop.campaign.identify_and_plan.sent import Excited
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 
@@ -72,6 +73,28 @@ def from_other_controllers(tests: Sequence[int]) -> Iterator[Remark]:
             f"The commands recorded of test{'s' if len(tests) > 1 else ''} {', '.join(map(str, tests))} are"
             " none that its controller gives for the recorded states: check the signs, units and order of states"
             " and commands, and that the recorded controller is the one that the test names.",
+        )
+
+
+def from_another_excitation(test: int, how: Excited) -> Iterator[Remark]:
+    """That the excitation of a test was not flown, or not held back.
+
+    Args:
+        test: its number.
+        how: its excitation was flown, by the recorded commands.
+    """
+    if how is Excited.NOT:
+        yield note(
+            "excitation",
+            f"The excitation of test {test} was not added to the commands: this flight tells less. The test sheet says"
+            " where it is and how to add it.",
+        )
+    elif how is Excited.WHOLE:
+        yield serious(
+            "excitation",
+            f"The excitation of test {test} was flown without holding it back: such a flight may lead further than its"
+            " sheet says. Scale it by the readings, as the sheet tells; for a program that cannot do this, set"
+            " hold_back = false under [options] before the first ask: then the excitation stays small.",
         )
 
 

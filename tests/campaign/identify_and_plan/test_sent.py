@@ -1,0 +1,104 @@
+"""How the excitation of a test was flown, by its recorded commands: as the test says, in full, or not at all."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from conftest import pendulum_step
+from lives import SIGNALS
+from twinloop._experiment.hold_back import HoldBack
+from twinloop.campaign.campaign_file import read_file, template
+from twinloop.campaign.examination.log_check import against
+from twinloop.campaign.identify_and_plan.sent import Excited, as_excited, excited, other_commands
+
+TORQUE = SIGNALS.commands[0].bounds
+
+
+@pytest.fixture(scope="module")
+def test(tmp_path_factory):
+    """The first test of a pendulum, held back so early that it matters."""
+    file = tmp_path_factory.mktemp("rig") / "rig.toml"
+    file.write_text(template("rig.db"), encoding="utf-8")
+    campaign = read_file(file).campaign(threads=1)
+    asked = campaign.test(read_file(file).first)
+    assert asked.excitation is not None and asked.hold_back is not None
+    # Held back from where the angle is near its target.
+    return dataclasses.replace(asked, hold_back=HoldBack([[-0.5, 0.8], [-9, 9]], [[-1, 0.85], [-10, 10]]))
+
+
+def flown(asked, how=Excited.HELD_BACK, noise=0.0):
+    """The flight of a test by a program that treats its excitation in some way."""
+    plant = tl.systems.Simulated(SIGNALS, pendulum_step, noise=noise, seed=1)
+    run = plant.run(as_excited(asked, how))
+    return SimpleNamespace(test=asked, number=asked.number, trajectory=run)
+
+
+def sent(flight, change):
+    """The same flight with other commands on record."""
+    run = flight.trajectory
+    other = tl.Trajectory(run.t, run.states, change(run.commands))
+    return SimpleNamespace(test=flight.test, number=flight.number, trajectory=other)
+
+
+def codes(flight):
+    return [(remark.code, remark.severity) for remark in against(flight, SIGNALS)]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_how_an_excitation_was_flown_is_seen_in_the_commands(test, noise):
+    for how in Excited:
+        flight = flown(test, how, noise)
+        assert excited(flight) is how and other_commands([flight]) == []
+    assert ("excitation", "note") in codes(flown(test, Excited.NOT, noise))
+    assert ("excitation", "serious") in codes(flown(test, Excited.WHOLE, noise))
+    assert "excitation" not in dict(codes(flown(test, noise=noise)))
+
+
+def late(periods):
+    return lambda commands: np.concatenate([np.repeat(commands[:1], periods, axis=0), commands[:-periods]])
+
+
+def in_pulses(commands):
+    owed, pulses = 0.0, []
+    for command in commands[:, 0]:
+        owed += command
+        pulses.append(TORQUE[1] if owed > 0.0 else TORQUE[0])
+        owed -= pulses[-1]
+    return np.array(pulses)[:, None]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *(late(periods) for periods in (1, 2, 5)),
+        lambda commands: np.clip(commands, -0.5, 0.5),
+        lambda commands: 0.1 * np.round(commands / 0.1),
+        lambda commands: 0.8 * commands,
+        lambda commands: commands + 0.05 * np.random.default_rng(2).standard_normal(commands.shape),
+        lambda commands: -commands,
+        in_pulses,
+    ],
+    ids=["late", "later", "late by five", "clipped", "rounded", "weaker", "noisy", "other sign", "pulses"],
+)
+def test_other_faults_of_commands_are_no_other_excitation(test, change):
+    assert excited(sent(flown(test, noise=0.01), change)) is Excited.HELD_BACK
+
+
+def test_where_the_excitation_was_flown_otherwise_small_faults_hide_nothing(test):
+    for how in (Excited.NOT, Excited.WHOLE):
+        assert excited(sent(flown(test, how), lambda commands: 0.02 * np.round(commands / 0.02))) is how
+
+
+def test_a_test_without_an_excitation_has_none_that_could_be_left_out(test):
+    flight = flown(test.quiet())
+    assert excited(flight) is Excited.HELD_BACK and codes(flight) == []
+    assert codes(SimpleNamespace(test=None, number=None, trajectory=flight.trajectory)) == []
+
+
+def test_tests_that_are_held_back_nowhere_are_flown_whole_and_as_they_say(test):
+    whole = dataclasses.replace(test, hold_back=None)
+    assert excited(flown(whole)) is Excited.HELD_BACK
+    assert excited(flown(whole, Excited.NOT)) is Excited.NOT
