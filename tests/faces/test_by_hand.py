@@ -21,6 +21,7 @@ from twinloop.faces.cli import main
 from twinloop.faces.sheet import foretold
 from twinloop.faces.telling import numbered
 from twinloop.logs import write_columns
+from twinloop.planning.leaving import risk_words
 
 PENDULUM = template("rig.db").partition("[options]")[0]
 
@@ -90,7 +91,10 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     flown(look().tests[0])
     run("tell", "rig.db", "0", "flight.csv")
     sheet = run("ask", "rig.db").stdout
-    assert "Predicted quality, integrated absolute error (rad s): " in sheet and "Risk" in sheet
+    assert "Predicted quality, integrated absolute error (rad s): " in sheet
+    # Of four members under two draws each, or of fewer members.
+    test = look().tests[1]
+    assert f"Risk of leaving the envelope: {risk_words(test.risk, 8)}.\n" in sheet
     test = look().tests[1]
     with open("rig-test-1.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

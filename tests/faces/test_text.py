@@ -132,3 +132,14 @@ def test_advice_to_stop_is_given_where_a_gain_could_not_be_measured(advice, word
 def test_a_quality_without_a_unit_is_named_without_one():
     assert quality_words("ise", "") == "integrated squared error"
     assert quality_words("iae", "rad s") == "integrated absolute error (rad s)"
+
+
+def test_a_risk_that_no_predicted_flight_shows_is_no_estimate():
+    """Where none of 128 flights leaves the envelope, (0 + 1/2) / 129 is the least that the formula gives."""
+    result = result_of_default() | {"options": {"committee_size": 8, "draws": 16}}
+    result["controller"]["risk"] = result["experiments"][0]["risk"] = 0.5 / 129.0
+    text = render(result)
+    assert "Risk of leaving the envelope: less than 0.4 % (none of 128 predicted flights leaves it)." in text
+    assert "< 0.4 %" in text and "0.003876" not in text
+    result["controller"]["risk"] = 2.5 / 129.0
+    assert "Risk of leaving the envelope: 1.9 %." in render(result)

@@ -71,6 +71,12 @@ class Setup(Recorded, kind="setup"):
         """Start, target and length, for the native engine."""
         return _core.Task(self.initial_state, self.target_state, self.steps)
 
+    @property
+    def predicted_flights(self) -> int | None:
+        """Flights at most from which a risk is taken, of all members and draws; None where the preset has none."""
+        options = self.options
+        return options.committee_size * options.draws if isinstance(options, DefaultOptions) else None
+
     @cached_property
     def limits(self) -> Limits:
         """Where simulated runs count as diverged."""

@@ -102,7 +102,7 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     stem = Path("campaign") if beside is None else beside.with_suffix("")
     file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
-    text = sheet(shown_name(store), test, predicted, str(file), campaign.setup.quality)
+    text = sheet(shown_name(store), test, predicted, str(file), campaign.setup)
     return text, facts(test, file, bool(campaign.experiments))
 
 

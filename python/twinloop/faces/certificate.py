@@ -21,6 +21,7 @@ from twinloop.faces.figures.svg import panel_svg
 from twinloop.faces.figures.units import labelled, shown_unit, words
 from twinloop.faces.result import plain_dict
 from twinloop.faces.text.words import quality_words
+from twinloop.planning.leaving import risk_words
 from twinloop.planning.quality import quality_unit
 
 
@@ -71,6 +72,7 @@ def facts(
         "prediction": None,
         "envelope": [{**dataclasses.asdict(use), "beyond_flown": use.beyond_flown} for use in found.uses],
         "risk": None if best is None else best.risk,
+        "predicted_flights": campaign.setup.predicted_flights,
         "not_tested": found.not_tested,
         "autopilot": None,
     }
@@ -127,6 +129,7 @@ def page(facts: Mapping[str, Any], names: Sequence[str], units: Sequence[str]) -
         title="Gain certificate" if facts["granted"] else "Gain certificate: refused",
         number=_number,
         quality=quality_words,
+        risk=risk_words,
         degrees=lambda value: None if value is None else math.degrees(value),
         plots=_plots(facts["prediction"], names, units),
         figures=f":root{{{variables(LIGHT)}}}@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}{RULES}",

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from twinloop.campaign.setup import Setup
 from twinloop.faces.text import quality_words, table
 from twinloop.logs import TIME
-from twinloop.planning.quality import Quality, quality_unit
+from twinloop.planning.leaving import risk_words
+from twinloop.planning.quality import quality_unit
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -172,7 +174,7 @@ def _range(ends: list[float | None]) -> str:
     return f"{low} to {high}"
 
 
-def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quality: Quality) -> str:
+def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, setup: Setup) -> str:
     """The test sheet, to be printed.
 
     Args:
@@ -180,7 +182,7 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quali
         test: to be flown.
         predicted: its run on the twin; None where nothing is known yet.
         file: where its columns are.
-        quality: what is minimised.
+        setup: of the campaign.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
@@ -198,13 +200,14 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, quali
         *_held_back(test, file),
     ]
     if test.predicted is not None and predicted is not None:
+        quality = setup.quality
         measure = quality_words(quality.kind, quality_unit(quality))
         lines.append(
             f"Predicted quality, {measure}: {foretold(test)}; the predicted run with its band: {file}."
         )
     if test.excitation is not None or predicted is not None:
         lines += ["", _expected(test, predicted), ""]
-    risk = unknown_risk(test) if test.risk is None else f"{100 * test.risk:.2g} %."
+    risk = unknown_risk(test) if test.risk is None else f"{risk_words(test.risk, setup.predicted_flights)}."
     lines.append(f"Risk of leaving the envelope: {risk}")
     lines.append(reason(test, predicted is not None))
     lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
 from twinloop.law.linear.margins import LoopMargins
+from twinloop.planning.leaving import risk_words
 
 LEFT = 0.1
 """Error on a flight that was not learnt, over that of a model that never moves, above which a twin is not believed."""
@@ -178,8 +179,9 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         safe = best.risk <= RISK
         yield Check(
             "envelope", "controller", best.risk, RISK, safe, True,
-            f"The probability that it leaves the envelope is {best.risk:.2g} according to the"
-            f" committee; at most {RISK:g} is allowed.",
+            f"The probability that it leaves the envelope is"
+            f" {risk_words(best.risk, found.setup.predicted_flights)} according to the committee; at most"
+            f" {100.0 * RISK:g} % is allowed.",
         )  # fmt: skip
     flown = any(run.number == best.number and run.kept_envelope for run in found.experiments)
     yield Check(

@@ -94,7 +94,7 @@ def from_another_excitation(test: int, how: Excited) -> Iterator[Remark]:
             "excitation",
             f"The excitation of test {test} was flown without holding it back: such a flight may lead further than its"
             " sheet says. Scale it by the readings, as the sheet tells; for a program that cannot do this, set"
-            " hold_back = false under [options] before the first ask: then the excitation stays small.",
+            " hold_back = false under [options] and begin a new campaign: then the excitation stays small.",
         )
 
 

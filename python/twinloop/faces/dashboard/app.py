@@ -25,6 +25,7 @@ from twinloop.faces.report.source import source
 from twinloop.faces.sheet import columns, sheet
 from twinloop.faces.telling import numbered
 from twinloop.logs import MOST_BYTES, write_columns
+from twinloop.planning.leaving import risk_words
 from twinloop.planning.quality import quality_unit
 
 MOST_WORDS = 10_000
@@ -197,7 +198,9 @@ class Pages:
                     "predicted": None if test.predicted is None else f"{test.predicted:.4g}",
                     "spread": None if test.spread is None else f"{test.spread:.2g}",
                     "unit": quality_unit(campaign.setup.quality),
-                    "risk": None if test.risk is None else f"{100 * test.risk:.2g} %",
+                    "risk": None
+                    if test.risk is None
+                    else risk_words(test.risk, campaign.setup.predicted_flights),
                     "reason": test.reason,
                     "approved": may.get(test.number) if test.number is not None else None,
                 }
@@ -216,9 +219,7 @@ class Pages:
         campaign = self.desk.look(name)
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test)
-        return sheet(
-            Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup.quality
-        )
+        return sheet(Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup)
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)

@@ -12,6 +12,7 @@ from twinloop.faces.figures.units import words
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
 from twinloop.faces.report.tables.table import Table, shown_value
+from twinloop.planning.leaving import short_risk
 from twinloop.planning.quality import quality_unit
 
 Row = tuple[str, object]
@@ -89,7 +90,7 @@ def _answers(source: Source) -> list[Row]:
             (f"quality predicted{unit}, lower is better", predicted),
             (f"± spread{unit}", spread),
             (f"quality flown{unit}", best.measured),
-            ("risk of leaving the envelope (probability)", best.risk),
+            ("risk of leaving the envelope", short_risk(best.risk, campaign.setup.predicted_flights)),
         ]
     rows.append((f"quality of the first gains, flown{unit}", None if first is None else first.quality))
     if found.margins is not None and found.twin.follows:

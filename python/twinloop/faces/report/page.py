@@ -25,6 +25,7 @@ from twinloop.faces.report.tables import twin as of_twin
 from twinloop.faces.report.tables.table import Table
 from twinloop.faces.report.verdict import EVIDENCE, verdict
 from twinloop.faces.result import summary
+from twinloop.planning.leaving import risk_words
 
 UNNAMED = "campaign"
 """The name of a campaign that nobody has named."""
@@ -116,6 +117,7 @@ def report_page(
             *((cost_table(result, elapsed), of_flights.flights(result)) if controller else ()), of_flights.data(found)
         ),
         next=_next(campaign, result),
+        risk=risk_words,
         failures=campaign.failures,
         withdrawals=campaign.withdrawals,
         sessions=sessions,
@@ -156,7 +158,12 @@ def _figures(found: Examination, names: Sequence[str]) -> list[Figure]:
 
 def _next(campaign: Campaign, result: Mapping[str, Any]) -> dict[str, object]:
     """What is waiting to be flown, and what another flight would bring."""
-    return {"waiting": campaign.waiting, "advice": result.get("advice"), "unit": result["quality"]["unit"]}
+    return {
+        "waiting": campaign.waiting,
+        "advice": result.get("advice"),
+        "unit": result["quality"]["unit"],
+        "flights": campaign.setup.predicted_flights,
+    }
 
 
 def _source(name: str) -> str:

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from twinloop.faces.text.table import cell, table
-from twinloop.faces.text.words import held_at, with_unit
+from twinloop.faces.text.words import held_at, predicted_flights, with_unit
+from twinloop.planning.leaving import risk_words
 
 
 def _gains(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[list[object]]:
@@ -56,9 +57,13 @@ def controller_text(result: Mapping[str, Any]) -> str:
             table(["gain", "value", "first", "unit", "bounds"], gains),
             "",
             table(["quality", "predicted", "± spread", "measured"], qualities),
-            f"{best['why']} Risk {cell(best['risk'])}.{excited}",
+            f"{best['why']}{_risk(best['risk'], predicted_flights(result))}{excited}",
         ]
     )
+
+
+def _risk(risk: float | None, flights: int | None) -> str:
+    return "" if risk is None else f" Risk of leaving the envelope: {risk_words(risk, flights)}."
 
 
 def advice_text(result: Mapping[str, Any]) -> str:

@@ -9,7 +9,8 @@ from twinloop.faces.text.controller import advice_text, controller_text, tuned_c
 from twinloop.faces.text.table import table
 from twinloop.faces.text.twin import equations_text, errors_text, program_errors_text, states_text
 from twinloop.faces.text.verdict import verdict
-from twinloop.faces.text.words import counted, quality_words
+from twinloop.faces.text.words import counted, predicted_flights, quality_words
+from twinloop.planning.leaving import short_risk
 
 
 def render(result: Mapping[str, Any], state: str | None = None) -> str:
@@ -93,7 +94,9 @@ def _time(result: Mapping[str, Any]) -> str:
 def _flights(result: Mapping[str, Any]) -> str:
     head = ["test", "predicted", "± spread", "flown", "predicted − flown", "risk"]
     keys = ("test", "predicted", "spread", "measured", "predicted_minus_measured", "risk")
-    rows = [[run[key] for key in keys] for run in result["experiments"]]
+    flights = predicted_flights(result)
+    runs = [{**run, "risk": short_risk(run["risk"], flights)} for run in result["experiments"]]
+    rows = [[run[key] for key in keys] for run in runs]
     reasons = [
         _of_run(run) + (f" It was cut: {run['reason']}." if run["reason"] else "")
         for run in result["experiments"]

@@ -43,6 +43,17 @@ def quality_words(kind: str, unit: str) -> str:
     return QUALITIES[kind] + (f" ({unit})" if unit else "")
 
 
+def predicted_flights(result: Mapping[str, Any]) -> int | None:
+    """Flights at most from which risks are taken; None where the result does not say it.
+
+    Args:
+        result: of a campaign.
+    """
+    options = result.get("options", {})
+    members, draws = options.get("committee_size"), options.get("draws")
+    return None if members is None or draws is None else members * draws
+
+
 def counted(measure: Mapping[str, Any]) -> str:
     """What counts in a quality, with weights and units, for a person.
 

@@ -11,6 +11,7 @@ from twinloop.campaign.examination.use import envelope_use
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.tables.table import Table, table_of
 from twinloop.faces.text import held_at
+from twinloop.planning.leaving import risk_words
 
 
 def gains(result: Mapping[str, Any]) -> Table | None:
@@ -156,7 +157,10 @@ def envelope(found: Examination) -> Table | None:
     risk = (
         ""
         if found.best is None or found.best.risk is None
-        else (f" Probability that the flight leaves it, according to the committee: {found.best.risk:.2g}.")
+        else (
+            f" Probability that the flight leaves it, according to the committee:"
+            f" {risk_words(found.best.risk, found.setup.predicted_flights)}."
+        )
     )
     head = ["state", "predicted (%)", "flown (%)", "largest of all flights (%)"]
     return table_of("envelope", "Use of the envelope", head, rows, f"100 % is a bound.{risk}")

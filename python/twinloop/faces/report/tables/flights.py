@@ -8,7 +8,8 @@ from typing import Any
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.units import said, words
 from twinloop.faces.report.tables.table import Table, shown_spread, table_of
-from twinloop.faces.text import counted, quality_words
+from twinloop.faces.text import counted, predicted_flights, quality_words
+from twinloop.planning.leaving import short_risk
 
 
 def flights(result: Mapping[str, Any]) -> Table:
@@ -17,14 +18,15 @@ def flights(result: Mapping[str, Any]) -> Table:
         [
             said(run["test"]), run["predicted"], shown_spread(run.get("spread")), run["measured"],
             run.get("predicted_minus_measured"),
-            run.get("risk"), run.get("why") or ("" if run["test"] is None else "Gains of your own."),
+            short_risk(run.get("risk"), predicted_flights(result)),
+            run.get("why") or ("" if run["test"] is None else "Gains of your own."),
         ]
         for run in result["experiments"]
     ]  # fmt: skip
     measure = result["quality"]
     unit = f" ({measure['unit']})" if measure["unit"] else ""
     head = ["flight", f"predicted{unit}", f"± spread{unit}", f"flown{unit}", f"predicted − flown{unit}",
-            "risk (probability)", "why"]  # fmt: skip
+            "risk", "why"]  # fmt: skip
     note = (
         f"Quality: {quality_words(measure['kind'], measure['unit'])}; lower is better. What counts: {counted(measure)}."
         " The prediction and its spread were made before the flight."

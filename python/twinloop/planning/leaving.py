@@ -1,0 +1,48 @@
+"""Leaving: the risk of leaving the envelope in words, which never claim more than the predicted flights show."""
+
+from __future__ import annotations
+
+
+def none_leaves(risk: float, flights: int | None) -> bool:
+    """Whether a risk is as small as it can be found: none of the predicted flights leaves the envelope.
+
+    With k of n flights outside, the risk is (k + 1/2) / (n + 1). A k of 1 or more would need n + 1 = 1.5 / risk flights
+    or more.
+
+    Args:
+        risk: probability.
+        flights: that are predicted at most; fewer where the committee is smaller. None: unknown.
+    """
+    return flights is not None and risk > 0.0 and 1.5 / risk > (flights + 1.0) * (1.0 + 1e-9)
+
+
+def risk_words(risk: float, flights: int | None) -> str:
+    """A risk for a person, such as "1.2 %" or "less than 0.4 % (none of 128 predicted flights leaves it)".
+
+    Args:
+        risk: probability.
+        flights: that are predicted at most; None: unknown.
+    """
+    if not none_leaves(risk, flights):
+        return f"{100.0 * risk:.2g} %"
+    count = round(0.5 / risk - 1.0)
+    return f"less than {_above(100.0 * risk):g} % (none of {count} predicted flights leaves it)"
+
+
+def short_risk(risk: float | None, flights: int | None) -> str | None:
+    """The same for a cell of a table, such as "1.2 %" or "< 0.4 %"; None without a risk.
+
+    Args:
+        risk: probability; None without a committee.
+        flights: that are predicted at most; None: unknown.
+    """
+    if risk is None:
+        return None
+    return f"< {_above(100.0 * risk):g} %" if none_leaves(risk, flights) else f"{100.0 * risk:.2g} %"
+
+
+def _above(percent: float) -> float:
+    """The next larger number of one digit."""
+    digit, exponent = f"{percent:.0e}".split("e")
+    more = 0 if float(f"{digit}e{exponent}") >= percent else 1
+    return float(f"{int(digit) + more}e{exponent}")
