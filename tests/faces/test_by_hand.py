@@ -106,6 +106,17 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     assert json.loads(run("ask", "rig.db", "--again", "--json").stdout)["test"] == 2
 
 
+def test_a_flight_without_its_excitation_is_noticed_at_once(folder):
+    run("ask", "rig.db")
+    flown(look().tests[0].quiet())
+    told = run("tell", "rig.db", "0", "flight.csv", "--json")
+    (remark,) = json.loads(told.stdout)["remarks"]
+    assert remark.startswith(
+        "The excitation of test 0 was not added to the commands: this flight tells less."
+    )
+    assert f"Against this flight: {remark}" in told.stderr
+
+
 def test_the_last_flight_is_learnt_when_that_is_asked_for_and_until_then_it_is_said(folder):
     run("ask", "rig.db")
     early = run("learn", "rig.db")

@@ -10,12 +10,13 @@ from pathlib import Path
 import click
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.assessment import foreseen
+from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, NotAvailable, at
 from twinloop.faces.answering import answer, json_option
+from twinloop.faces.cautions import serious_of
 from twinloop.faces.files import check_writable, write_text
 from twinloop.faces.from_file import file_beside
 from twinloop.faces.result import to_json
@@ -102,8 +103,9 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     stem = Path("campaign") if beside is None else beside.with_suffix("")
     file = stem.with_name(f"{stem.name}-test-{test.number}.csv")
     write_columns(file, columns(test, predicted))
-    text = sheet(shown_name(store), test, predicted, str(file), campaign.setup)
-    return text, facts(test, file, bool(campaign.experiments))
+    against_twin = serious_of(latest_lesson(campaign))
+    text = sheet(shown_name(store), test, predicted, str(file), campaign.setup, against_twin)
+    return text, facts(test, file, bool(campaign.experiments), predicted, against_twin)
 
 
 @click.command()

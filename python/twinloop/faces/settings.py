@@ -62,7 +62,9 @@ def settings(
                 " themselves; send the table of commands."
             )
     if asked.excitation is not None and asked.hold_back is not None:
-        said += " The excitation is to be held back as the test sheet says; the table has the whole of it."
+        said += (
+            " The excitation is to be held back as the test sheet says; the table has the rows to be scaled."
+        )
     columns = _columns(campaign, asked)
     output.mkdir(parents=True, exist_ok=True)
     for file, text in texts.items():

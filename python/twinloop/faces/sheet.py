@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
 from twinloop.campaign.setup import Setup
+from twinloop.faces.cautions import band_leaves, leaving, not_reliable
 from twinloop.faces.text import quality_words, table
 from twinloop.logs import TIME
 from twinloop.planning.leaving import risk_words
 from twinloop.planning.quality import quality_unit
+from twinloop.remarks import Remark
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -123,13 +126,17 @@ def _listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def facts(test: Test, file: Path, flown: bool) -> dict[str, object]:
+def facts(
+    test: Test, file: Path, flown: bool, predicted: Trajectory | None, against: Sequence[Remark]
+) -> dict[str, object]:
     """The sheet as values.
 
     Args:
         test: to be flown.
         file: where its columns are.
         flown: whether there is any run yet.
+        predicted: its run on the twin; None where nothing is known yet.
+        against: what speaks against the twin.
     """
     signals = test.family.signals
     return {
@@ -145,6 +152,8 @@ def facts(test: Test, file: Path, flown: bool) -> dict[str, object]:
         "spread": test.spread,
         "risk": test.risk,
         "risk_unknown": unknown_risk(test) if test.risk is None else None,
+        "band_leaves": {name: list(times) for name, times in leaving(signals, predicted).items()},
+        "serious": list(dict.fromkeys(remark.code for remark in against)),
         "why": reason(test, flown),
         "file": str(file),
     }
@@ -163,7 +172,8 @@ def _held_back(test: Test, file: str) -> list[str]:
         "",
         f"Scale it each period by the readings: the full row while every state is in its inner"
         f" range, nothing once one has left its outer range, linear in between; the state with the smallest"
-        f" factor decides. {file} has the whole of it.",
+        f" factor decides. {file} has the rows to be scaled. For a program that cannot do this, set hold_back = false"
+        " under [options] and begin a new campaign: then the excitation stays small.",
         "",
         table(["state", "inner range", "outer range", "unit"], rows),
     ]
@@ -174,7 +184,14 @@ def _range(ends: list[float | None]) -> str:
     return f"{low} to {high}"
 
 
-def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, setup: Setup) -> str:
+def sheet(
+    store: str,
+    test: Test,
+    predicted: Trajectory | None,
+    file: str,
+    setup: Setup,
+    against: Sequence[Remark] = (),
+) -> str:
     """The test sheet, to be printed.
 
     Args:
@@ -183,6 +200,7 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, setup
         predicted: its run on the twin; None where nothing is known yet.
         file: where its columns are.
         setup: of the campaign.
+        against: what speaks against the twin.
     """
     signals, units = test.family.signals, {gain.name: gain.unit for gain in test.family.law_gains}
     gains = [[name, f"{value:.9g}", units[name]] for name, value in test.parameters.items()]
@@ -209,6 +227,8 @@ def sheet(store: str, test: Test, predicted: Trajectory | None, file: str, setup
         lines += ["", _expected(test, predicted), ""]
     risk = unknown_risk(test) if test.risk is None else f"{risk_words(test.risk, setup.predicted_flights)}."
     lines.append(f"Risk of leaving the envelope: {risk}")
+    lines += band_leaves(signals, predicted)
+    lines += not_reliable(store, against)
     lines.append(reason(test, predicted is not None))
     lines.append(f"Record t, {', '.join((*signals.state_names, *signals.command_names))}, then:")
     lines.append(f"  twinloop tell {store} {test.number} FLIGHT.csv")

@@ -16,8 +16,9 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from twinloop.campaign.assessment import foreseen
+from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
+from twinloop.faces.cautions import serious_of
 from twinloop.faces.dashboard.desk import Desk
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.report.page import source_page, style, templates
@@ -219,7 +220,10 @@ class Pages:
         campaign = self.desk.look(name)
         test = numbered(campaign, number)
         predicted = foreseen(campaign, test)
-        return sheet(Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup)
+        against = serious_of(latest_lesson(campaign))
+        return sheet(
+            Path(self.desk.store).name, test, predicted, f"test-{number}.csv", campaign.setup, against
+        )
 
     def _columns(self, name: str, number: int) -> str:
         campaign = self.desk.look(name)

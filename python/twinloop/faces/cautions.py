@@ -1,0 +1,77 @@
+"""Cautions on a test sheet: a band that leaves the envelope, and a twin that is not reliable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.campaign.history import Lesson
+from twinloop.remarks import Remark
+from twinloop.signals import Signals
+from twinloop.trajectory import Trajectory
+
+
+def leaving(signals: Signals, predicted: Trajectory | None) -> dict[str, tuple[float, float]]:
+    """First and last time at which the predicted band of a state is beyond its envelope, s, by name.
+
+    Args:
+        signals: of the system.
+        predicted: run with its band; None where nothing is known yet.
+    """
+    if predicted is None or predicted.band is None:
+        return {}
+    found = {}
+    for i, state in enumerate(signals.states):
+        if state.envelope is None:
+            continue
+        low, high = predicted.band[:, :, i]
+        beyond = np.flatnonzero(~((low >= state.envelope[0]) & (high <= state.envelope[1])))
+        if len(beyond):
+            found[state.name] = float(predicted.t[beyond[0]]), float(predicted.t[beyond[-1]])
+    return found
+
+
+def band_leaves(signals: Signals, predicted: Trajectory | None) -> list[str]:
+    """That the band contradicts a small risk, where it leaves the envelope: a line, or none.
+
+    Args:
+        signals: of the system.
+        predicted: run with its band; None where nothing is known yet.
+    """
+    end = 0.0 if predicted is None else float(predicted.t[-1])
+    parts = [
+        f"of {name} leaves its envelope {_when(first, last, end)}"
+        for name, (first, last) in leaving(signals, predicted).items()
+    ]
+    return [f"The band {', that '.join(parts)}: the twin is not sure of this flight."] if parts else []
+
+
+def _when(first: float, last: float, end: float) -> str:
+    if last >= end:
+        return f"from {first:.4g} s on"
+    return f"at {first:.4g} s" if first == last else f"between {first:.4g} and {last:.4g} s"
+
+
+def serious_of(lesson: Lesson | None) -> list[Remark]:
+    """What speaks against a twin so much that it is not reliable.
+
+    Args:
+        lesson: its last; None where nothing was learnt.
+    """
+    return [] if lesson is None else [remark for remark in lesson.remarks if remark.serious]
+
+
+def not_reliable(store: str, remarks: Sequence[Remark]) -> list[str]:
+    """That the twin is not reliable, with the first reason: a line, or none.
+
+    Args:
+        store: of the campaign, as the next command names it.
+        remarks: serious ones.
+    """
+    if not remarks:
+        return []
+    codes = ", ".join(dict.fromkeys(remark.code for remark in remarks))
+    return [
+        f"The twin is not reliable yet ({codes}): {remarks[0].sentence} twinloop show {store} has the whole."
+    ]

@@ -1,0 +1,76 @@
+"""What a test sheet says against its own prediction: the band leaves the envelope, the twin is not reliable."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS
+from lives import SMALL
+from twinloop.faces.cautions import leaving
+from twinloop.faces.sheet import facts, sheet
+from twinloop.remarks import serious
+
+SIGNALS = tl.Signals(
+    [
+        tl.State("angle", "rad", scale=3.0, envelope=(-1.0, 1.5)),
+        tl.State("rate", "rad/s", scale=8.0, derivative_of="angle", envelope=(-8.0, 8.0)),
+    ],
+    [tl.Command("torque", "N m", bounds=(-2.0, 2.0))],
+    dt=0.05,
+)
+T = 0.05 * np.arange(21)
+
+
+@pytest.fixture
+def campaign():
+    return tl.Campaign(
+        SIGNALS, controller=PENDULUM_CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=1.0,
+        threads=1, options=SMALL,
+    )  # fmt: skip
+
+
+def predicted(low=-0.1, high=0.1, rate=0.0):
+    """A run at rest with a band; its ends may vary in time."""
+    band = np.zeros((2, 21, 2))
+    band[0, :, 0], band[1, :, 0], band[0, :, 1] = low, high, rate
+    return tl.Trajectory(T, np.zeros((21, 2)), np.zeros((20, 1)), band=band)
+
+
+def said(campaign, run, against=()):
+    test = campaign.test(PENDULUM_GAINS)
+    return sheet("rig.db", test, run, "rig-test-0.csv", campaign.setup, against)
+
+
+def test_a_band_that_leaves_the_envelope_is_said(campaign):
+    assert "The band" not in said(campaign, predicted()) + said(campaign, None)
+    to_the_end, for_a_while = np.where(T > 0.62, 1.6, 0.1), np.where((T > 0.32) & (T < 0.58), -1.2, -0.1)
+    assert (
+        "\nThe band of angle leaves its envelope from 0.65 s on: the twin is not sure of this flight.\n"
+        in said(campaign, predicted(high=to_the_end))
+    )
+    assert "of angle leaves its envelope between 0.35 and 0.55 s:" in said(
+        campaign, predicted(low=for_a_while)
+    )
+    both = predicted(high=to_the_end, rate=np.where(np.arange(21) == 3, -9.0, 0.0))
+    assert leaving(SIGNALS, both) == {"angle": (pytest.approx(0.65), 1.0), "rate": (pytest.approx(0.15),) * 2}
+    assert "from 0.65 s on, that of rate leaves its envelope at 0.15 s:" in said(campaign, both)
+
+
+def test_a_twin_that_is_not_reliable_is_said_with_the_first_reason(campaign):
+    against = [serious("free-run", "It misses angle."), serious("unmoved", "Nothing drives rate.")]
+    line = "\nThe twin is not reliable yet (free-run, unmoved): It misses angle. twinloop show rig.db has the whole.\n"
+    assert line in said(campaign, predicted(), against)
+    assert "not reliable" not in said(campaign, predicted())
+    test = campaign.test(PENDULUM_GAINS)
+    found = facts(test, Path("rig-test-0.csv"), True, predicted(high=2.0), against)
+    assert found["serious"] == ["free-run", "unmoved"] and found["band_leaves"] == {"angle": [0.0, 1.0]}
+
+
+def test_a_sheet_says_what_is_scaled_and_what_a_program_does_that_cannot(campaign):
+    text = said(campaign, None)
+    assert "rig-test-0.csv has the rows to be scaled." in text and "hold_back = false under [options]" in text
+    quiet = replace(campaign.test(PENDULUM_GAINS), excitation=None, hold_back=None)
+    assert "hold_back" not in sheet("rig.db", quiet, None, "rig-test-0.csv", campaign.setup)
