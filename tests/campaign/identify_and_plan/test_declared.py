@@ -50,6 +50,8 @@ def test_body_rates_declared_as_derivatives_are_called_so_and_which_angle_is_whi
     (remark,) = said(flight(0.6, True, order, seed), signals(order))
     assert remark.code == "body-rates" and remark.serious
     assert f"RigidBody(angles={ANGLES}, rates={RATES})" in str(remark)
+    assert '[kinematics] with angles = ["roll", "pitch", "yaw"] and rates = ["p", "q", "r"]' in str(remark)
+    assert "Remove derivative_of" in str(remark) and "begin a new one" in str(remark)
 
 
 @pytest.mark.parametrize("seed", range(3))

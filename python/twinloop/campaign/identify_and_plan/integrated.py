@@ -1,0 +1,54 @@
+"""Integrated: a state, held against the integral of what is said to be its derivative."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop._ground.arrays import Floats
+
+MOVED = 20.0
+"""Standard deviations of its noise that a state must have moved before it is held against its derivative."""
+BENT = 5.0
+"""The same about a line, which is all that a biased rate adds."""
+WALKED = 3.0
+"""Standard deviations of the random walk, which noise becomes when a rate is integrated, that this must have moved."""
+AS_FAST = (0.5, 2.0)
+"""Times as fast as its derivative says, between which a state is taken to do what was declared."""
+ALIKE = 0.5
+"""Correlation with its integrated derivative below which a state is taken to do something else."""
+
+
+def contradiction(pairs: Sequence[tuple[Floats, ...]], least: float, least_declared: float) -> str | None:
+    """How states contradict what their derivatives say: "" if they do not, None if they moved too little to tell.
+
+    Args:
+        pairs: of each run, the state and the same by its derivative.
+        least: mean square that the state must have.
+        least_declared: sum of squares that its integrated derivative must have.
+    """
+    found, declared = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    size, declared_size, product = (
+        float(values.sum()) for values in (np.square(found), np.square(declared), found * declared)
+    )
+    if size <= len(found) * least or declared_size <= least_declared:
+        return None
+    if product * product < ALIKE * ALIKE * size * declared_size:
+        return "does not change as"
+    if not AS_FAST[0] * declared_size < product < AS_FAST[1] * declared_size:
+        return f"changes {product / declared_size:.3g} times as fast as"
+    return ""
+
+
+def moved(state: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
+    """A state over a run, and the same by its derivative, each less its mean."""
+    said = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
+    return state - state.mean(), said - said.mean()
+
+
+def without_line(values: Floats) -> Floats:
+    """Values less their regression on a constant and time (n,)."""
+    time = np.arange(len(values)) - 0.5 * (len(values) - 1)
+    rest: Floats = values - values.mean()
+    return rest - time * (float((time * rest).sum()) / max(float(np.square(time).sum()), 1.0))
