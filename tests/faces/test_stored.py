@@ -55,9 +55,9 @@ def test_what_a_store_holds_is_shown(store):
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        (("--seed", "1"), "setup.seed = 0, found 1"),
+        (("--seed", "1"), "seed: 0 in the store, 1 now"),
         (("--set", "mutants=4"), "setup.options.mutants"),
-        (("--noise", "0.002"), "system.noise = 0.001, found 0.002"),
+        (("--noise", "0.002"), "noise: 0.001 in the store, 0.002 now"),
         (("--experiments", "1"), "at least the 2 runs"),
     ],
 )

@@ -291,8 +291,8 @@ def test_another_system_than_the_one_that_was_flown_is_refused(path):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"seed": 4}, "setup.seed = 0, found 4"),
-        ({"options": {**TINY, "mutants": 5}}, "setup.options.mutants = 3, found 5"),
+        ({"seed": 4}, "seed: 0 in the store, 4 now"),
+        ({"options": {**TINY, "mutants": 5}}, "options: mutants: 3 in the store, 5 now"),
         ({"target_state": [2.0, 0.0]}, "target_state"),
         ({"preset": "default", "options": SMALL}, "preset = 'paper', found 'default'"),
     ],

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from twinloop import _core
 from twinloop._ground.arrays import whole
 from twinloop._ground.versions import versions
+from twinloop.campaign.differing import differences
 from twinloop.campaign.history import Progress
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.method import Method
@@ -60,7 +61,7 @@ class Keeping:
             held = found(store, name)
             assert held is not None  # the keeper has entered it
             known = Setup.from_record(held.setup).to_record()
-            _check_same(known, asked, f"Store {store.name}: expected the campaign {name!r}", "setup")
+            _check_same(known, asked, f"Store {store.name}: expected the campaign {name!r} as it was begun")
             self._keeper.open_session(provenance(threads))
         except BaseException:
             self.close()
@@ -144,8 +145,8 @@ class Keeping:
         """
         record = system.to_record() if isinstance(system, Recorded) else None
         if record is not None and self._system is not None:
-            what = f"Campaign.run, system: expected the one that {self.name} has flown so far,"
-            _check_same({**self._system, "runs": None}, {**record, "runs": None}, what, "system")
+            what = f"Campaign.run, system: expected the one that {self.name} has flown so far"
+            _check_same({**self._system, "runs": None}, {**record, "runs": None}, what)
             if self._runs is None:
                 self._runs = self._system.get("runs")
         elif record is not None:
@@ -287,19 +288,10 @@ def _check_name(name: object) -> None:
         )
 
 
-def _check_same(known: Any, asked: Any, what: str, where: str) -> None:
+def _check_same(known: Any, asked: Any, what: str) -> None:
     """Refuses another setup or system than the one that is known, and says where they differ."""
-    if known == asked:
-        return
-    if isinstance(known, dict) and isinstance(asked, dict) and set(known) == set(asked):
-        for key in known:
-            _check_same(known[key], asked[key], what, f"{where}.{key}")
-    raise InvalidInput(
-        f"{what} with {where} = {_short(known)}, found {_short(asked)}; use another store or another name, or the same"
-        " arguments as before."
-    )
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:60]}…"
+    if known != asked:
+        raise InvalidInput(
+            f"{what}, found another: {differences(known, asked)}; use another store or another name, or the same"
+            " campaign file or arguments as before."
+        )

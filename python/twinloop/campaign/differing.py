@@ -1,0 +1,90 @@
+"""Differing: which values of two plain forms differ, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+LONGEST = 60
+"""Characters of a value that are shown."""
+MOST = 3
+"""Differences that are shown."""
+ABSENT = object()
+
+
+def differences(known: object, asked: object) -> str:
+    """What differs between what a store holds and what is asked for now; empty where nothing does.
+
+    Args:
+        known: plain form of what the store holds.
+        asked: the same of what is asked for.
+
+    Returns:
+        Such as "signals: state p: derivative_of: 'roll' in the store, none now".
+    """
+    found = list(_found(known, asked, ()))
+    more = f"; and {len(found) - MOST} more" if len(found) > MOST else ""
+    return "; ".join(found[:MOST]) + more
+
+
+def _found(known: Any, asked: Any, place: tuple[str, ...]) -> Iterator[str]:
+    if known == asked:
+        return
+    if isinstance(known, Mapping) and isinstance(asked, Mapping):
+        for key in dict.fromkeys([*known, *asked]):
+            yield from _found(known.get(key, ABSENT), asked.get(key, ABSENT), (*place, str(key)))
+    elif _named(known) and _named(asked):
+        yield from _of_members(known, asked, place)
+    elif isinstance(known, (list, tuple)) and isinstance(asked, (list, tuple)) and len(known) == len(asked):
+        for i, (one, other) in enumerate(zip(known, asked, strict=True)):
+            yield from _found(one, other, (*place, str(i + 1)))
+    else:
+        one, other = _cut(_words(known), _words(asked))
+        yield f"{': '.join(place)}: {one} in the store, {other} now"
+
+
+def _named(value: object) -> bool:
+    """Whether it is a list of records with names, such as states."""
+    return isinstance(value, (list, tuple)) and all(
+        isinstance(item, Mapping) and "kind" in item and "name" in item for item in value
+    )
+
+
+def _of_members(
+    known: Sequence[Mapping[str, Any]], asked: Sequence[Mapping[str, Any]], place: tuple[str, ...]
+) -> Iterator[str]:
+    """Differences of the members by name; of their order where they are the same ones."""
+    ours, theirs = ({item["name"]: item for item in items} for items in (known, asked))
+    for name in dict.fromkeys([*ours, *theirs]):
+        item = ours[name] if name in ours else theirs[name]
+        where = (*place[:-1], f"{item['kind']} {name}")
+        if name in ours and name in theirs:
+            yield from _found(ours[name], theirs[name], where)
+        else:
+            yield f"{': '.join(where)}: {'in the store, none now' if name in ours else 'none in the store, there now'}"
+    if list(ours) != list(theirs) and set(ours) == set(theirs):
+        yield f"{': '.join(place)}: in the order {', '.join(ours)} in the store, {', '.join(theirs)} now"
+
+
+def _words(value: object) -> str:
+    if value is None or value is ABSENT:
+        return "none"
+    if isinstance(value, Mapping):
+        return ", ".join(
+            f"{key} {_words(item)}" for key, item in value.items() if key not in ("kind", "version")
+        )
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_words, value))}]"
+    return repr(value)
+
+
+def _cut(one: str, other: str) -> tuple[str, str]:
+    """Both in short, from shortly before where they differ."""
+    first = next((i for i, pair in enumerate(zip(one, other, strict=False)) if pair[0] != pair[1]), 0)
+    start = max(0, first - LONGEST // 2) if max(len(one), len(other)) > LONGEST else 0
+
+    def cut(text: str) -> str:
+        end = start + LONGEST
+        return f"{'…' if start else ''}{text[start:end]}{'…' if len(text) > end else ''}"
+
+    return cut(one), cut(other)
