@@ -173,3 +173,10 @@ def test_a_rate_is_not_declared_in_another_unit_than_its_angle(angle, rate):
     ):
         tl.Signals(states, [command], 0.01)
     tl.Signals([states[0], tl.State("turn", f"{angle}/s", 1.0, derivative_of="tilt")], [command], 0.01)
+
+
+def test_an_angle_that_a_body_turns_has_no_derivative_besides_and_it_is_said_where_to_remove_it():
+    names = ("roll", "pitch", "yaw", "p", "q", "r")
+    states = [state(name, {"p": "roll"}.get(name)) for name in names]
+    with pytest.raises(tl.InvalidInput, match="remove `derivative_of` from 'p'"):
+        tl.Signals(states, [COMMAND], 0.1, kinematics=tl.RigidBody(names[:3], names[3:]))

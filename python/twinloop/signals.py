@@ -181,6 +181,18 @@ class Signals(Recorded, kind="signals"):
             for name in (*self.kinematics.angles, *self.kinematics.rates):
                 if name not in self.state_names:
                     raise unknown("state in the kinematics", name, self.state_names)
+            self._check_turned(self.kinematics)
+
+    def _check_turned(self, body: RigidBody) -> None:
+        """Refuses angles of a body that have a derivative besides: body rates already say how they turn."""
+        declared = [state for state in self.states if state.derivative_of in body.angles]
+        if declared:
+            found = ", ".join(f"{state.name!r} of {state.derivative_of!r}" for state in declared)
+            raise InvalidInput(
+                f"Signals: expected angles that the kinematics alone turn, found derivatives too: {found}; remove"
+                f" `derivative_of` from {', '.join(repr(state.name) for state in declared)}, because body rates are not"
+                " the derivatives of the angles."
+            )
 
     def _check_derivatives(self) -> None:
         parents = {state.name: state.derivative_of for state in self.states}

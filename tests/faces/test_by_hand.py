@@ -16,7 +16,7 @@ import twinloop as tl
 from conftest import pendulum_step
 from lives import SIGNALS, SMALL
 from sameness import same
-from twinloop.campaign.campaign_file import _toml, read_file, template
+from twinloop.campaign.campaign_file import _toml, read_file, read_signals, template
 from twinloop.faces.cli import main
 from twinloop.faces.sheet import foretold
 from twinloop.faces.telling import numbered
@@ -316,7 +316,17 @@ def test_a_changed_campaign_file_is_refused(folder):
     file = folder / "rig.toml"
     file.write_text(file.read_text(encoding="utf-8").replace("seed = 0", "seed = 1"), encoding="utf-8")
     refused = run("ask", "rig.db")
-    assert refused.exit_code == 2 and "setup.seed = 0, found 1" in refused.stderr
+    assert refused.exit_code == 2 and "seed: 0 in the store, 1 now" in refused.stderr
+
+
+def test_what_differs_between_a_store_and_its_file_is_named_where_long_lists_begin_alike(folder):
+    run("ask", "rig.db")
+    file = folder / "rig.toml"
+    before = file.read_text(encoding="utf-8")
+    file.write_text(before.replace('derivative_of = "angle"\n', ""), encoding="utf-8")
+    refused = run("ask", "rig.db")
+    assert refused.exit_code == 2
+    assert "signals: state rate: derivative_of: 'angle' in the store, none now" in refused.stderr
 
 
 # The campaign file
@@ -333,6 +343,22 @@ def test_the_file_that_is_written_is_a_campaign_with_every_default(tmp_path):
     assert read_file(tmp_path / "all.toml").campaign().setup.to_record() == plain.setup.to_record()
 
 
+def test_the_body_that_stands_in_the_file_as_a_comment_can_be_declared(tmp_path):
+    _, block, rest = template("rig.db").partition("# [kinematics]")
+    lines = (block + rest).split("\n\n")[0]
+    states = "".join(
+        f'[states.{name}]\nunit = "{unit}"\nscale = 1.0\n'
+        for name, unit in [*((n, "rad") for n in ("roll", "pitch", "yaw")), *((n, "rad/s") for n in "pqr")]
+    )
+    commands = '[commands.u]\nunit = "N m"\nbounds = [-1.0, 1.0]\n'
+    file = tmp_path / "rig.toml"
+    file.write_text(
+        "dt = 0.01\n" + states + "\n".join(line[2:] for line in lines.split("\n")) + "\n" + commands,
+        encoding="utf-8",
+    )
+    assert read_signals(file)[0].kinematics == tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "r"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "word"),
     [
@@ -347,6 +373,13 @@ def test_the_file_that_is_written_is_a_campaign_with_every_default(tmp_path):
         ("scale = 3.14", 'scale = "3.14"', "number"),
         ("[task]", "[task", "expected TOML"),
         ("[states.angle]", "[states.'angle; rm']", "rename"),
+        ("dt = 0.05", "dt = 0.05\nkinematics = 'x'", r"write a section \[kinematics\] with angles = \["),
+        ("[first]", "[kinematics]\nangle = []\n[first]", "did you mean 'angles'"),
+        (
+            "[first]",
+            '[kinematics]\nangles = ["angle"]\n[first]',
+            r"\[kinematics\]: expected rates, found none",
+        ),
     ],
 )
 def test_a_file_with_a_mistake_is_refused_with_what_is_wrong(tmp_path, old, new, word):

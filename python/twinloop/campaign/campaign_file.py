@@ -25,6 +25,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+KINEMATICS = '[kinematics] with angles = ["roll", "pitch", "yaw"] and rates = ["p", "q", "r"], names of states of yours'
 MOST_BYTES = 10_000_000
 """Of a campaign file."""
 SECTIONS = (
@@ -51,6 +52,10 @@ derivative_of = "angle"
 envelope = [-12.0, 12.0]
 # noise = 0.01                   # standard deviation of the sensor, if it is known
 # periodic = false               # true: an angle that wraps
+
+# [kinematics]                   # if gyroscopes measure the body rates of roll, pitch and yaw: instead of derivative_of
+# angles = ["roll", "pitch", "yaw"]
+# rates = ["p", "q", "r"]        # about x, y and z of the body
 
 [commands.torque]                # one section a command
 unit = "N m"
@@ -247,8 +252,19 @@ def _signals(found: Mapping[str, Any]) -> Signals:
         states=_members(found, "states", State),
         commands=_members(found, "commands", Channel),
         dt=found["dt"],
-        kinematics=_tagged(found["kinematics"], RigidBody) if "kinematics" in found else None,
+        kinematics=_kinematics(found["kinematics"]) if "kinematics" in found else None,
     )
+
+
+def _kinematics(value: object) -> RigidBody:
+    if not isinstance(value, Mapping):
+        raise InvalidInput(
+            f"Campaign file, kinematics: expected a section, found {value!r}; write a section {KINEMATICS}."
+        )
+    _keys(value, ("angles", "rates"), ("angles", "rates"), "[kinematics]")
+    with at("Campaign file, [kinematics]"):
+        body: RigidBody = _tagged(value, RigidBody)
+    return body
 
 
 def read_autopilot(path: str | Path) -> Declared | None:
