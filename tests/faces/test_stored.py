@@ -56,7 +56,7 @@ def test_what_a_store_holds_is_shown(store):
     ("change", "word"),
     [
         (("--seed", "1"), "seed: 0 in the store, 1 now"),
-        (("--set", "mutants=4"), "setup.options.mutants"),
+        (("--set", "mutants=4"), "options: mutants: "),
         (("--noise", "0.002"), "noise: 0.001 in the store, 0.002 now"),
         (("--experiments", "1"), "at least the 2 runs"),
     ],
