@@ -284,7 +284,7 @@ def test_another_system_than_the_one_that_was_flown_is_refused(path):
     campaign = tl.Campaign(system.signals, **arguments)
     campaign.run(system, 1)
     campaign.close()
-    with pytest.raises(tl.InvalidInput, match=r"system\.noise = 0\.0, found 0\.01"):
+    with pytest.raises(tl.InvalidInput, match=r"found another: noise: 0\.0 in the store, 0\.01 now"):
         tl.Campaign(system.signals, **arguments).run(tl.systems.Quadrotor(noise=0.01), 2)
 
 
@@ -294,7 +294,7 @@ def test_another_system_than_the_one_that_was_flown_is_refused(path):
         ({"seed": 4}, "seed: 0 in the store, 4 now"),
         ({"options": {**TINY, "mutants": 5}}, "options: mutants: 3 in the store, 5 now"),
         ({"target_state": [2.0, 0.0]}, "target_state"),
-        ({"preset": "default", "options": SMALL}, "preset = 'paper', found 'default'"),
+        ({"preset": "default", "options": SMALL}, "preset: 'paper' in the store, 'default' now"),
     ],
 )
 def test_another_configuration_under_the_same_name_is_refused(path, pendulum, changes, word):
