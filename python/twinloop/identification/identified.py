@@ -13,7 +13,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.sensors.noise import exact
+from twinloop.identification.sensors.noise import KINEMATIC, exact
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 from twinloop.law.noise import CorrelatedDisturbance, Noise
@@ -118,7 +118,9 @@ class Identified(Recorded, kind="identified"):
         moves = np.zeros(signals.n_x)
         for chain in self.chains:
             period = signals.dt if chain.integrated else 1.0
-            moves[chain.states[0]] = np.sqrt(chain.motion.white * period)
+            # What stirs an angle beyond its sensor's noise is the disturbance of its rate, which moves it by itself.
+            most = np.inf if chain.output is not None else KINEMATIC * float(chain.sensors[0])
+            moves[chain.states[0]] = np.sqrt(min(chain.motion.white * period, most))
         correlated = [
             CorrelatedDisturbance(
                 tuple(chain.states),

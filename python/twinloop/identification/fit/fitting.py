@@ -15,7 +15,7 @@ from twinloop.identification.fit.tuning import tune
 from twinloop.identification.fit.unused import without_unused
 from twinloop.identification.hypothesis import Fit, Hypothesis
 from twinloop.identification.search.structure import Sum, Weights, prices
-from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.chains import Chain, stirred
 from twinloop.identification.terms.bounds import excludes_zero
 from twinloop.law.actuation import Actuation
 
@@ -85,7 +85,8 @@ def _tuned(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Fit]:
     """The hypothesis with its model tuned, and that fit."""
     hypothesis = without_unused(hypothesis)
     sums, steps = hypothesis.sums, context.options.tuning_steps
-    observer = [*(found.chain for found in sums), *hypothesis.given]
+    driven = [found.chain for found in sums]
+    observer = [*driven, *stirred(hypothesis.given, driven, context.signals)]
     fit, _ = tune(context, hypothesis, model_of(context, hypothesis), observer, steps)
     if not fit.stable:
         # Held to its readings at every step it cannot diverge; from there it may be let go.

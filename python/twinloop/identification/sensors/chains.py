@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -118,3 +119,35 @@ def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
         if i not in seen:
             given.append(Chain((i,), None, form, sensors[[i]], sensors[[i]]))
     return [*driven, *given]
+
+
+def stirred(given: Sequence[Chain], driven: Sequence[Chain], signals: Signals) -> list[Chain]:
+    """Angles that body rates turn, moved by what disturbs their rates within a period.
+
+    A rate that a disturbance changes by Δω in a period has turned its angle by half of that more than the rate at the
+    beginning says. An observer that took the angle for certain would let it drift from its readings, and constants that
+    are tuned on its predictions would take the blame. A slow disturbance adds up over the periods: it counts by its
+    spectral density at rest.
+
+    Args:
+        given: chains of angles that other states drive.
+        driven: chains with outputs, with what disturbs them.
+        signals: of the system.
+
+    Returns:
+        The angles' chains, for an observer alone: what disturbs rates moves their angles in a simulation by itself.
+    """
+    body, names = signals.kinematics, signals.state_names
+    if body is None:
+        return list(given)
+    motions = {names[chain.states[0]]: chain.motion for chain in driven}
+    of = {names.index(angle): motions.get(rate) for angle, rate in zip(body.angles, body.rates, strict=True)}
+    found = []
+    for chain in given:
+        motion = of.get(chain.states[0])
+        if motion is not None:
+            density = motion.white / 3.0 + motion.correlated * motion.correlation_time / 2.0
+            white = max(chain.motion.white, signals.dt * signals.dt * density)
+            chain = replace(chain, motion=chain.motion._replace(white=white))
+        found.append(chain)
+    return found

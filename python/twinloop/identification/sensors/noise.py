@@ -29,6 +29,8 @@ NOTHING = 0.01
 """χ² a reading below which the noise was not estimated but held at the least that is believed: readings are exact."""
 CALM = 1e-2
 """Variance, in a sensor's, of what disturbs in a period and is hardly seen."""
+KINEMATIC = 1e-4
+"""Variance, in its sensor's, of what moves an angle in a period beside the body rates that turn it."""
 FEW_READINGS = 20
 """Fewest readings from which the noise of an angle that body rates turn is estimated."""
 OUTLYING = 6.0
@@ -55,7 +57,7 @@ def declared_noise(chain: Chain, signals: Signals) -> Chain:
 def given_noise(chain: Chain, signals: Signals) -> Chain:
     """An angle that body rates turn: what it does between readings is known but for the rates' own noise."""
     sensors = declared_noise(chain, signals).sensors
-    return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
+    return chain.with_noise(sensors, (KINEMATIC * float(sensors[0]) / signals.dt, 0.0, 1.0))
 
 
 def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chain:
@@ -83,7 +85,7 @@ def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chai
     rough = float(chain.rough[0])
     found = min(-float(products.mean()), rough)
     sensors = np.array([max(BEST_SENSOR * BEST_SENSOR * rough, found)])
-    return chain.with_noise(sensors, (1e-4 * float(sensors[0]) / signals.dt, 0.0, 1.0))
+    return chain.with_noise(sensors, (KINEMATIC * float(sensors[0]) / signals.dt, 0.0, 1.0))
 
 
 def floor_of(chain: Chain, dt: float, integration: float = 0.0) -> tuple[Floats, Motion]:
