@@ -103,7 +103,8 @@ def grown(
     family, genes, target, _ = three_axes(seed)
     stream = Unit(seed, (0,)).stream("exam")
     sizes = np.array([command.scale for command in family.signals.commands])
-    return growing_chirps(family, share * genes, target, 100, amplitude, most, 0.25, stream, flights) / sizes
+    along = directions(family, share * genes, target)
+    return growing_chirps(family.signals, along, 100, amplitude, most, 0.25, stream, flights) / sizes
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -147,18 +148,9 @@ def test_it_grows_during_the_flight_and_the_next_flight_begins_where_it_ended(se
 def test_a_controller_that_answers_no_error_does_not_limit_its_excitation():
     known = signals()
     family = family_of(known)
-    _, sent = directions(family, np.zeros(family.size), np.zeros(known.n_x))
-    assert not sent.any()
-    added = growing_chirps(
-        family,
-        np.zeros(family.size),
-        np.zeros(known.n_x),
-        100,
-        0.02,
-        0.02,
-        0.25,
-        Unit(1, (0,)).stream("exam"),
-    )
+    along = directions(family, np.zeros(family.size), np.zeros(known.n_x))
+    assert not along[1].any()
+    added = growing_chirps(known, along, 100, 0.02, 0.02, 0.25, Unit(1, (0,)).stream("exam"))
     sizes = np.array([command.size for command in known.commands])
     assert 0.014 < np.abs(added / sizes).max() <= 0.02 + 1e-9
 

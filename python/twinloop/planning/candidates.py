@@ -8,7 +8,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.planning.excitation import chirps, growing_chirps
+from twinloop.planning.excitation import chirps, directions, growing_chirps
 from twinloop.planning.judging import Ends, Judge
 from twinloop.planning.proposal import Flown
 from twinloop.planning.settings import PlanningOptions
@@ -90,10 +90,11 @@ def candidates(
     if most > 0.0 and options.excitation > 0.0:
         # Gains that have flown bear more of it than before, and once more the same would tell little.
         stronger = min(2.0 ** max(1, flown.times) * options.excitation, most)
+        along = directions_of(judge, flown.best) if options.hold_back and not trusted else None
         for i in range(1, count):
             repeated = i >= count - again
-            if repeated and options.hold_back and not trusted:
-                excitation[i] = unknown_excitation(judge, options, flown.best, flown.borne, stream)
+            if repeated and along is not None:
+                excitation[i] = unknown_excitation(judge, options, along, flown.borne, stream)
                 continue
             amplitude = stronger if repeated else most * stream.uniform()
             excitation[i] = chirps(judge.signals, steps, amplitude, options.fade, stream)
@@ -116,20 +117,28 @@ def _ends(judge: Judge, options: PlanningOptions, number: int, count: int) -> En
     return ends[0], ends[1]
 
 
+def directions_of(judge: Judge, genes: Floats) -> tuple[Floats, Floats]:
+    """`directions` of the controller with some gains (size,), around the target of the campaign's task."""
+    return directions(judge.family, genes, np.atleast_2d(judge.task.target_state)[0])
+
+
 def unknown_excitation(
-    judge: Judge, options: PlanningOptions, genes: Floats, flights: int, stream: _core.Stream
+    judge: Judge,
+    options: PlanningOptions,
+    along: tuple[Floats, Floats],
+    flights: int,
+    stream: _core.Stream,
 ) -> Floats:
     """An excitation of a flight of the campaign's task of which no model can say where it leads (n, n_u).
 
     Args:
-        judge: of the campaign: family and task.
+        judge: of the campaign: its signals and task.
         options: of the planning; where nothing holds it back, it does not grow.
-        genes: gains that fly (size,).
+        along: `directions_of` the gains that fly.
         flights: before this one that have borne such an excitation.
         stream: of random numbers.
     """
     most = options.excitation_unknown if options.hold_back else options.excitation
-    target = np.atleast_2d(judge.task.target_state)[0]
     return growing_chirps(
-        judge.family, genes, target, judge.task.steps, options.excitation, most, options.fade, stream, flights
+        judge.signals, along, judge.task.steps, options.excitation, most, options.fade, stream, flights
     )

@@ -32,9 +32,8 @@ UNUSED = 1e-6
 
 
 def growing_chirps(
-    family: Family,
-    genes: Floats,
-    target: Floats,
+    signals: Signals,
+    along: tuple[Floats, Floats],
     steps: int,
     amplitude: float,
     most: float,
@@ -51,9 +50,8 @@ def growing_chirps(
     flight that has borne them lets the next begin where it ended.
 
     Args:
-        family: of the controllers.
-        genes: of the one that flies (size,).
-        target: that it leads to (n_x,).
+        signals: of the system.
+        along: `directions` of the controller that flies, with what it sends along them.
         steps: of the test.
         amplitude: at which the first flight begins, at most, in units of each command's scale.
         most: amplitude at the end of any flight, at most.
@@ -64,14 +62,13 @@ def growing_chirps(
     Returns:
         What is to be added to the commands (steps, n_u), in their units.
     """
-    vectors, answers = directions(family, genes, target)
+    vectors, answers = along
     first = np.minimum(amplitude, SHARE * answers)
     first = np.where(answers > 0.0, first, first.min(where=answers > 0.0, initial=amplitude))
     begin, end = (np.maximum(first, np.minimum(first * GROWTH**k, most)) for k in (flights, flights + 1))
     passed = np.arange(steps)[:, np.newaxis] / steps
     entering = np.minimum(1.0, passed / ENTERING)
     into = np.clip((passed - ENTERING) / max(1.0 - fade - ENTERING, 1.0 / steps), 0.0, 1.0)
-    signals = family.signals
     swings = _swings(signals, steps, len(answers), fade, stream, FIRST)
     swings *= entering * begin * exp(log(end / begin) * into)
     added = np.zeros((steps, signals.n_u))

@@ -14,7 +14,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Purpose
 from twinloop.controllers import Family
-from twinloop.planning.candidates import candidates, unknown_excitation
+from twinloop.planning.candidates import candidates, directions_of, unknown_excitation
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.excitation import binary, chirps, swing_of
 from twinloop.planning.gains import scores_of, tune_gains
@@ -127,7 +127,7 @@ class Planner(Judge):
         if self.options.excitation <= 0.0:
             return None, None
         stream = self.unit.part(number).stream("excitation")
-        added = unknown_excitation(self, self.options, genes, 0, stream)
+        added = unknown_excitation(self, self.options, directions_of(self, genes), 0, stream)
         return added, self.held_back(self.task.initial_state, self.task.target_state)
 
     def held_back(self, start: Floats, target: Floats, reached: Floats | None = None) -> HoldBack | None:

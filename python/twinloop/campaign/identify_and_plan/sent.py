@@ -44,10 +44,13 @@ def excited(run: Experiment) -> Excited:
     if run.test is None or run.test.excitation is None:
         return Excited.HELD_BACK
     sent, states, span = run.trajectory.commands, run.trajectory.states, _span(run.test)
-    off = {how: _off(sent, _given(as_excited(run.test, how), states), span) for how in Excited}
+    asked = _off(sent, _given(run.test, states), span)
+    if asked <= SEEN * SEEN:
+        return Excited.HELD_BACK
+    others = (Excited.WHOLE, Excited.NOT)
+    off = {how: _off(sent, _given(as_excited(run.test, how), states), span) for how in others}
     best = min(off, key=lambda how: off[how])
-    asked = off[Excited.HELD_BACK]
-    return best if asked > SEEN * SEEN and off[best] < BETTER * asked else Excited.HELD_BACK
+    return best if off[best] < BETTER * asked else Excited.HELD_BACK
 
 
 def as_excited(test: Test, how: Excited) -> Test:
