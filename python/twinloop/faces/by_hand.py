@@ -151,7 +151,7 @@ def tell(
             "spread": asked.spread,
             "quality": runs[-1].quality if runs else None,
         }
-        remarks = _against(campaign, runs[-1] if log is not None else None)
+        remarks = _against(campaign, runs[-1] if log is not None else None, asked)
         answer({**_standing(campaign, asked), **quality, "remarks": remarks}, text, as_json)
         _say(remarks)
 
@@ -200,7 +200,7 @@ def attach(store: str, flight: Path, as_json: bool) -> None:
     with closing(_campaign(store)) as campaign:
         attach_flight(campaign, flight)
         text = f"Saved: {flight}; {counted(campaign)} in {shown_name(store)}."
-        remarks = _against(campaign, campaign.experiments[-1])
+        remarks = _against(campaign, campaign.experiments[-1], None)
         answer(
             {"file": str(flight), "experiments": len(campaign.experiments), "remarks": remarks}, text, as_json
         )
@@ -220,9 +220,11 @@ def abandon(store: str, test: int, as_json: bool) -> None:
         answer(_standing(campaign, asked), text, as_json)
 
 
-def _against(campaign: Campaign, flight: Experiment | None) -> list[str]:
+def _against(campaign: Campaign, flight: Experiment | None, asked: Test | None) -> list[str]:
     """What speaks against a flight that was told."""
-    return [] if flight is None else [remark.sentence for remark in against(flight, campaign.signals)]
+    if flight is None:
+        return []
+    return [remark.sentence for remark in against(flight, asked, campaign.signals)]
 
 
 def _say(remarks: Sequence[str]) -> None:

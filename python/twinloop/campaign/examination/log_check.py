@@ -9,15 +9,17 @@ import numpy as np
 
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.excited import excited
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.declared import against_derivatives
 from twinloop.campaign.identify_and_plan.diagnostics import from_another_excitation, from_other_controllers
 from twinloop.campaign.identify_and_plan.readings import suspicious
-from twinloop.campaign.identify_and_plan.sent import excited, other_commands
+from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.errors import InvalidInput
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
+from twinloop.test import Test
 from twinloop.trajectory import JITTER, Trajectory, check_recorded
 
 LOST = 1.5
@@ -123,11 +125,12 @@ def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> 
     )
 
 
-def against(flight: Experiment, signals: Signals) -> list[Remark]:
+def against(flight: Experiment, asked: Test | None, signals: Signals) -> list[Remark]:
     """What speaks against a flight by itself, without a twin.
 
     Args:
-        flight: as it was told.
+        flight: that was recorded.
+        asked: its test as it was asked for; None for an attached flight.
         signals: declared signals.
 
     Returns:
@@ -136,7 +139,7 @@ def against(flight: Experiment, signals: Signals) -> list[Remark]:
     run = flight.trajectory
     found = check_log(run.t, run.states, run.commands, signals).remarks
     others = from_other_controllers(other_commands([flight]))
-    excitations = () if flight.test is None else from_another_excitation(flight.test.number, excited(flight))
+    excitations = () if asked is None else from_another_excitation(asked.number, excited(asked, run))
     return [*(each for each in found if each.serious), *others, *excitations]
 
 

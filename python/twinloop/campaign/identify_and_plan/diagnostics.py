@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from twinloop.campaign.excited import Excited
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.declared import against_derivatives
 from twinloop.campaign.identify_and_plan.misses import Miss
 from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.selection import distinct
-from twinloop.campaign.identify_and_plan.sent import Excited
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 

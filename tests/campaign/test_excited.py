@@ -9,10 +9,12 @@ import pytest
 import twinloop as tl
 from conftest import pendulum_step
 from lives import SIGNALS
+from oracles import same_bits
 from twinloop._experiment.hold_back import HoldBack
 from twinloop.campaign.campaign_file import read_file, template
 from twinloop.campaign.examination.log_check import against
-from twinloop.campaign.identify_and_plan.sent import Excited, as_excited, excited, other_commands
+from twinloop.campaign.excited import Excited, as_excited, excited
+from twinloop.campaign.identify_and_plan.sent import other_commands
 
 TORQUE = SIGNALS.commands[0].bounds
 
@@ -44,14 +46,18 @@ def sent(flight, change):
 
 
 def codes(flight):
-    return [(remark.code, remark.severity) for remark in against(flight, SIGNALS)]
+    return [(remark.code, remark.severity) for remark in against(flight, flight.test, SIGNALS)]
+
+
+def seen(flight):
+    return excited(flight.test, flight.trajectory)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_how_an_excitation_was_flown_is_seen_in_the_commands(test, noise):
     for how in Excited:
         flight = flown(test, how, noise)
-        assert excited(flight) is how and other_commands([flight]) == []
+        assert seen(flight) is how and other_commands([flight]) == []
     assert ("excitation", "note") in codes(flown(test, Excited.NOT, noise))
     assert ("excitation", "serious") in codes(flown(test, Excited.WHOLE, noise))
     assert "excitation" not in dict(codes(flown(test, noise=noise)))
@@ -84,21 +90,56 @@ def in_pulses(commands):
     ids=["late", "later", "late by five", "clipped", "rounded", "weaker", "noisy", "other sign", "pulses"],
 )
 def test_other_faults_of_commands_are_no_other_excitation(test, change):
-    assert excited(sent(flown(test, noise=0.01), change)) is Excited.HELD_BACK
+    assert seen(sent(flown(test, noise=0.01), change)) is Excited.HELD_BACK
 
 
 def test_where_the_excitation_was_flown_otherwise_small_faults_hide_nothing(test):
     for how in (Excited.NOT, Excited.WHOLE):
-        assert excited(sent(flown(test, how), lambda commands: 0.02 * np.round(commands / 0.02))) is how
+        assert seen(sent(flown(test, how), lambda commands: 0.02 * np.round(commands / 0.02))) is how
 
 
 def test_a_test_without_an_excitation_has_none_that_could_be_left_out(test):
     flight = flown(test.quiet())
-    assert excited(flight) is Excited.HELD_BACK and codes(flight) == []
+    assert seen(flight) is Excited.HELD_BACK and codes(flight) == []
     assert codes(SimpleNamespace(test=None, number=None, trajectory=flight.trajectory)) == []
 
 
 def test_tests_that_are_held_back_nowhere_are_flown_whole_and_as_they_say(test):
     whole = dataclasses.replace(test, hold_back=None)
-    assert excited(flown(whole)) is Excited.HELD_BACK
-    assert excited(flown(whole, Excited.NOT)) is Excited.NOT
+    assert seen(flown(whole)) is Excited.HELD_BACK
+    assert seen(flown(whole, Excited.NOT)) is Excited.NOT
+
+
+def told(campaign, first, how):
+    """A campaign that was told one flight, whose test is held back so early that it matters."""
+    asked = campaign.test(first)
+    tight = HoldBack([[-0.5, 0.8], [-9, 9]], [[-1, 0.85], [-10, 10]])
+    own = dataclasses.replace(asked, hold_back=tight, predicted=1.0)
+    campaign._book.tests[asked.number] = own
+    campaign.tell(own, flown(own, how, noise=0.001).trajectory)
+    return campaign
+
+
+@pytest.mark.parametrize("how", Excited)
+def test_a_flight_counts_as_it_was_flown(how, tmp_path):
+    file = tmp_path / "rig.toml"
+    file.write_text(template("rig.db"), encoding="utf-8")
+    campaign = told(read_file(file).campaign(threads=1), read_file(file).first, how)
+    asked, (run,) = campaign.tests[0], campaign.experiments
+    assert run.number == 0 and campaign.status(asked) == "flown"
+    assert asked.excitation is not None and asked.hold_back is not None
+    assert (run.test.excitation is None) == (how is Excited.NOT)
+    assert (run.test.hold_back is not None) == (how is Excited.HELD_BACK)
+    # What was predicted is the quality of the flight that was asked for.
+    assert run.test.predicted == (1.0 if how is Excited.HELD_BACK else None)
+    # So its own commands, and no others, are those of the record.
+    controller = run.test.controller()
+    controller.reset()
+    again = [
+        controller.command(state, run.test.target(k)) for k, state in enumerate(run.trajectory.states[:-1])
+    ]
+    assert np.abs(np.array(again) - run.trajectory.commands).max() < 0.02 * (TORQUE[1] - TORQUE[0])
+    # The record keeps what was asked for.
+    kept = tl.Campaign.from_record(campaign.to_record())
+    assert same_bits(kept.tests[0].excitation, asked.excitation) and kept.tests[0].predicted == 1.0
+    assert (kept.experiments[0].test.hold_back is None) == (run.test.hold_back is None)

@@ -1,0 +1,102 @@
+"""Excited: how the excitation of a test was flown, as the recorded commands show it.
+
+A program that flies a test may leave its excitation out, or may not be able to hold it back. The flight is learnt as it
+was flown, so a twin that is held against it has to be flown in the same way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import Enum
+
+import numpy as np
+
+from twinloop._ground.arrays import Floats
+from twinloop.campaign.history import Experiment
+from twinloop.test import Test
+from twinloop.trajectory import Trajectory
+
+BETTER = 0.25
+"""Share of the square that is off below which another excitation explains commands better. An excitation that was sent
+late is never further off than this: |e(t - d) - e(t)|² is at most 4 |e|² on average, whatever the delay."""
+SEEN = 0.005
+"""Share of their bounds by which commands are off at least before another excitation is looked for."""
+
+
+class Excited(Enum):
+    """How the excitation of a test was flown."""
+
+    HELD_BACK = "as the test says"
+    WHOLE = "without holding it back"
+    NOT = "not at all"
+
+
+def excited(test: Test, run: Trajectory) -> Excited:
+    """How the excitation of a test was flown, by the recorded commands; as the test says where they are not clear.
+
+    Args:
+        test: as it was asked for.
+        run: that was recorded of it.
+    """
+    if test.excitation is None:
+        return Excited.HELD_BACK
+    asked = apart(run.commands, given(test, run.states), test)
+    if asked <= SEEN * SEEN:
+        return Excited.HELD_BACK
+    others = (Excited.WHOLE, Excited.NOT)
+    off = {how: apart(run.commands, given(as_excited(test, how), run.states), test) for how in others}
+    best = min(off, key=lambda how: off[how])
+    return best if off[best] < BETTER * asked else Excited.HELD_BACK
+
+
+def as_excited(test: Test, how: Excited) -> Test:
+    """The same test with its excitation flown in another way.
+
+    Args:
+        test: as it was asked for.
+        how: it was flown.
+    """
+    if how is Excited.NOT:
+        return test.quiet()
+    return replace(test, hold_back=None) if how is Excited.WHOLE else test
+
+
+def as_it_was_flown(run: Experiment) -> Experiment:
+    """A run whose test is excited as the recorded commands show; nothing was predicted of it if that was not asked for.
+
+    Args:
+        run: as it was recorded.
+    """
+    if run.test is None or (how := excited(run.test, run.trajectory)) is Excited.HELD_BACK:
+        return run
+    flown = as_excited(run.test, how)
+    return replace(run, replayed=replace(flown, predicted=None, spread=None, risk=None))
+
+
+def given(test: Test, states: Floats) -> Floats:
+    """What a test's controller gives on some readings, with its excitation held back as it says (n, n_u).
+
+    Args:
+        test: that was flown.
+        states: that were read (n + 1, n_x).
+    """
+    controller = test.controller()
+    controller.reset()
+    return np.array([controller.command(state, test.target(k)) for k, state in enumerate(states[:-1])])
+
+
+def apart(sent: Floats, commands: Floats, test: Test) -> float:
+    """Mean square between commands (n, n_u), in units of their spans.
+
+    Args:
+        sent: on record.
+        commands: others.
+        test: with the signals.
+    """
+    return float(np.square((sent - commands) / span_of(test)).mean())
+
+
+def span_of(test: Test) -> Floats:
+    """From the smallest to the largest value of each command (n_u,)."""
+    low, high = np.array([command.bounds for command in test.family.signals.commands]).T
+    return np.asarray(high - low)
