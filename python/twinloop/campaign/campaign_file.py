@@ -26,6 +26,7 @@ else:
     import tomli as tomllib
 
 KINEMATICS = '[kinematics] with angles = ["roll", "pitch", "yaw"] and rates = ["p", "q", "r"], names of states of yours'
+"""What a file is told to declare where the section is not one."""
 MOST_BYTES = 10_000_000
 """Of a campaign file."""
 SECTIONS = (

@@ -46,6 +46,31 @@ def test_an_empty_equation_of_a_state_that_moves_and_that_the_controller_answers
     assert found("r4 = r3 * 2.0", turning) == []
 
 
+def test_a_reading_that_wraps_is_no_motion():
+    """An angle that turns steadily is a straight line through whole turns."""
+    heading = tl.State("heading", "rad", 3.0, periodic=True)
+    signals = tl.Signals([heading], [tl.Command("rudder", "1", (-1.0, 1.0))], 0.02)
+    family = tl.controllers.PID(
+        [("heading", None)], {"heading.kp": (0.0, 1.0), "heading.ki": 0.0, "heading.kd": 0.0}
+    ).bind(signals)
+    setup = SimpleNamespace(signals=signals, family=family, target_state=np.zeros(1))
+    program = _core.Program.parse(program_text(2, 1, 3, [["r2 = r2 + 0.0"]]))
+    identified = SimpleNamespace(
+        model=_core.Model(program, "increment", signals.engine),
+        sensors=lambda n_x: np.full(n_x, SENSOR),
+        sums=[SimpleNamespace(chain=SimpleNamespace(states=(0,)))],
+    )
+
+    def said(angle):
+        wrapped = (angle[:, np.newaxis] + np.pi) % (2.0 * np.pi) - np.pi
+        run = SimpleNamespace(states=wrapped, commands=np.zeros((STEPS, 1)))
+        return unmoved_states(identified, [SimpleNamespace(trajectory=run)], setup)
+
+    noise = SENSOR * np.random.default_rng(0).standard_normal(STEPS + 1)
+    assert said(noise + np.linspace(0.0, 10.0, STEPS + 1)) == []
+    assert said(noise + 4.0 + np.sin(np.linspace(0.0, 3.0, STEPS + 1))) == [0]
+
+
 def test_noise_and_a_straight_line_are_no_motion():
     assert found("r4 = r4 + 0.0", np.linspace(0.0, 5.0, STEPS + 1)) == []
     assert found("r4 = r4 + 0.0", np.zeros(STEPS + 1)) == []

@@ -14,6 +14,7 @@ from twinloop.campaign.identify_and_plan.integrated import (
     WALKED,
     contradiction,
     moved,
+    walk,
     without_line,
 )
 from twinloop.campaign.identify_and_plan.turning import Turned, contradictions, cures, turning
@@ -44,8 +45,7 @@ def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Ite
             continue
         j = signals.state_names.index(rate.derivative_of)
         pairs = [moved(run.states[:, j], run.states[:, i], signals.dt) for run in runs]
-        # Integrated, white noise is a random walk: about its line it has a fifteenth of its last variance.
-        walks = sum(float(noise[i]) * (signals.dt * run.steps) ** 2 / 15.0 for run in recorded)
+        walks = sum(float(walk(noise[i], signals.dt, run.steps)) for run in recorded)
         how = contradiction(
             [tuple(map(without_line, pair)) for pair in pairs], BENT**2 * noise[j], WALKED**2 * walks
         )
@@ -102,8 +102,7 @@ def _off(
         for k in range(3):
             by_angle, by_rate = moved(run.states[:, angles[k]], said[:, k], dt)
             off[k] += float(np.square(without_line(by_angle - by_rate)).sum())
-        # Integrated, white noise is a random walk: about its line it has a fifteenth of its last variance.
-        explained += len(run.states) * (noise[angles] + noise[rates] * dt * dt * len(run.states) / 15.0)
+        explained += len(run.states) * noise[angles] + walk(noise[rates], dt, len(run.states))
     return off / explained
 
 

@@ -153,7 +153,7 @@ def _model_error(states: Sequence[str]) -> Iterator[Remark]:
         yield note(
             "model-error",
             f"The disturbance of {', '.join(states)} recurs at the same times in each flight. So it"
-            " is a model error, not a disturbance: a term is missing there.",
+            " is a model error, not a disturbance: a term is missing there, or a constant is wrong.",
         )
 
 

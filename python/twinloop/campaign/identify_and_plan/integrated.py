@@ -41,6 +41,19 @@ def contradiction(pairs: Sequence[tuple[Floats, ...]], least: float, least_decla
     return ""
 
 
+def walk(variance: Floats, dt: float, steps: int) -> Floats:
+    """Sum of squares about its line of the random walk that white noise becomes when it is integrated.
+
+    On average these are a fifteenth of its last variance each.
+
+    Args:
+        variance: of the noise, any shape.
+        dt: period.
+        steps: of the record.
+    """
+    return np.asarray(variance * (dt * steps) ** 2 / 15.0)
+
+
 def moved(state: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:
     """A state over a run, and the same by its derivative, each less its mean."""
     said = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])

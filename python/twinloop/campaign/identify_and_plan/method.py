@@ -178,15 +178,18 @@ class IdentifyAndPlan:
             reason=found.reason,
             initial_state=found.initial_state,
             target_state=found.target_state,
-            hold_back=None
-            if committee.trusted or found.excitation is None
-            else self.planner.held_back(
-                found.initial_state, found.target_state, standing.reached(book, found.genes)
-            ),
+            hold_back=None if committee.trusted else self._held_back(book, found),
         )
         book.asked.append((self.iteration, _planned(test, found)))
         self.memory = replace(self.memory, asked=replace(self._latest(), gains=tuned), under_way=None)
         return test
+
+    def _held_back(self, book: Logbook, found: Proposal) -> HoldBack | None:
+        """What holds back the excitation of a test of a committee that cannot say where it leads."""
+        if found.excitation is None:
+            return None
+        reached = standing.reached(book, found.genes)
+        return self.planner.held_back(found.initial_state, found.target_state, reached)
 
     def _as_test(self, book: Logbook, found: Proposal) -> Test:
         """The test that a proposal would become."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import cos, sin
-from twinloop.campaign.identify_and_plan.integrated import BENT, WALKED, contradiction
+from twinloop.campaign.identify_and_plan.integrated import BENT, WALKED, contradiction, walk
 from twinloop.signals import RigidBody
 
 STEEP = 0.1
@@ -72,9 +72,7 @@ class Turned:
         """
         gains = [turning(self.angles, np.broadcast_to(axis, self.rates.shape)) for axis in np.eye(3)]
         each = sum(float(noise[j]) * np.square(gain).mean(axis=0) for j, gain in enumerate(gains))
-        # Integrated, white noise is a random walk: about its line it has a fifteenth of its last variance.
-        walks: Floats = each * (self.dt * len(self.angles)) ** 2 / 15.0
-        return walks
+        return walk(np.asarray(each), self.dt, len(self.angles))
 
     def _integrated(self, rates: Floats) -> Floats:
         said = turning(self.angles, rates)

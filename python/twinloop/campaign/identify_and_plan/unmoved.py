@@ -34,7 +34,8 @@ def unmoved_states(identified: Identified, experiments: Sequence[Experiment], se
     """
     signals, model = setup.signals, identified.model
     law = Law.of(model, signals)
-    sensors = np.minimum(identified.sensors(signals.n_x), _at_most(experiments, signals))
+    runs = [Run.of(run.trajectory.states, run.trajectory.commands).continued(signals) for run in experiments]
+    sensors = np.minimum(identified.sensors(signals.n_x), _at_most(runs, signals))
     target = np.atleast_2d(setup.target_state)[0]
     middle = np.array([0.5 * (gain.low + gain.high) for gain in setup.family.gains])
     answered = (slopes(setup.family, middle, target) != 0.0).any(axis=0)
@@ -44,13 +45,12 @@ def unmoved_states(identified: Identified, experiments: Sequence[Experiment], se
         for first, output in zip(driven_states(signals, model.form), law.outputs, strict=True)
         if law.expressions.constant_value(output) is not None
         and answered[by_first[first]].any()
-        and any(_moved(run.trajectory.states[:, first], sensors[first]) for run in experiments)
+        and any(_moved(run.states[:, first], sensors[first]) for run in runs)
     ]
 
 
-def _at_most(experiments: Sequence[Experiment], signals: Signals) -> Floats:
+def _at_most(runs: Sequence[Run], signals: Signals) -> Floats:
     """Largest standard deviation of each sensor (n_x,): what seems more than readings scatter is motion."""
-    runs = [Run.of(run.trajectory.states, run.trajectory.commands) for run in experiments]
     guess: Floats = np.sqrt(guessed_noise(runs, np.array([state.scale for state in signals.states])))
     return guess
 
