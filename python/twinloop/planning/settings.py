@@ -51,7 +51,7 @@ class PlanningOptions:
         delay_margin: whether gains are tuned on, and must tolerate, one more period of delay, and half of that for each
             of the last predictions of new gains in a row that came true.
         confidence: share of members and draws that must find new gains better than the best flown ones, by half a
-            percent or more; on a twin that misses its own flights, by more than its predictions have missed of late.
+            percent or more, and by more than predictions have missed of late.
         track_record: whether new gains must also be better by the error of earlier predictions.
         alone: whether flown gains are compared without the effect of their excitation.
         exploit_last: whether the last experiment of a budget flies the tuned gains without excitation.

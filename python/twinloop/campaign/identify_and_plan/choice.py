@@ -44,7 +44,7 @@ class Choice:
         book: of the campaign.
         draws: of the sensors' noise.
         confidence: share of members and draws that must find tuned gains better than the best flown, by half a percent
-            or more; on a twin that misses its own flights, by more than its predictions have missed of late.
+            or more, and by more than predictions have missed of late.
         gusts: what disturbances do to the quality of a flight.
     """
 
@@ -107,8 +107,8 @@ class Choice:
 
     @cached_property
     def _worth(self) -> float:
-        """Share of a quality by which tuned gains must be better: more than a twin misses that is known to be wrong."""
-        least = 0.0 if self.committee.explains else missed(self.book.experiments)
+        """Share of a quality by which tuned gains must be better: by more than predictions have missed of late."""
+        least = missed(self.book.experiments) if self.planner.options.track_record else 0.0
         return max(WORTH, least)
 
     @property
