@@ -24,6 +24,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.outliers import cleaned
 from twinloop.identification.proposals.apart import apart
 from twinloop.identification.proposals.at_once import at_once
+from twinloop.identification.proposals.bare import bare
 from twinloop.identification.proposals.contacts import contacts
 from twinloop.identification.proposals.friction import friction
 from twinloop.identification.proposals.hidden import hidden
@@ -45,7 +46,7 @@ from twinloop.signals import Signals
 Proposal = Callable[[Context, Hypothesis], Iterable[Hypothesis]]
 """Takes a hypothesis and gives changed ones, or none."""
 PROPOSALS: tuple[Proposal, ...] = (
-    lags, hidden, terms, undisturbed, apart, storage, friction, contacts, second_look, parts, at_once,
+    lags, hidden, terms, undisturbed, apart, storage, friction, contacts, second_look, parts, bare, at_once,
 )  # fmt: skip
 """In the order in which they are made."""
 

@@ -12,7 +12,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
-from twinloop.identification.proposals.hidden import with_hidden
+from twinloop.identification.proposals.hidden import with_hidden, without_hidden
 from twinloop.identification.records import guessed_noise
 from twinloop.identification.search.moderation import with_moved
 from twinloop.identification.search.selection import from_both_sides
@@ -102,7 +102,7 @@ def anew(context: Context, aligned: Hypothesis) -> Hypothesis:
     known = context.earlier
     if known is None:
         return from_both_sides(context, aligned)
-    sums = [_without_hidden(found, aligned.pool) for found in known.sums]
+    sums = [_left_of(found, aligned.pool) for found in known.sums]
     alike = alike_commands(context.signals, known.actuation)
     return from_both_sides(context, replace(aligned, actuation=known.actuation.bare(), alike=alike), sums)
 
@@ -121,7 +121,7 @@ def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothe
     return fitted(context, begins)
 
 
-def _without_hidden(found: Sum, pool: Pool) -> Sum | None:
+def _left_of(found: Sum, pool: Pool) -> Sum | None:
     """A sum without terms of a hidden state; None where nothing is left of it."""
-    weights = {node: weight for node, weight in found.weights.items() if not pool.is_hidden(node)}
-    return None if found.weights and not weights else replace(found, weights=weights, others=[])
+    left = without_hidden(found, pool)
+    return None if found.weights and not left.weights else left

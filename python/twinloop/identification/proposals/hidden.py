@@ -103,6 +103,17 @@ def filled(pool: Pool, count: int = 1) -> list[int]:
     return terms
 
 
+def without_hidden(found: Sum, pool: Pool) -> Sum:
+    """A sum without terms of hidden states.
+
+    Args:
+        found: the sum.
+        pool: of its terms.
+    """
+    weights = {term: weight for term, weight in found.weights.items() if not pool.is_hidden(term)}
+    return replace(found, weights=weights, others=[])
+
+
 def enter_directions(pool: Pool, found: Sequence[Direction]) -> None:
     """Enters products of the hidden state and of directions of commands.
 

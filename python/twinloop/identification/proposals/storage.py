@@ -17,10 +17,10 @@ from twinloop.identification.evidence import strongest
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.proposals.hidden import filled, with_hidden
+from twinloop.identification.proposals.hidden import filled, with_hidden, without_hidden
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.selection import from_both_sides, posed
-from twinloop.identification.search.structure import Sum, search
+from twinloop.identification.search.structure import search
 from twinloop.identification.sensors.noise import calm
 from twinloop.law.actuation import Actuation, HiddenState, alike_commands
 from twinloop.law.forms import DERIVATIVES
@@ -178,7 +178,7 @@ class _Screen:
             hypothesis,
             candidates=candidates,
             actuation=hypothesis.actuation.bare(),
-            sums=tuple(_without_hidden(found, hypothesis) for found in hypothesis.sums),
+            sums=tuple(without_hidden(found, hypothesis.pool) for found in hypothesis.sums),
         )
         inputs = stages(bare.runs, context.signals, bare.actuation)
         unit = context.unit.part(hypothesis.start + STORED)
@@ -221,9 +221,3 @@ def _pairs(context: Context, alone: Hypothesis, others: Sequence[int], time: flo
 def _sources(context: Context) -> list[int]:
     """States that may fill a storage: not those that wrap, for a turn more is no other angle."""
     return [i for i, state in enumerate(context.signals.states) if state.period is None]
-
-
-def _without_hidden(found: Sum, hypothesis: Hypothesis) -> Sum:
-    """A sum without terms of hidden states."""
-    weights = {term: weight for term, weight in found.weights.items() if not hypothesis.pool.is_hidden(term)}
-    return replace(found, weights=weights, others=[])
