@@ -11,7 +11,7 @@ from oracles import rk4, same_bits
 from twinloop.planning.candidates import candidates
 from twinloop.planning.comparison import Comparison
 from twinloop.planning.proposal import Flown, Wanted
-from twinloop.planning.reach import around
+from twinloop.planning.seen import Seen
 
 KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
 DRAWS = 3
@@ -234,10 +234,10 @@ def test_until_a_prediction_has_come_true_no_flight_leads_far_beyond_what_was_se
     ]
     # How fast each candidate turns at most, on the member on which it turns fastest.
     fastest = np.array([max(np.abs(run[:, 1]).max() for run in members) for members in runs])
-    seen = np.array([[0.0, -0.15], [0.6, 0.15]])
+    seen = Seen(np.array([[0.0, -0.15], [0.6, 0.15]]), np.zeros((2, 2)))
     reach = ((1.0 - 1e-9) * float(np.median(fastest)) - 0.15) / 0.3
     comparison = compared(flown=replace(FLOWN, seen=seen, flies=False), drawn=drawn)
-    bounds = around(seen, reach, KNOWN)
+    bounds = seen.around(reach, KNOWN)
     np.testing.assert_allclose(bounds[:, 1], np.array([-1.0, 1.0]) * (0.15 + reach * 0.3), atol=1e-12)
     comparison.options = replace(comparison.options, reach_seen=reach)
     near = comparison._near_what_was_seen()
@@ -245,13 +245,19 @@ def test_until_a_prediction_has_come_true_no_flight_leads_far_beyond_what_was_se
         all((run <= bounds[1]).all() and (run >= bounds[0]).all() for run in members) for members in runs
     ]
     assert near.tolist() == inside and 0 < near.sum() < len(near)
-    for anywhere in (replace(FLOWN, seen=None), replace(FLOWN, seen=1e-6 * seen)):
+    for anywhere in (replace(FLOWN, seen=None), replace(FLOWN, seen=Seen(1e-6 * seen.flights, seen.task))):
         comparison.flown = anywhere
         # Where every one leads further than that, it tells no flight from another.
         assert comparison._near_what_was_seen().all()
 
 
 def test_what_has_hardly_moved_is_taken_to_have_moved_by_a_share_of_its_scale():
-    bounds = around(np.zeros((2, 2)), 2.0, KNOWN)
+    bounds = Seen(np.zeros((2, 2)), np.zeros((2, 2))).around(2.0, KNOWN)
     scales = np.array([state.scale for state in KNOWN.states])
     np.testing.assert_allclose(bounds, 0.04 * np.stack([-scales, scales]))
+
+
+def test_a_task_that_leads_far_may_be_reached_and_is_no_reason_to_go_further():
+    flights, task = np.array([[0.0, -0.5], [0.4, 0.5]]), np.array([[0.2, 0.0], [3.0, 0.0]])
+    bounds = Seen(flights, task).around(2.0, KNOWN)
+    np.testing.assert_allclose(bounds, [[-0.8, -2.5], [3.8, 2.5]])

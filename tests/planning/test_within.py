@@ -9,7 +9,8 @@ from committees import TASK, committee_of, member, planner_of, signals
 from oracles import same_bits
 from twinloop._ground.streams import Unit
 from twinloop.planning.proposal import Flown
-from twinloop.planning.reach import around, bounds_of, reach_of
+from twinloop.planning.reach import bounds_of, reach_of
+from twinloop.planning.seen import Seen
 from twinloop.planning.within import tune_within
 
 KNOWN = signals(envelope=(-0.9, 0.9), rate=(-1.5, 1.5))
@@ -62,7 +63,7 @@ def test_they_keep_the_envelope_on_a_model_with_more_delay():
 @pytest.mark.parametrize("exploit", [False, True])
 def test_where_the_tuned_gains_lead_too_far_the_best_within_the_limits_fly(exploit):
     quick = np.array([9.0, 0.0, 1.0])
-    seen = np.array([[0.4, -0.05], [0.5, 0.02]])
+    seen = Seen(np.array([[0.4, -0.05], [0.5, 0.02]]), np.array([[0.4, 0.0], [0.5, 0.0]]))
     flown = Flown(best=GENTLE, flies=True, usages=[0.56], good=1.0, seen=seen)
     bounds = bounds_of(flown, "both", KNOWN, PLANNER.options)
     promised = {}
@@ -78,10 +79,10 @@ def test_where_the_tuned_gains_lead_too_far_the_best_within_the_limits_fly(explo
 
 
 def test_the_next_flight_keeps_both_the_reach_in_the_envelope_and_the_states_near_those_seen():
-    seen = np.array([[0.0, -0.1], [0.5, 0.1]])
+    seen = Seen(np.array([[0.0, -0.1], [0.5, 0.1]]), np.zeros((2, 2)))
     flown = Flown(best=GENTLE, flies=True, usages=[0.6], good=1.0, seen=seen)
     options = replace(PLANNER.options, reach_seen=1.0)
-    reach, near = reach_of(flown, "both", options), around(seen, 1.0, KNOWN)
+    reach, near = reach_of(flown, "both", options), seen.around(1.0, KNOWN)
     low, high = bounds_of(flown, "both", KNOWN, options)
     assert reach == pytest.approx(0.75)
     np.testing.assert_allclose(low, [max(-0.9 * reach, near[0, 0]), max(-1.5 * reach, near[0, 1])])
@@ -94,7 +95,10 @@ def test_the_next_flight_keeps_both_the_reach_in_the_envelope_and_the_states_nea
 
 
 def test_on_a_twin_that_explains_no_flight_nothing_is_tuned_under_limits():
-    quick, seen = np.array([9.0, 0.0, 1.0]), np.array([[0.4, -0.05], [0.5, 0.02]])
+    quick, seen = (
+        np.array([9.0, 0.0, 1.0]),
+        Seen(np.array([[0.4, -0.05], [0.5, 0.02]]), np.array([[0.4, 0.0], [0.5, 0.0]])),
+    )
     flown = Flown(best=GENTLE, flies=True, usages=[0.56], good=1.0, seen=seen)
     unexplained = replace(COMMITTEE, explains=False)
     without = planner_of(KNOWN, candidates=64, evaluations=4096, within=False)

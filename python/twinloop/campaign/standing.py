@@ -140,15 +140,23 @@ def reached(book: Logbook, genes: Floats) -> Floats | None:
         book: of the campaign.
         genes: of them (size,).
     """
-    signals, start = book.setup.signals, book.setup.initial_state
-    read = [
-        signals.continued(run.trajectory.states, start=start)
+    kept = [
+        run
         for run in book.experiments
         if run.test is not None and run.kept_envelope and run.test.genes.tobytes() == genes.tobytes()
     ]
-    if not read:
-        return None
-    states = np.concatenate(read)
+    return read_in(book, kept) if kept else None
+
+
+def read_in(book: Logbook, flights: Sequence[Experiment]) -> Floats:
+    """Smallest and largest reading of each state (2, n_x), of angles that are continued through whole turns.
+
+    Args:
+        book: of the campaign.
+        flights: of it, at least one.
+    """
+    signals, start = book.setup.signals, book.setup.initial_state
+    states = np.concatenate([signals.continued(run.trajectory.states, start=start) for run in flights])
     return np.stack([states.min(axis=0), states.max(axis=0)])
 
 

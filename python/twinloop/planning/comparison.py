@@ -15,7 +15,7 @@ from twinloop.planning.candidates import Candidates
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judge, Judged, expected, risk
 from twinloop.planning.proposal import Flown, Proposal, Wanted
-from twinloop.planning.reach import around, reach_of
+from twinloop.planning.reach import reach_of
 from twinloop.planning.reasons import Why, reason
 from twinloop.planning.settings import PlanningOptions
 from twinloop.planning.worth import apart, gain, limit
@@ -159,7 +159,7 @@ class Comparison:
         if seen is None or reach <= 0.0:
             return np.ones_like(self.possible)
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
-        bounds = around(seen, reach, self.judge.signals)
+        bounds = seen.around(reach, self.judge.signals)
         near = ~outside(self.judge.judge_within(bounds, self.members, genes, excitation, ends).worst_usage)
         near[drafts.repeats :] |= self.flown.flies
         return near if near[: drafts.repeats].any() else np.ones_like(near)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from twinloop._ground.arrays import Floats
+from twinloop.planning.seen import Seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +22,7 @@ class Flown:
         failed: genes of tests that failed on the system, or were cut.
         times: how often the best gains have flown.
         borne: how many of the last flights whose excitation was held back kept the envelope.
-        seen: smallest and largest reading of each state so far (2, n_x), where no prediction has come true yet.
+        seen: where the flights have been, as long as no prediction has come true.
     """
 
     best: Floats
@@ -31,7 +32,7 @@ class Flown:
     failed: Sequence[Floats] = ()
     times: int = 1
     borne: int = 1
-    seen: Floats | None = None
+    seen: Seen | None = None
 
 
 @dataclass(frozen=True)

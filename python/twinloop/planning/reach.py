@@ -9,9 +9,6 @@ from twinloop.planning.proposal import Flown
 from twinloop.planning.settings import PlanningOptions
 from twinloop.signals import Signals
 
-HARDLY = 0.02
-"""Share of its scale by which a state is taken to have moved at least."""
-
 
 def reach_of(flown: Flown, goal: str, options: PlanningOptions) -> float:
     """Usage of the envelope that a proposal may have, where that of each flight so far is known.
@@ -31,18 +28,6 @@ def reach_of(flown: Flown, goal: str, options: PlanningOptions) -> float:
     return min(1.0 - options.margin, far if goal == "model" else near)
 
 
-def around(seen: Floats, reach: float, signals: Signals) -> Floats:
-    """Bounds of states (2, n_x) that are wider than those seen by some times as far as each has moved.
-
-    Args:
-        seen: smallest and largest reading of each state (2, n_x).
-        reach: how many times; what has hardly moved is taken to have moved by a share of its scale.
-        signals: of the system.
-    """
-    moved = np.maximum(seen[1] - seen[0], HARDLY * np.array([state.scale for state in signals.states]))
-    return np.stack([seen[0] - reach * moved, seen[1] + reach * moved])
-
-
 def bounds_of(flown: Flown, goal: str, signals: Signals, options: PlanningOptions) -> Floats:
     """Bounds of the states (2, n_x) that no member may leave in the next flight; infinite where there is none.
 
@@ -60,5 +45,5 @@ def bounds_of(flown: Flown, goal: str, signals: Signals, options: PlanningOption
             bounds[:, i] = middle - reach * half, middle + reach * half
     if flown.seen is None or options.reach_seen <= 0.0:
         return bounds
-    near = around(flown.seen, options.reach_seen, signals)
+    near = flown.seen.around(options.reach_seen, signals)
     return np.stack([np.maximum(bounds[0], near[0]), np.minimum(bounds[1], near[1])])

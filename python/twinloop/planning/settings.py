@@ -43,8 +43,8 @@ class PlanningOptions:
         reach_least: usage that such flights may always have, even if the first flight hardly moves.
         reach_growth: largest ratio of a proposal's usage to the largest flown one or, for flights for the model, to
             that of the first flight.
-        reach_seen: how far beyond the states seen so far a proposal may lead, in units of how far they have moved,
-            until a prediction has come true; 0: anywhere.
+        reach_seen: how far beyond the states seen so far and those of the task a proposal may lead, in units of how far
+            flights have moved them, until a prediction has come true; 0: anywhere.
         evaluations: number of flights on which gains are tuned, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
@@ -81,7 +81,7 @@ class PlanningOptions:
     reach_far: float = 0.6
     reach_least: float = 0.2
     reach_growth: float = 1.25
-    reach_seen: float = 4.0
+    reach_seen: float = 2.0
     evaluations: int = 12_000
     tuning_starts: int = 3
     tuning_members: int = 4

@@ -38,6 +38,7 @@ from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Flown, Proposal
 from twinloop.planning.scored import Scored
+from twinloop.planning.seen import Seen
 from twinloop.records import Record
 from twinloop.test import Test
 
@@ -242,13 +243,11 @@ class IdentifyAndPlan:
             None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
         )
 
-    def _seen(self, book: Logbook) -> Floats:
-        """Smallest and largest value of each state in the flights so far and in the task (2, n_x)."""
+    def _seen(self, book: Logbook) -> Seen:
+        """Where the flights have been, and where the task leads."""
         setup = self.setup
-        continued = partial(setup.signals.continued, start=setup.initial_state)
-        read = [continued(run.trajectory.states) for run in book.experiments]
-        states = np.concatenate([*read, setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
-        return np.stack([states.min(axis=0), states.max(axis=0)])
+        ends = np.concatenate([setup.initial_state[np.newaxis], np.atleast_2d(setup.target_state)])
+        return Seen(standing.read_in(book, book.experiments), np.stack([ends.min(axis=0), ends.max(axis=0)]))
 
     def best_test(self, book: Logbook, at_once: bool = False) -> Test:
         """The gains tuned on the committee, unless it is not confident that they beat the best ones flown."""
