@@ -111,3 +111,23 @@ def test_a_log_check_says_it():
         times, states, np.random.default_rng(0).normal(size=(len(states) - 1, 1)), signals(0.01)
     )
     assert "kinematics" in [remark.code for remark in found.remarks] and not found.fit
+
+
+def drifting(seed, dt=0.01, steps=3000, wander=0.06):
+    """Half a minute of level flight whose gyroscopes' bias wanders, as measured ones do: it adds up to a radian."""
+    states = flight(seed, size=0.3, dt=dt, steps=steps)
+    wanders = np.cumsum(np.random.default_rng(seed).normal(size=(steps + 1, 3)), axis=0) / np.sqrt(steps)
+    return states + np.pad(wander * wanders, ((0, 0), (3, 0)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bias_that_drifts_over_a_long_flight_is_no_mistake_and_hides_none(seed):
+    states = drifting(seed)
+    rates = states[:, 3:] - states[:, 3:].mean(axis=0)
+    # Integrated it is as far as the angles go, or further.
+    off = 0.01 * np.cumsum(rates, axis=0) - (states[:, :3] - states[:, :3].mean(axis=0))
+    assert (np.ptp(off, axis=0) > 0.5 * np.ptp(states[:, :3], axis=0)).any()
+    assert not said(states)
+    for place in (3, 4, 5):
+        (remark,) = said(negated(place)(states))
+        assert f"with the sign of {RATES[place - 3]} changed" in str(remark)

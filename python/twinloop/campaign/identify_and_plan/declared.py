@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -13,6 +14,8 @@ from twinloop.campaign.identify_and_plan.integrated import (
     MOVED,
     WALKED,
     contradiction,
+    cuts,
+    in_spite_of_drift,
     moved,
     walk,
     without_line,
@@ -44,19 +47,26 @@ def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Ite
         if rate.derivative_of is None or (body is not None and rate.name in body.rates):
             continue
         j = signals.state_names.index(rate.derivative_of)
-        pairs = [moved(run.states[:, j], run.states[:, i], signals.dt) for run in runs]
-        walks = sum(float(walk(noise[i], signals.dt, run.steps)) for run in recorded)
-        how = contradiction(
-            [tuple(map(without_line, pair)) for pair in pairs], BENT**2 * noise[j], WALKED**2 * walks
-        )
-        if how is None:
-            how = contradiction(pairs, MOVED**2 * noise[j], 0.0)
+        (how,) = in_spite_of_drift(partial(_of_derivative, runs, (j, i), signals.dt, noise))
         if how:
             yield serious(
                 "derivative",
                 f"{rate.derivative_of} {how} {rate.name}, its declared derivative, says: check their units and signs,"
                 " the order of the columns, and what is declared.",
             )
+
+
+def _of_derivative(
+    runs: Sequence[Run], of: tuple[int, int], dt: float, noise: Floats, pieces: int
+) -> list[str | None]:
+    """How a state contradicts its derivative, the places of both being given, where runs are cut into pieces."""
+    j, i = of
+    cut = [run.states[part] for run in runs for part in cuts(len(run.states), pieces)]
+    pairs = [moved(states[:, j], states[:, i], dt) for states in cut]
+    walks = sum(float(walk(noise[i], dt, len(states) - 1)) for states in cut)
+    bent = [tuple(map(without_line, pair)) for pair in pairs]
+    how = contradiction(bent, BENT**2 * noise[j], WALKED**2 * walks)
+    return [contradiction(pairs, MOVED**2 * noise[j], 0.0) if how is None else how]
 
 
 def _as_a_body(runs: Sequence[Run], signals: Signals, noise: Floats) -> RigidBody | None:

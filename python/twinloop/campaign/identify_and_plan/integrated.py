@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -18,6 +18,10 @@ AS_FAST = (0.5, 2.0)
 """Times as fast as its derivative says, between which a state is taken to do what was declared."""
 ALIKE = 0.5
 """Correlation with its integrated derivative below which a state is taken to do something else."""
+PIECES = (5, 25)
+"""Into how many a run is cut where it seems to contradict."""
+LEAST_ROWS = 20
+"""Of a piece: fewer show little of a motion."""
 
 
 def contradiction(pairs: Sequence[tuple[Floats, ...]], least: float, least_declared: float) -> str | None:
@@ -39,6 +43,34 @@ def contradiction(pairs: Sequence[tuple[Floats, ...]], least: float, least_decla
     if not AS_FAST[0] * declared_size < product < AS_FAST[1] * declared_size:
         return f"changes {product / declared_size:.3g} times as fast as"
     return ""
+
+
+def in_spite_of_drift(judged: Callable[[int], Sequence[str | None]]) -> list[str | None]:
+    """How states contradict their derivatives over whole runs, and in pieces of them, too.
+
+    The bias of a rate drifts: integrated over a long run it may be more than all that the state has moved, and in a
+    short piece it is little. A wrong sign, unit or column is wrong in every piece.
+
+    Args:
+        judged: gives what is said of each state, in the way of `contradiction`, where runs are cut into so many pieces.
+    """
+    said = list(judged(1))
+    for pieces in PIECES:
+        if any(said):
+            said = ["" if piece == "" else whole for whole, piece in zip(said, judged(pieces), strict=True)]
+    return said
+
+
+def cuts(rows: int, pieces: int) -> Iterator[slice]:
+    """Where a run is cut into pieces of equal length; fewer where they would be too short.
+
+    Args:
+        rows: of the run.
+        pieces: that are wanted.
+    """
+    count = max(1, min(pieces, rows // LEAST_ROWS))
+    ends = np.linspace(0, rows, count + 1).astype(int).tolist()
+    yield from (slice(*ends[k : k + 2]) for k in range(count))
 
 
 def walk(variance: Floats, dt: float, steps: int) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from math import pi
 
@@ -11,7 +12,14 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import cos, sin
-from twinloop.campaign.identify_and_plan.integrated import BENT, WALKED, contradiction, walk
+from twinloop.campaign.identify_and_plan.integrated import (
+    BENT,
+    WALKED,
+    contradiction,
+    cuts,
+    in_spite_of_drift,
+    walk,
+)
 from twinloop.signals import RigidBody
 
 STEEP = 0.1
@@ -93,8 +101,18 @@ def contradictions(flown: Sequence[Turned], angles: Floats, rates: Floats) -> li
         angles: variances of the noise of the angles (3,).
         rates: the same of the body rates (3,).
     """
-    pairs = [run.pairs() for run in flown]
-    walks = np.sum([run.walks(rates) for run in flown], axis=0)
+    return in_spite_of_drift(partial(_in_pieces, flown, angles, rates))
+
+
+def _in_pieces(flown: Sequence[Turned], angles: Floats, rates: Floats, pieces: int) -> list[str | None]:
+    """The same where runs are cut into so many pieces."""
+    cut = [
+        Turned(run.angles[part], run.rates[part], run.dt)
+        for run in flown
+        for part in cuts(len(run.angles), pieces)
+    ]
+    pairs = [run.pairs() for run in cut]
+    walks = np.sum([run.walks(rates) for run in cut], axis=0)
     return [
         contradiction([run[k] for run in pairs], BENT**2 * float(angles[k]), WALKED**2 * float(walks[k]))
         for k in range(3)
