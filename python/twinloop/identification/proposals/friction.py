@@ -28,6 +28,10 @@ WORTH = 20.0
 """What friction must gain, in units of χ², beside its price: as much as a rung of the ladder."""
 ROUNDS = 4
 """Times that each equation may get one more term."""
+FEW_STEPS = 2
+"""Of the tuning, by which it is seen which terms may pay: the first steps gain most."""
+FINALISTS = 3
+"""Terms of each equation, the best ones after these, that are tuned to the end."""
 
 
 def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -103,7 +107,11 @@ def _with_one_more(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         problem = posed(context, grown)
         if calm(problem, known.chain) is not known.chain:
             nodes = _offered(context, problem, known)
-            best = shortest([best, *(_tuned(context, problem, grown, i, node) for node in nodes)], _described)
+            screened = [(_tuned(context, problem, grown, i, node, FEW_STEPS), node) for node in nodes]
+            screened.sort(key=lambda found: _described(found[0]))
+            full = context.options.tuning_steps
+            finalists = [_tuned(context, problem, grown, i, node, full) for _, node in screened[:FINALISTS]]
+            best = shortest([best, *finalists], _described)
     return best
 
 
@@ -127,7 +135,9 @@ def _described(hypothesis: Hypothesis) -> float:
     )
 
 
-def _tuned(context: Context, problem: Problem, hypothesis: Hypothesis, i: int, node: int) -> Hypothesis:
+def _tuned(
+    context: Context, problem: Problem, hypothesis: Hypothesis, i: int, node: int, steps: int
+) -> Hypothesis:
     """The hypothesis with one more term in a sum, tuned with the noise that it had; itself where that is singular."""
     assert hypothesis.fit is not None
     known, sums = hypothesis.sums[i], list(hypothesis.sums)
@@ -140,7 +150,5 @@ def _tuned(context: Context, problem: Problem, hypothesis: Hypothesis, i: int, n
     sums[i] = replace(known, weights=dict(zip(terms, map(float, solved[0]), strict=True)), others=[])
     candidates = hypothesis.candidates.with_terms([node])
     more = replace(hypothesis, candidates=candidates, sums=tuple(sums), fit=None)
-    fit, _ = tune(
-        context, more, model_of(context, more), hypothesis.fit.observer, context.options.tuning_steps
-    )
+    fit, _ = tune(context, more, model_of(context, more), hypothesis.fit.observer, steps)
     return with_fit(more, fit)
