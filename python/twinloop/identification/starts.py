@@ -93,7 +93,8 @@ def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         offsets = search_offsets(runs, signals, every, scales, context.workers)
         offsets = that_hold(context, hypothesis, offsets)
     at_once = tuple(moved(runs, signals, offsets))
-    given = tuple(kinematic_noise(chain, at_once, signals) for chain in hypothesis.given)
+    rates = max((float(chain.sensors[0]) for chain in hypothesis.driven), default=0.0)
+    given = tuple(kinematic_noise(chain, at_once, signals, rates) for chain in hypothesis.given)
     return replace(hypothesis, offsets=offsets, runs=at_once, given=given)
 
 

@@ -31,6 +31,10 @@ CALM = 1e-2
 """Variance, in a sensor's, of what disturbs in a period and is hardly seen."""
 KINEMATIC = 1e-4
 """Variance, in its sensor's, of what moves an angle in a period beside the body rates that turn it."""
+DRIFTS = 50.0
+"""What a drift of an angle beside its rates must gain, in units of χ²."""
+LARGE = 30.0
+"""Times what its rates are known to add to an angle that a drift of it must be: a wrong form may look like less."""
 FEW_READINGS = 20
 """Fewest readings from which the noise of an angle that body rates turn is estimated."""
 OUTLYING = 6.0
@@ -60,16 +64,18 @@ def given_noise(chain: Chain, signals: Signals) -> Chain:
     return chain.with_noise(sensors, (KINEMATIC * float(sensors[0]) / signals.dt, 0.0, 1.0))
 
 
-def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chain:
+def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals, rates: float = 0.0) -> Chain:
     """An angle that body rates turn, with its sensor's noise as kinematics show it.
 
     A reading's error makes one increment too large and the next one too small: the covariance of neighbouring residuals
-    is minus its variance.
+    is minus its variance. What goes on adding up is no sensor's noise: gyroscopes of a real machine drift, and are
+    mounted a little askew. Where it is far more than the noise of the rates adds, it moves the angle.
 
     Args:
         chain: of one angle that no output drives, with a first guess of its sensor's noise.
         runs: as they would have been read had all sensors been read at once.
         signals: of the system, which say how rates turn the angle.
+        rates: variance of the noise of the rates that turn it.
 
     Returns:
         The chain with that noise; as it was where readings are too few.
@@ -85,7 +91,49 @@ def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals) -> Chai
     rough = float(chain.rough[0])
     found = min(-float(products.mean()), rough)
     sensors = np.array([max(BEST_SENSOR * BEST_SENSOR * rough, found)])
-    return chain.with_noise(sensors, (KINEMATIC * float(sensors[0]) / signals.dt, 0.0, 1.0))
+    quiet = chain.with_noise(sensors, (KINEMATIC * float(sensors[0]) / signals.dt, 0.0, 1.0))
+    known = signals.dt**2 * (rates + _bent(runs, signals))
+    return _drifting(quiet, clipped, [run.weights[:, [angle]] for run in runs], signals.dt, known)
+
+
+def _bent(runs: Sequence[Run], signals: Signals) -> float:
+    """Variance of a body rate's mean over a period about the mean of its ends, as its second differences show it."""
+    body = signals.kinematics
+    if body is None:
+        return 0.0
+    rates = [signals.state_names.index(rate) for rate in body.rates]
+    bends = np.concatenate([np.diff(run.states[:, rates], n=2, axis=0) for run in runs])
+    return float(np.square(bends / 12.0).mean(axis=0).max())
+
+
+def _drifting(
+    quiet: Chain, residuals: Sequence[Floats], weights: Sequence[Floats], dt: float, known: float
+) -> Chain:
+    """An angle whose residuals add up beyond what the noise of its rates does, moved by that; else as it was.
+
+    Args:
+        quiet: the chain, with its sensor's noise.
+        residuals: what a period adds to the angle beyond its kinematics, of each run (n,).
+        weights: of the angle's readings, of each run (n + 1, 1).
+        dt: period, s.
+        known: variance that the noise of the rates and their motion between readings add to the angle in a period.
+    """
+    records = []
+    for residual, counted in zip(residuals, weights, strict=True):
+        added = np.concatenate([[0.0], np.cumsum(residual)])[:, np.newaxis]
+        nothing = np.zeros((len(residual), 1))
+        records.append((added, counted, nothing, nothing, nothing))
+    first = float(quiet.sensors[0])
+    low, slow = BEST_SENSOR * BEST_SENSOR * quiet.rough, Motion(KINEMATIC * first, 0.0, dt)
+    with engine_input():
+        regression = _core.Regression(1, dt, "increment", records)
+        begun = (regression, [0.0], quiet.sensors, Motion(1e-2 * first, 0.0, dt), low, slow)
+        ((sensors, motion, length),) = _core.most_likely_noises([begun])
+        without = regression.likelihood([0.0], quiet.sensors, slow)
+    drift = Motion(*motion).white - known
+    if without - length < DRIFTS or drift <= max(LARGE * known, KINEMATIC * float(sensors[0])):
+        return quiet
+    return quiet.with_noise(sensors, (drift / dt, 0.0, 1.0))
 
 
 def floor_of(chain: Chain, dt: float, integration: float = 0.0) -> tuple[Floats, Motion]:
