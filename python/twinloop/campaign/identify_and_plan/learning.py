@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
+from twinloop.campaign.identify_and_plan.rests import resting_commands
 from twinloop.campaign.identify_and_plan.selection import learnt_from
 from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
@@ -153,18 +153,12 @@ class Learner:
             identify_runs,
             [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
             self.setup.signals,
-            rests=self._rests(),
+            rests=resting_commands(self.setup, flights),
             axes=self._axes(),
             seed=self.setup.seed,
             workers=self.workers,
             watch=self.watch,
         )
-
-    def _rests(self) -> list[Floats]:
-        """Commands that the family gives when there is nothing to do: actuators may rest there before a run."""
-        family, target = self.setup.family, np.atleast_2d(self.setup.target_state)[0]
-        middle = np.array([0.5 * (gain.low + gain.high) for gain in family.gains])
-        return [family.controller(middle).command(target, target)]
 
     def _axes(self) -> list[Direction]:
         """Directions in which the controller's axes move alike commands, as its mixer says."""
