@@ -27,7 +27,8 @@ def resting_commands(setup: Setup, flights: Sequence[Experiment]) -> list[Floats
         flights: that are learnt from.
 
     Returns:
-        What the family sends at the target; and what was sent in flights without a test, its median, if that is another.
+        What the family sends at the target; and the median of what was sent in flights without a test, if that is
+        another.
     """
     found = [_of_family(setup)]
     logs = [run.trajectory.commands for run in flights if run.test is None]
