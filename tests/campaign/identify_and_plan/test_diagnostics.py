@@ -8,10 +8,11 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
+from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, distinct
 from twinloop.campaign.identify_and_plan.misses import Miss, unexplained
 from twinloop.campaign.identify_and_plan.readings import froze, ratio
-from twinloop.campaign.identify_and_plan.sent import other_commands
+from twinloop.campaign.identify_and_plan.sent import exchanged, other_commands
 
 DT, STEPS = 0.02, 200
 SIGNALS = tl.Signals(
@@ -145,6 +146,31 @@ def test_commands_of_another_controller_are_found(new_campaign, pendulum):
     for states in (run.states * [57.3, 1.0], -run.states):
         wrong = SimpleNamespace(states=states, commands=run.commands)
         assert other_commands([SimpleNamespace(test=test, number=0, trajectory=wrong)]) == [0]
+
+
+def test_two_commands_exchanged_among_four_are_found_and_named():
+    system = tl.systems.Quadrotor()
+    campaign = tl.Campaign(
+        system.signals, controller=system.controller, initial_state=system.initial_state,
+        target_state=system.target_state, duration=system.duration, progress=None,
+    )  # fmt: skip
+    test = campaign.test(system.default_gains)
+    run = system.run(test)
+
+    def recorded(columns):
+        commands = run.commands[:, columns]
+        flight = tl.Trajectory(run.t, run.states, commands)
+        return SimpleNamespace(test=test, number=0, trajectory=flight)
+
+    assert other_commands([recorded([0, 1, 2, 3])]) == []
+    for columns in ([1, 0, 2, 3], [0, 3, 2, 1], [0, 1, 3, 2]):
+        wrong = recorded(columns)
+        assert other_commands([wrong]) == [0]
+        pair = exchanged(wrong)
+        assert [columns[i] for i in pair] == list(pair[::-1])
+        names = [system.signals.commands[i].name for i in pair]
+        (said_of_it,) = against(wrong, test, system.signals)
+        assert said_of_it.sentence.endswith(f"They would be with {names[0]} and {names[1]} exchanged.")
 
 
 def codes(*runs):

@@ -14,7 +14,7 @@ from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.declared import against_derivatives
 from twinloop.campaign.identify_and_plan.diagnostics import from_another_excitation, from_other_controllers
 from twinloop.campaign.identify_and_plan.readings import suspicious
-from twinloop.campaign.identify_and_plan.sent import other_commands
+from twinloop.campaign.identify_and_plan.sent import exchanged, other_commands
 from twinloop.errors import InvalidInput
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
@@ -138,9 +138,11 @@ def against(flight: Experiment, asked: Test | None, signals: Signals) -> list[Re
     """
     run = flight.trajectory
     found = check_log(run.t, run.states, run.commands, signals).remarks
-    others = from_other_controllers(other_commands([flight]))
+    others = other_commands([flight])
+    pair = exchanged(flight) if others else None
+    names = [signals.commands[i].name for i in pair or ()]
     excitations = () if asked is None else from_another_excitation(asked.number, excited(asked, run))
-    return [*(each for each in found if each.serious), *others, *excitations]
+    return [*(each for each in found if each.serious), *from_other_controllers(others, names), *excitations]
 
 
 def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:

@@ -61,18 +61,20 @@ def diagnostics_of(
     return [*said, *_model_error(recurring), *_copies(experiments), *_none_complete(experiments, steps)]
 
 
-def from_other_controllers(tests: Sequence[int]) -> Iterator[Remark]:
+def from_other_controllers(tests: Sequence[int], exchanged: Sequence[str] = ()) -> Iterator[Remark]:
     """Tests whose recorded commands are none that their controllers give.
 
     Args:
         tests: their numbers.
+        exchanged: names of two commands with which they would be, once exchanged; empty: there are none.
     """
     if tests:
+        hint = f" They would be with {' and '.join(exchanged)} exchanged." if exchanged else ""
         yield serious(
             "other-commands",
             f"The commands recorded of test{'s' if len(tests) > 1 else ''} {', '.join(map(str, tests))} are"
             " none that its controller gives for the recorded states: check the signs, units and order of states"
-            " and commands, and that the recorded controller is the one that the test names.",
+            f" and commands, and that the recorded controller is the one that the test names.{hint}",
         )
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.excited import apart, as_excited, excited, given, span_of
+from twinloop.campaign.excited import as_excited, excited, given, span_of
 from twinloop.campaign.history import Experiment
+from twinloop.test import Test
 
 OTHER = 0.5
-"""Share of what commands do that may differ from what their controller gives, squared."""
+"""Share of what a command does, or all do on average, that may differ from what their controller gives, squared."""
 LITTLE = 0.02
 """Share of their bounds by which commands may differ whatever they do."""
 LEVELS = 5
@@ -38,20 +41,50 @@ def in_pulses(experiments: Sequence[Experiment]) -> list[int]:
     return [number for number, pulsed in _unlike(experiments).items() if pulsed]
 
 
+def exchanged(run: Experiment) -> tuple[int, int] | None:
+    """Two commands that the test's controller gives once their columns are exchanged; None where no two are the fault.
+
+    Args:
+        run: of a test, with commands that are not those of its controller.
+    """
+    if run.test is None:
+        return None
+    sent, test = run.trajectory.commands, _as_flown(run)
+    asked = given(test, run.trajectory.states)
+    for pair in combinations(range(sent.shape[1]), 2):
+        other = sent.copy()
+        other[:, pair] = sent[:, pair[::-1]]
+        if not _off(other, asked, test).any():
+            return pair
+    return None
+
+
 def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
     """Tests in which what was sent is not what the controller gives, by number: whether it was sent in pulses."""
     found: dict[int, bool] = {}
     for run in experiments:
         if run.test is None or run.test.number in found:
             continue
-        # An excitation that was left out, or not held back, is another fault, and is said by itself.
-        test = as_excited(run.test, excited(run.test, run.trajectory))
-        sent, asked, span = run.trajectory.commands, given(test, run.trajectory.states), span_of(test)
-        size = np.square((asked - asked.mean(axis=0)) / span).mean()
-        off = apart(sent, asked, test)
-        if off > OTHER * size and off > LITTLE * LITTLE:
-            found[test.number] = _pulses(sent, asked, span)
+        test = _as_flown(run)
+        sent, asked = run.trajectory.commands, given(test, run.trajectory.states)
+        off = _off(sent, asked, test)
+        if off.any():
+            found[run.test.number] = _pulses(sent[:, off], asked[:, off], span_of(test)[off])
     return found
+
+
+def _as_flown(run: Experiment) -> Test:
+    """The test of a run, excited as it was: an excitation that was left out, or not held back, is a fault by itself."""
+    assert run.test is not None
+    return as_excited(run.test, excited(run.test, run.trajectory))
+
+
+def _off(sent: Floats, asked: Floats, test: Test) -> NDArray[np.bool_]:
+    """Commands that have little to do with what the controller gives (n_u,); two columns exchanged are two of many."""
+    span = span_of(test)
+    size = np.square((asked - asked.mean(axis=0)) / span).mean(axis=0)
+    off = np.square((sent - asked) / span).mean(axis=0)
+    return np.asarray((off > OTHER * np.maximum(size, size.mean())) & (off > LITTLE * LITTLE))
 
 
 def _pulses(sent: Floats, asked: Floats, span: Floats) -> bool:
