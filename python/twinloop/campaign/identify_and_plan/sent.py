@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.excited import as_excited, excited, given, span_of
@@ -19,6 +18,8 @@ LITTLE = 0.02
 """Share of their bounds by which commands may differ whatever they do."""
 LEVELS = 5
 """Values that commands have at most that are sent in pulses."""
+EXCHANGED = 20.0
+"""Times nearer to the controller's that two commands are once exchanged, in squares, where that was the fault."""
 PULSES = 2.0
 """Times the span of a command that pulses may be behind or ahead of it."""
 
@@ -42,19 +43,20 @@ def in_pulses(experiments: Sequence[Experiment]) -> list[int]:
 
 
 def exchanged(run: Experiment) -> tuple[int, int] | None:
-    """Two commands that the test's controller gives once their columns are exchanged; None where no two are the fault.
+    """Two commands that are those of the test's controller once their columns are exchanged; None where no two are.
 
     Args:
-        run: of a test, with commands that are not those of its controller.
+        run: of a test.
     """
     if run.test is None:
         return None
-    sent, test = run.trajectory.commands, _as_flown(run)
-    asked = given(test, run.trajectory.states)
+    test = _as_flown(run)
+    sent, asked = run.trajectory.commands, given(test, run.trajectory.states)
+    before = _off(sent, asked, test)
     for pair in combinations(range(sent.shape[1]), 2):
-        other = sent.copy()
-        other[:, pair] = sent[:, pair[::-1]]
-        if not _off(other, asked, test).any():
+        first, second = pair
+        crossed = _off(sent[:, [second, first]], asked[:, pair], test, pair)
+        if before[[first, second]].min() > max(LITTLE * LITTLE, EXCHANGED * crossed.max()):
             return pair
     return None
 
@@ -66,10 +68,14 @@ def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
         if run.test is None or run.test.number in found:
             continue
         test = _as_flown(run)
-        sent, asked = run.trajectory.commands, given(test, run.trajectory.states)
+        sent, asked, span = run.trajectory.commands, given(test, run.trajectory.states), span_of(test)
+        size = np.square((asked - asked.mean(axis=0)) / span).mean(axis=0)
         off = _off(sent, asked, test)
-        if off.any():
-            found[run.test.number] = _pulses(sent[:, off], asked[:, off], span_of(test)[off])
+        far = (off > OTHER * np.maximum(size, size.mean())) & (off > LITTLE * LITTLE)
+        if far.any():
+            found[run.test.number] = _pulses(sent[:, far], asked[:, far], span[far])
+        elif exchanged(run) is not None:
+            found[run.test.number] = False
     return found
 
 
@@ -79,12 +85,11 @@ def _as_flown(run: Experiment) -> Test:
     return as_excited(run.test, excited(run.test, run.trajectory))
 
 
-def _off(sent: Floats, asked: Floats, test: Test) -> NDArray[np.bool_]:
-    """Commands that have little to do with what the controller gives (n_u,); two columns exchanged are two of many."""
-    span = span_of(test)
-    size = np.square((asked - asked.mean(axis=0)) / span).mean(axis=0)
-    off = np.square((sent - asked) / span).mean(axis=0)
-    return np.asarray((off > OTHER * np.maximum(size, size.mean())) & (off > LITTLE * LITTLE))
+def _off(sent: Floats, asked: Floats, test: Test, columns: Sequence[int] | None = None) -> Floats:
+    """Mean squares of what commands are off from those that the controller gives, in units of their spans."""
+    span = span_of(test) if columns is None else span_of(test)[list(columns)]
+    off: Floats = np.square((sent - asked) / span).mean(axis=0)
+    return off
 
 
 def _pulses(sent: Floats, asked: Floats, span: Floats) -> bool:
