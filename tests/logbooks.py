@@ -40,6 +40,7 @@ class Life:
     asked: bool
     runs: list = field(default_factory=list)
     failures: int = 0
+    on_record: int = 0
     abandoned: bool = False
 
     @property
@@ -49,6 +50,12 @@ class Life:
     @property
     def qualities(self):
         return [quality for kind, quality in self.runs if kind != "cut"]
+
+    @property
+    def kept(self):
+        """Of each flight, whether it kept the envelope; a failure without a record is a flight that did not."""
+        unrecorded = self.failures - self.on_record
+        return [kind == "inside" and not self.failures for kind, _ in self.runs] + [False] * unrecorded
 
     @property
     def flies(self):
@@ -107,6 +114,7 @@ def happened(life, event, quality):
     elif event.startswith("fail"):
         life.failures += 1
         life.runs += [("cut", None)] if event == "fail on record" else []
+        life.on_record += event == "fail on record"
     elif event == "abandon":
         life.abandoned = True
 

@@ -54,6 +54,35 @@ def test_gains_have_flown_as_often_as_there_are_runs_of_any_test_with_them(wante
 
 
 @given(events)
+def test_gains_have_fared_as_all_their_flights_or_as_those_without_excitation_where_there_are_any(wanted):
+    book, lives, _ = written(wanted)
+    some = np.ones((book.setup.steps, book.setup.signals.n_u))
+    excited = [number for number in range(len(lives)) if number % 2]
+    for number in excited:
+        book.tests[number] = replace(book.tests[number], excitation=some)
+    book.experiments[:] = [
+        run if run.number not in excited else replace(run, replayed=book.tests[run.number])
+        for run in book.experiments
+    ]
+    book.failures[:] = [replace(each, test=book.tests[each.test.number]) for each in book.failures]
+    for gains in range(3):
+        flights = [
+            (number not in excited, kept)
+            for number, life in enumerate(lives)
+            if life.gains == gains
+            for kept in life.kept
+        ]
+        quiet = [each for each in flights if each[0]]
+        for found, counted in (
+            (standing.fared(book, genes_of(gains), excited=True), flights),
+            (standing.fared(book, genes_of(gains), excited=False), quiet or flights),
+        ):
+            left = sum(not kept for _, kept in counted)
+            assert (found.flights, found.left) == (len(counted), left)
+            assert found.risk == (pytest.approx((left + 0.5) / (len(counted) + 1)) if left else 0.0)
+
+
+@given(events)
 def test_excitations_were_borne_by_the_last_tests_that_were_held_back_and_flew(wanted):
     book, lives, _ = written(wanted)
     held = HoldBack(*(np.tile([-far, far], (book.setup.signals.n_x, 1)) for far in (1.0, 2.0)))

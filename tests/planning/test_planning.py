@@ -20,7 +20,7 @@ from twinloop.planning.candidates import candidates as drawn
 from twinloop.planning.excitation import GROWTH, SHARE, binary, chirps, directions, growing_chirps
 from twinloop.planning.gains import _dearer_outside, tune_gains
 from twinloop.planning.judging import Committee
-from twinloop.planning.proposal import Flown
+from twinloop.planning.proposal import Fared, Flown
 from twinloop.planning.quality import KINDS, quality_of
 
 
@@ -345,6 +345,11 @@ def test_where_the_tuned_gains_may_not_be_flown_the_last_test_is_the_best_of_the
     )
     assert same_bits(found.genes, flown) and found.excitation is None
     assert found.reason.startswith("The best gains flown, again: they are known to fly.")
+    left = Flown(flown, True, [1.0], 0.5 * quality, fared=Fared(3, 1))
+    found = planner.propose(committee, lazy, left, goal, 3, exploit=True, last=True)
+    assert found.reason.startswith(
+        "The best gains flown, again, though 1 of their 3 flights left the envelope."
+    )
 
 
 def test_a_committee_of_one_agrees_and_a_member_that_diverges_is_no_reason_to_crash():

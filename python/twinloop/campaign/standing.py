@@ -12,6 +12,7 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment, Iteration, Lesson
 from twinloop.campaign.logbook import Logbook
+from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 
 Turn = TypeVar("Turn", Lesson, Iteration)
@@ -158,6 +159,29 @@ def read_in(book: Logbook, flights: Sequence[Experiment]) -> Floats:
     signals, start = book.setup.signals, book.setup.initial_state
     states = np.concatenate([signals.continued(run.trajectory.states, start=start) for run in flights])
     return np.stack([states.min(axis=0), states.max(axis=0)])
+
+
+def fared(book: Logbook, genes: Floats, excited: bool) -> Fared:
+    """How some gains have fared so far, in tests with or without an excitation.
+
+    Args:
+        book: of the campaign.
+        genes: of them (size,).
+        excited: whether they are to fly with an excitation. Without one, only flights without one count if there were
+            any.
+    """
+    flown = [
+        (run.test, run.kept_envelope and not failed(book, run.test.number))
+        for run in book.experiments
+        if run.test is not None
+    ]
+    flown += [(failure.test, False) for failure in book.failures if not failure.recorded]
+    same = [
+        (test.excitation is None, kept) for test, kept in flown if test.genes.tobytes() == genes.tobytes()
+    ]
+    quiet = [(is_quiet, kept) for is_quiet, kept in same if is_quiet]
+    counted = quiet if quiet and not excited else same
+    return Fared(len(counted), sum(not kept for _, kept in counted))
 
 
 def times_flown(book: Logbook, genes: Floats) -> int:

@@ -211,6 +211,9 @@ class Comparison:
         return Why(
             trusted=self.committee.trusted,
             flies=self.flown.flies,
+            fared=self.flown.fared,
+            # Nobody knows where an excitation leads once the last one was too much, and it begins anew.
+            stronger=self.committee.trusted or self.flown.borne > 0,
             exploits=self.wanted.exploit and chosen == 0,
             plain=self.wanted.plain,
             repeats=chosen >= self.drafts.repeats,

@@ -9,6 +9,30 @@ from twinloop._ground.arrays import Floats
 from twinloop.planning.seen import Seen
 
 
+@dataclass(frozen=True)
+class Fared:
+    """How flights of the same gains have fared.
+
+    Args:
+        flights: how many there were, failures included.
+        left: how many of them left the envelope, or did not end.
+    """
+
+    flights: int
+    left: int
+
+    def __str__(self) -> str:
+        return "their only flight" if self.flights == 1 else f"{self.left} of their {self.flights} flights"
+
+    @property
+    def risk(self) -> float:
+        """Least probability that the next one does not keep the envelope: 0 where all have kept it.
+
+        Half a flight is added on either side: few flights are no certainty.
+        """
+        return (self.left + 0.5) / (self.flights + 1.0) if self.left else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Flown:
     """What has flown so far.
@@ -21,6 +45,7 @@ class Flown:
             worse.
         failed: genes of tests that failed on the system, or were cut.
         times: how often the best gains have flown.
+        fared: how these flights have ended.
         borne: how many of the last flights whose excitation was held back kept the envelope.
         seen: where the flights have been, as long as no prediction has come true.
     """
@@ -31,6 +56,7 @@ class Flown:
     good: float
     failed: Sequence[Floats] = ()
     times: int = 1
+    fared: Fared = Fared(1, 0)
     borne: int = 1
     seen: Seen | None = None
 

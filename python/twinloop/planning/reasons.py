@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop._ground.elementary import log
+from twinloop.planning.proposal import Fared
 from twinloop.planning.settings import PlanningOptions
 from twinloop.signals import Signals
 
@@ -16,6 +17,8 @@ class Why:
     Args:
         trusted: whether the committee follows the flights so far.
         flies: whether the best gains flown are known to fly.
+        fared: how their flights have ended.
+        stronger: whether they fly with a stronger excitation than before.
         exploits: whether the tuned gains are flown as they are.
         plain: whether the test that promises most was wanted.
         repeats: whether it flies the best gains flown again.
@@ -28,6 +31,8 @@ class Why:
 
     trusted: bool
     flies: bool
+    fared: Fared
+    stronger: bool
     exploits: bool
     plain: bool
     repeats: bool
@@ -58,10 +63,13 @@ def reason(why: Why, signals: Signals, options: PlanningOptions) -> str:
 def _what_flies(why: Why, options: PlanningOptions) -> str:
     """That the best gains flown fly again; nothing where others do."""
     known = ": they are known to fly" * why.flies
+    if why.fared.left:
+        known = f", though {why.fared} left the envelope"
     if why.repeats and why.plain:
         return f"The best gains flown, again{known}."
     if why.repeats:
-        change = "a stronger excitation" if options.excitation > 0.0 else "a small variation"
+        excitation = "a stronger excitation" if why.stronger else "another excitation"
+        change = excitation if options.excitation > 0.0 else "a small variation"
         return f"The best gains flown, again, with {change}{known}."
     return ""
 

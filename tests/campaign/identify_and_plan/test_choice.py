@@ -22,11 +22,13 @@ from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.judging import Committee, Judged
 from twinloop.planning.planner import Planner
+from twinloop.planning.proposal import Fared
 from twinloop.planning.settings import PlanningOptions
 
 FAMILY = CONTROLLER.bind(SIGNALS)
 FLOWN = tl.Test(FAMILY, np.array([2.0, 2.0, 0.3]), np.zeros(2), np.array([1.0, 0.0]), 20, number=0)
 TUNED = np.array([4.0, 1.0, 0.5])
+KEPT = Fared(1, 0)
 
 
 def experiment(predicted=None, quality=1.0, spread=0.01):
@@ -38,6 +40,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
     experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED, explained=True,
+    fared=KEPT,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -68,9 +71,13 @@ def chosen(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
         unfit=lambda book: list(unfit), on_task=lambda book, test: True,
         measured=lambda book, test: measured if test == 0 else None, best_flown=lambda book: best_measured,
+        fared=lambda book, genes, excited: KEPT if (genes == TUNED).all() else fared,
     ):  # fmt: skip
         found = choice.between(TUNED, best)
     told = [found.reason, found.predicted, found.spread]
+    assert found.risk == pytest.approx(
+        max(0.5 / 5.0, fared.risk if (found.genes == FLOWN.genes).all() else 0.0)
+    )
     return ("tuned" if (found.genes == TUNED).all() else "flown"), told[0] if gusts is UNMOVED else told
 
 
@@ -210,6 +217,11 @@ def test_gains_that_cannot_be_answered_for_are_not_flown(changes, words):
 def test_gains_that_left_the_envelope_give_way_to_any_that_keep_it():
     answer, reason = chosen(1.5, flies=False)
     assert answer == "tuned" and "as the best flown gains did" in reason
+
+
+def test_gains_that_left_the_envelope_in_other_flights_say_so_and_are_as_risky_as_those_were():
+    answer, reason = chosen(1.5, fared=Fared(4, 3))
+    assert answer == "flown" and reason.endswith(" But 3 of their 4 flights left the envelope.")
 
 
 # Starts of the tuning

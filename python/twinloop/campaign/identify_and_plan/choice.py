@@ -21,6 +21,7 @@ from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
 from twinloop.planning.judging import Committee, Judged, expected, risk
 from twinloop.planning.planner import Planner
+from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 
 DOUBT = 3.0
@@ -82,7 +83,7 @@ class Choice:
                 " yet."
             )
             return self._tuned(tuned, judged, recorded, reason)
-        flies = standing.flies(self.book, flown.number)
+        flies, own = standing.flies(self.book, flown.number), self._fared(flown)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < (1.0 - self._worth) * old).mean())
         if flies and not refused:
@@ -100,6 +101,8 @@ class Choice:
         reason = f"The best gains flown: {refused}."
         if not flies:
             reason += " They left the envelope when they flew."
+        elif own.left:
+            reason += f" But {own} left the envelope."
         reason += self._measured_better(flown)
         return self._flown(flown, judged, recorded, reason)
 
@@ -228,7 +231,14 @@ class Choice:
     ) -> Test:
         predicted, spread = self._expected(test, recorded[:, :, pick])
         usages = judged.usages[:, :, pick]
-        return replace(test, predicted=predicted, measured=measured).explained(spread, risk(usages), reason)
+        least = self._fared(test).risk
+        return replace(test, predicted=predicted, measured=measured).explained(
+            spread, max(risk(usages), least), reason
+        )
+
+    def _fared(self, test: Test) -> Fared:
+        """How the gains of a test have fared, of which the twin may know nothing."""
+        return standing.fared(self.book, test.genes, excited=False)
 
     def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
         """The quality to be measured of a flight, and its calibrated spread, disturbances included."""

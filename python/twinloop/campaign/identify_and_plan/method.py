@@ -36,7 +36,7 @@ from twinloop.law.actuation import delayed
 from twinloop.law.twin import Twin
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
-from twinloop.planning.proposal import Flown, Proposal
+from twinloop.planning.proposal import Fared, Flown, Proposal
 from twinloop.planning.scored import Scored
 from twinloop.planning.seen import Seen
 from twinloop.records import Record
@@ -169,7 +169,8 @@ class IdentifyAndPlan:
         gusts = self._gusts(book, self._as_test(book, found))
         predicted, spread = gusts.added_to(found.predicted, found.spread)
         spread = calibrated(spread, predicted, book.experiments)
-        found = replace(found, predicted=predicted, spread=spread)
+        own = standing.fared(book, found.genes, found.excitation is not None)
+        found = replace(found, predicted=predicted, spread=spread, risk=max(found.risk, own.risk))
         test = book.new_test(
             found.genes,
             excitation=found.excitation,
@@ -238,9 +239,10 @@ class IdentifyAndPlan:
             [run.usage for run in book.experiments],
             float("inf") if good is None else good,
             standing.unfit(book),
-            1 if best is None else standing.times_flown(book, best.genes),
-            standing.borne(book),
-            None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
+            times=1 if best is None else standing.times_flown(book, best.genes),
+            fared=Fared(0, 0) if best is None else standing.fared(book, best.genes, excited=True),
+            borne=standing.borne(book),
+            seen=None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
         )
 
     def _seen(self, book: Logbook) -> Seen:
