@@ -201,5 +201,5 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
     )
     yield serious(
         "free-run",
-        f"In free run over the {runs} run{'s' if runs > 1 else ''} that it was learnt from, the twin {what}. {why}",
+        f"In free run over the {runs} run{'s' if runs > 1 else ''} so far, the twin {what}. {why}",
     )

@@ -41,8 +41,8 @@ ROUGH = serious(
 """What is said of a twin that is linear because no law explains the flights and no other one is better."""
 BEFORE = note(
     "known-before",
-    "The twin learnt from all flights misses some of them in free run; the twin of before the last flight"
-    " misses none. The earlier twin is kept.",
+    "The twin learnt from all flights misses some of them in free run by more than any disturbance explains; the"
+    " twin of before the last flight does not. The earlier twin is kept.",
 )
 """What is said of a twin that has not learnt all flights and follows them, where the one that has does not."""
 LASTED = note(
