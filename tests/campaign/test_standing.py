@@ -97,6 +97,19 @@ def test_excitations_were_borne_by_the_last_tests_that_were_held_back_and_flew(w
     assert standing.borne(book) == len(list(takewhile(bool, reversed(fared))))
 
 
+@pytest.mark.parametrize(("rate", "borne"), [(3.0, 1), (7.9, 1), (8.1, 0)])
+def test_an_excitation_that_states_outran_is_not_borne_though_they_kept_the_envelope(rate, borne):
+    book = Logbook(SETUPS["default"])
+    kept = [[-np.inf, np.inf], [-4.0, 4.0]]
+    assert book.setup.signals.states[1].envelope == (-12.0, 12.0)
+    test = book.new_test(genes_of(0), hold_back=HoldBack(np.multiply(kept, 0.5), np.array(kept)))
+    run = run_of(test)
+    states = run.trajectory.states.copy()
+    states[3, 1] = rate
+    book.enter(replace(run, trajectory=replace(run.trajectory, states=states)))
+    assert standing.flies(book, 0) and standing.borne(book) == borne
+
+
 @given(events)
 def test_gains_have_reached_what_their_flights_that_kept_the_envelope_have_read(wanted):
     book, _, _ = written(wanted)

@@ -27,6 +27,27 @@ PROGRAM = _core.Program(
 MODEL = _core.Model(PROGRAM, "acceleration", SIGNALS.engine)
 
 
+def test_how_far_readings_went_on_is_a_share_of_the_way_to_the_envelope():
+    signals = tl.Signals(
+        [tl.State("angle", "rad", 1.0, envelope=(-2.0, 1.6)), tl.State("rate", "rad/s", 1.0, envelope=(-9.0, 9.0)),
+         tl.State("place", "m", 1.0)],
+        [tl.Command("torque", "N m", (-1.0, 1.0))], 0.05,
+    )  # fmt: skip
+    held = HoldBack([[-0.1, 0.2], [-np.inf, 1.0], [0.0, 0.0]], [[-0.5, 0.6], [-np.inf, 3.0], [-1.0, 1.0]])
+    still = np.zeros((5, 3))
+    assert held.overrun(signals, still) == pytest.approx(max(-0.5 / 1.5, -0.6 / 1.0, -3.0 / 6.0))
+    for state, value, expected in (
+        (0, 1.1, 0.5),
+        (0, -2.0, 1.0),
+        (1, 6.0, 0.5),
+        (1, -8.0, -1 / 3),
+        (2, 50.0, -1 / 3),
+    ):
+        read = still.copy()
+        read[2, state] = value
+        assert held.overrun(signals, read) == pytest.approx(expected)
+
+
 def share(hold_back, reading):
     """The definition: the room that is left of each end's margin, the smallest of all, within 0 and 1."""
     left = [1.0]

@@ -67,6 +67,28 @@ class HoldBack(Recorded, kind="hold_back"):
             if np.isfinite(self.none[i]).any()
         }
 
+    def overrun(self, signals: Signals, states: ArrayLike) -> float:
+        """How far readings went on after the excitation was held back to nothing.
+
+        Args:
+            signals: of the system.
+            states: readings (n, n_x), SI units, radians.
+
+        Returns:
+            As a share of the way from the outer range to the envelope: 0 or less if no reading was outside the outer
+            range, 1 if one reached the end of the envelope.
+        """
+        read = np.asarray(states, dtype=np.float64)
+        most = -np.inf
+        for i, state in enumerate(signals.states):
+            if state.envelope is None or state.periodic:
+                continue
+            far = np.array([self.none[i, 0] - read[:, i].min(), read[:, i].max() - self.none[i, 1]])
+            way = np.array([self.none[i, 0] - state.envelope[0], state.envelope[1] - self.none[i, 1]])
+            counts = np.isfinite(far) & (way > 0.0)
+            most = max(most, float((far[counts] / way[counts]).max(initial=-np.inf)))
+        return most
+
     @classmethod
     def between(
         cls,

@@ -15,6 +15,9 @@ from twinloop.campaign.logbook import Logbook
 from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 
+HELD = 0.5
+"""Share of the way to the envelope by which states may go on after an excitation was held back to nothing."""
+
 Turn = TypeVar("Turn", Lesson, Iteration)
 
 
@@ -121,14 +124,19 @@ def unfit(book: Logbook) -> list[Floats]:
 def borne(book: Logbook) -> int:
     """How many of the last tests in a row that were held back are known to fly: each bore a stronger excitation.
 
+    None counts whose states went on by half of the way to the envelope or more once the excitation was nothing:
+    holding back has not held it, and would not hold a stronger one.
+
     Args:
         book: of the campaign.
     """
-    count = 0
+    count, signals = 0, book.setup.signals
     for test in reversed(book.tests):
         if test.hold_back is None or status(book, test) in ("asked", "abandoned"):
             continue
-        if not flies(book, test.number):
+        runs = _runs(book, test.number)
+        went_on = max((test.hold_back.overrun(signals, run.trajectory.states) for run in runs), default=0.0)
+        if not flies(book, test.number) or went_on >= HELD:
             break
         count += 1
     return count
