@@ -81,7 +81,7 @@ class PlanningOptions:
     reach_far: float = 0.6
     reach_least: float = 0.2
     reach_growth: float = 1.25
-    reach_seen: float = 2.0
+    reach_seen: float = 4.0
     evaluations: int = 12_000
     tuning_starts: int = 3
     tuning_members: int = 4
