@@ -137,7 +137,7 @@ def test_logs_of_an_unstable_system_are_judged_in_pieces_and_its_twin_is_written
     found = json.loads(done.stdout)
     assert found["follows"] and all(0.5 <= log["piece"] < 0.5 * log["seconds"] for log in found["logs"])
     assert all(fit > 70.0 for log in found["logs"] for fit in log["fit"].values())
-    assert "begins again at a reading every" in identified(folder, logs=("3.csv",)).stdout
+    assert "the free run begins again at a reading every" in identified(folder, logs=("3.csv",)).stdout
 
 
 def test_a_log_of_an_unstable_system_that_was_held_out_is_foretold_in_pieces():

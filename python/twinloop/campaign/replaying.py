@@ -17,6 +17,7 @@ from twinloop.campaign.logbook import Logbook
 from twinloop.errors import engine_input
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.law.flight import drawn_runs
+from twinloop.law.noise import Noise
 from twinloop.law.pieces import held, in_pieces, judged_length
 from twinloop.objectives import closed_loop, normalised_error
 from twinloop.test import Test
@@ -43,7 +44,7 @@ class FreeError:
 
 
 def free_errors(
-    model: _core.Model, book: Logbook, workers: _core.Workers, sensors: Floats | None = None
+    model: _core.Model, book: Logbook, workers: _core.Workers, noise: Noise | None = None
 ) -> list[FreeError]:
     """What the free runs of a model are off from each flight.
 
@@ -51,13 +52,13 @@ def free_errors(
         model: to be judged.
         book: with the flights.
         workers: how the work is carried out.
-        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
+        noise: of the sensors, and disturbances, as identified; None: of sensors alone, guessed from each flight.
     """
     whole = closed_loop([model], book.selected, workers)[0].tolist()
     limits = book.setup.limits
     found = []
     for run, error in zip(book.experiments, whole, strict=True):
-        flown, length = run.trajectory, length_of(model, run, limits, workers, sensors)
+        flown, length = run.trajectory, length_of(model, run, limits, workers, noise)
         if length == flown.steps:
             found.append(FreeError(error, run.frozen, length))
             continue
@@ -76,7 +77,7 @@ def lengths_of(
     flights: Sequence[Experiment],
     limits: Limits,
     workers: _core.Workers,
-    sensors: Floats | None = None,
+    noise: Noise | None = None,
 ) -> Integers:
     """Steps of the pieces in which a model is held against flights (N,).
 
@@ -85,11 +86,9 @@ def lengths_of(
         flights: N of them.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
-        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
+        noise: of the sensors, and disturbances, as identified; None: of sensors alone, guessed from each flight.
     """
-    return np.array(
-        [length_of(model, flight, limits, workers, sensors) for flight in flights], dtype=np.int64
-    )
+    return np.array([length_of(model, flight, limits, workers, noise) for flight in flights], dtype=np.int64)
 
 
 def length_of(
@@ -97,7 +96,7 @@ def length_of(
     flight: Experiment,
     limits: Limits,
     workers: _core.Workers,
-    sensors: Floats | None = None,
+    noise: Noise | None = None,
 ) -> int:
     """Steps of the pieces in which a model is held against a flight: all, if its controller flies in the free run too.
 
@@ -106,16 +105,16 @@ def length_of(
         flight: that was made.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
-        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
+        noise: of the sensors, and disturbances, as identified; None: of sensors alone, guessed from each flight.
     """
     flown = flight.trajectory
     if flight.test is not None:
         return flown.steps
-    if sensors is None:
+    if noise is None:
         scales = np.array([state.scale for state in limits.signals.states])
         run = Run.of(flown.states, flown.commands).continued(limits.signals)
-        sensors = np.sqrt(guessed_noise([run], scales))
-    return judged_length(model, flown, sensors, limits, workers)
+        noise = Noise.of_sensors(np.sqrt(guessed_noise([run], scales)))
+    return judged_length(model, flown, noise, limits, workers)
 
 
 def as_flown(model: _core.Model, flight: Experiment, length: int) -> Test | Replay:

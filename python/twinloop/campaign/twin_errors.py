@@ -7,11 +7,12 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.replaying import free_errors
 from twinloop.law.accuracy import TestErrors
+from twinloop.law.noise import Noise
 from twinloop.objectives import open_loop
 
 
 def errors_of(
-    model: _core.Model, book: Logbook, workers: _core.Workers, sensors: Floats | None = None
+    model: _core.Model, book: Logbook, workers: _core.Workers, noise: Noise | Floats | None = None
 ) -> list[TestErrors]:
     """How well a model follows each run.
 
@@ -19,14 +20,16 @@ def errors_of(
         model: to be judged.
         book: with the runs.
         workers: how the work is carried out.
-        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
+        noise: of the sensors, and disturbances, as identified; of sensors alone (n_x,): nothing disturbs the system;
+            None: guessed from each flight.
 
     Returns:
         A row for each experiment, in the order of `tell`.
     """
+    known = noise if noise is None or isinstance(noise, Noise) else Noise.of_sensors(noise)
     steps, runs = (
         open_loop([model], book.selected, workers)[0].tolist(),
-        free_errors(model, book, workers, sensors),
+        free_errors(model, book, workers, known),
     )
     return [
         TestErrors(run.number, step, free.error, free.normalised, run.before, free.error)

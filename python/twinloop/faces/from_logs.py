@@ -147,7 +147,10 @@ def _text(twin: Twin, found: dict[str, Any]) -> str:
     pieces = [log["piece"] for log in found["logs"] if log["piece"] < log["seconds"] - 0.5 * twin.signals.dt]
     note = "FIT: of the free run from the first reading; 100 is perfect, 0 no better than the mean."
     if pieces:
-        note += f"\nThe free run of an unstable system begins again at a reading every {_span(pieces)} s."
+        every = f"every {_span(pieces)} s"
+        note += (
+            f"\nWhere no model could be followed for longer, the free run begins again at a reading {every}."
+        )
     return (
         "\n".join([*found["equations"], "", errors, note, *([] if not remarks else ["", remarks.rstrip()])])
         + "\n"

@@ -60,6 +60,11 @@ class Noise(Recorded, kind="noise"):
             ]
         return found
 
+    @staticmethod
+    def of_sensors(sensors: Floats) -> Noise:
+        """Of sensors alone (n_x,); nothing disturbs the system."""
+        return Noise(sensors, np.zeros_like(sensors))
+
     def without(self, states: Collection[int]) -> Noise:
         """The same without the correlated disturbances that drive some states."""
         return replace(

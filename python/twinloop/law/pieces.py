@@ -7,6 +7,9 @@ deviation of the size of the sensor's noise, grown by the model's own slopes alo
 the system itself moves in a piece. Where noise leaves no such length, it is the one at which the two are furthest
 apart. A model that grows the deviation faster than the system moves has no length at all, and follows nothing: shorter
 pieces would make no model right.
+
+Nothing corrects what disturbs a system on a replay either, such as gusts. So known disturbances add to the deviation in
+each period, and a piece may then be as short as any that foresees something, if they leave most of the motion there.
 """
 
 from __future__ import annotations
@@ -19,8 +22,10 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import exp
 from twinloop.errors import engine_input
 from twinloop.law.flight import drawn_runs
+from twinloop.law.noise import Noise, reaches
 from twinloop.trajectory import Trajectory, continued
 
 WRONG = 0.5
@@ -35,6 +40,9 @@ LARGE = 100.0
 """Mean square of a deviation, in units of how far states move, after which it is followed no further."""
 LEAST = 10
 """Steps of a piece: one that foresees less foresees nothing."""
+Deviations = tuple[Floats, Floats, Floats]
+"""How deviations go on: their first covariance (m, m), what each period does to it (n, m, m), what it adds (m,). They
+are those of the states, in units of how far these move, and the correlated disturbances behind them."""
 STARTS = 64
 """Readings, spread over the flight, from which the growth is followed."""
 
@@ -75,7 +83,7 @@ def held(readings: Floats, length: int) -> Floats:
 def judged_length(
     model: _core.Model,
     flight: Trajectory,
-    sensors: Floats,
+    noise: Noise,
     limits: Limits,
     workers: _core.Workers | None = None,
 ) -> int:
@@ -84,7 +92,7 @@ def judged_length(
     Args:
         model: to be judged.
         flight: of at least one step.
-        sensors: standard deviations of their noise (n_x,).
+        noise: of the sensors, and disturbances.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
 
@@ -105,9 +113,9 @@ def judged_length(
     )
     if int(runs.lasted[0]) < flight.steps:
         free = np.inf
-    if not left(free, frozen, float(np.square(sensors / scales).mean())):
+    if not left(free, frozen, float(np.square(noise.sensors / scales).mean())):
         return flight.steps
-    length = followed_length(model, whole, readings, sensors, limits, workers)
+    length = followed_length(model, whole, readings, noise, limits, workers)
     return flight.steps if length < LEAST else -(-flight.steps // -(-flight.steps // length))
 
 
@@ -115,17 +123,17 @@ def followed_length(
     model: _core.Model,
     whole: Replay,
     readings: Floats,
-    sensors: Floats,
+    noise: Noise,
     limits: Limits,
     workers: _core.Workers | None = None,
 ) -> int:
-    """Steps of a piece in which a deviation of the sensors' size stays small beside what the system moves.
+    """Steps of a piece in which what noise and disturbances do stays small beside what the system moves.
 
     Args:
         model: whose slopes let it grow.
         whole: replay of the flight (n steps).
         readings: of the flight (n + 1, n_x), periodic states continued.
-        sensors: standard deviations of their noise (n_x,).
+        noise: of the sensors, and disturbances.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
 
@@ -133,33 +141,73 @@ def followed_length(
         The most at which it is small enough, otherwise those at which it is smallest; 0: there are none.
     """
     scales = np.array([state.scale for state in limits.signals.states])
-    moves = np.maximum(readings.std(axis=0), np.maximum(sensors, 1e-9 * scales))
-    off = np.maximum(sensors, SHARE * moves)
+    moves = np.maximum(readings.std(axis=0), np.maximum(noise.sensors, 1e-9 * scales))
+    off = np.maximum(noise.sensors, SHARE * moves)
     slopes = _slopes(model, whole, readings, off, limits, workers)
     if slopes is None:
         return 0
-    slopes = slopes * moves / moves[:, np.newaxis]
-    starts = np.unique(np.linspace(0, len(slopes) - 1, STARTS).astype(int))
-    spread = np.tile(np.diag(np.square(off / moves)), (len(starts), 1, 1))
-    unseen = 2.0 * np.square(sensors / moves)
-    grown = moved = 0.0
+    shares = _shares(_deviations(slopes, off, moves, noise), readings / moves, noise.sensors / moves)
     length, least = 0, MOST
+    for step, share in enumerate(shares, 1):
+        if share <= max(SMALL, least):
+            length, least = step, share
+    disturbed = bool(noise.correlated) and len(shares) >= LEAST and shares[LEAST - 1] <= MOST
+    return max(length, LEAST) if disturbed else length
+
+
+def _shares(deviations: Deviations, moved: Floats, sensors: Floats) -> list[float]:
+    """Of what the system moves in a piece what a deviation comes to, mean squares over the piece: one for each length.
+
+    Args:
+        deviations: how they go on.
+        moved: readings in units of how far states move (n + 1, n_x).
+        sensors: standard deviations of their noise in the same units (n_x,).
+    """
+    first, slopes, added = deviations
+    n_x = moved.shape[1]
+    starts = np.unique(np.linspace(0, len(slopes) - 1, STARTS).astype(int))
+    spread = np.tile(first, (len(starts), 1, 1))
+    grown = went = 0.0
+    shares = []
     for step in range(1, len(slopes) + 1):
         going = starts + step <= len(slopes)
         starts, spread = starts[going], spread[going]
-        spread = _moved_on(slopes[starts + step - 1], spread)
-        now = np.trace(spread, axis1=1, axis2=2) / len(moves)
+        spread = _moved_on(slopes[starts + step - 1], spread) + np.diag(added)
+        now = np.trace(spread[:, :n_x, :n_x], axis1=1, axis2=2) / n_x
         if not now.mean() < LARGE:
             break
-        went = np.square((readings[starts + step] - readings[starts]) / moves) - unseen
-        grown, moved = grown + float(now.mean()), moved + float(went.mean())
-        if grown <= max(SMALL, least) * moved:
-            length, least = step, grown / moved if moved > 0.0 else 0.0
-    return length
+        grown += float(now.mean())
+        went += float((np.square(moved[starts + step] - moved[starts]) - 2.0 * np.square(sensors)).mean())
+        shares.append(grown / went if went > 0.0 else np.inf)
+    return shares
+
+
+def _deviations(slopes: Floats, off: Floats, moves: Floats, noise: Noise) -> Deviations:
+    """How deviations of the states, off at first by (n_x,), go on with the disturbances that noise knows.
+
+    Args:
+        slopes: of each step over deviations of the states (n, n_x, n_x), in their units.
+        off: deviations that a piece begins with (n_x,), in their units.
+        moves: how far the states move (n_x,), in their units.
+        noise: with the disturbances.
+    """
+    n_x, gusts = len(moves), noise.correlated
+    size = n_x + len(gusts)
+    onward = np.zeros((len(slopes), size, size))
+    onward[:, :n_x, :n_x] = slopes * moves / moves[:, np.newaxis]
+    first, added = np.zeros(size), np.zeros(size)
+    first[:n_x], added[:n_x] = np.square(off / moves), np.square(noise.moves / moves)
+    for i, gust in enumerate(gusts, n_x):
+        kept = float(exp(-noise.dt / gust.correlation_time))
+        onward[:, i, i] = kept
+        first[i], added[i] = gust.sd * gust.sd, (1.0 - kept * kept) * gust.sd * gust.sd
+        for state, reach in zip(gust.states, reaches(gust.form, noise.dt, len(gust.states)), strict=True):
+            onward[:, state, i] = reach / moves[state]
+    return np.diag(first), onward, added
 
 
 def _moved_on(slopes: Floats, spread: Floats) -> Floats:
-    """Covariances (starts, n_x, n_x) a period later: S C Sᵀ, summed in a fixed order."""
+    """Covariances (starts, m, m) a period later: S C Sᵀ, summed in a fixed order."""
     half = (slopes[:, :, :, np.newaxis] * spread[:, np.newaxis, :, :]).sum(axis=2)
     onward: Floats = (half[:, :, np.newaxis, :] * slopes[:, np.newaxis, :, :]).sum(axis=3)
     return onward

@@ -455,8 +455,9 @@ class Twin(Shown, Recorded, kind="twin"):
     def piece_of(self, trajectory: Trajectory) -> int:
         """Steps for which the twin is held against a record under its commands before it begins again at a reading.
 
-        All of them, unless the free run leaves the record and the system is unstable without its controller by the twin
-        itself: then as many as a right model could be followed.
+        All of them, unless the free run leaves the record, and by the twin itself noise and disturbances take any free
+        run away from it, as on a system that is unstable without its controller: then as many as a right model could be
+        followed.
 
         Args:
             trajectory: of the same signals, with at least one step.
@@ -468,8 +469,8 @@ class Twin(Shown, Recorded, kind="twin"):
             InvalidInput: other columns, or no step.
         """
         recorded = check_recorded(trajectory, self.limits, None, least=1)
-        sensors = np.zeros(self.signals.n_x) if self.noise is None else self.noise.sensors
-        return judged_length(self.model, recorded, sensors, self.limits)
+        noise = Noise.of_sensors(np.zeros(self.signals.n_x)) if self.noise is None else self.noise
+        return judged_length(self.model, recorded, noise, self.limits)
 
     def fit(self, trajectory: Trajectory) -> FitTable:
         """How well the twin's free run under the recorded commands, from the first reading, follows a record.

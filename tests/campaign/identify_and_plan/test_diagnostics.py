@@ -233,6 +233,14 @@ def test_what_no_controller_corrects_is_held_against_no_effect_alone():
     assert "a right model of its stability" in remark.sentence and "backlash" not in remark.sentence
 
 
+def test_logs_that_disturbances_take_a_replay_away_from_accuse_no_law():
+    found = {"without_test": True, "disturbed": ["rate"]}
+    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, False, STEPS, **found)
+    assert remark.code == "does-not-follow" and remark.serious
+    assert "What seems to disturb rate would take a replay of the right law as far." in remark.sentence
+    assert "Fly a test" in remark.sentence and "no term describes" not in remark.sentence
+
+
 def test_flights_that_were_followed_in_pieces_are_named():
     runs, whole = [flown(), flown(1)], flown().trajectory.steps
     (remark,) = diagnostics_of(runs, SIGNALS, True, STEPS, pieces=[whole, whole // 2])

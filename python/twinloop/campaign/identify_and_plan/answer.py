@@ -16,7 +16,7 @@ from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.causes import causes_of
 from twinloop.campaign.identify_and_plan.following import Following, following, in_pieces
-from twinloop.campaign.identify_and_plan.misses import Miss, misses_any, misses_of
+from twinloop.campaign.identify_and_plan.misses import Miss, misses_any, misses_of, of_each_state
 from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
@@ -42,6 +42,7 @@ class Answer:
         unmoved: states that move, and nothing moves them by the law.
         missed: whether the best one misses a flight by more than noise and whatever may disturb explains.
         beside: the best model of the other kind, where none explains the flights; it sits in the committee, too.
+        lost: places of the flights that the best of them does not follow.
     """
 
     identified: Identified
@@ -51,6 +52,7 @@ class Answer:
     unmoved: Sequence[int]
     missed: bool
     beside: _core.Model | None = None
+    lost: Sequence[int] = ()
 
     @property
     def worst(self) -> float:
@@ -91,18 +93,17 @@ class Answer:
             workers: how the work is carried out.
             number: of the answer to these flights, which tells its draws from those of others.
         """
-        sensors = identified.sensors(setup.signals.n_x)
-        followed = following(identified.members, flights, setup.limits, workers, sensors)
+        noise = identified.noise(setup.signals)
+        followed = following(identified.members, flights, setup.limits, workers, noise)
         unmoved = unmoved_states(identified, flights, setup)
         if not np.isfinite(identified.chi_squared):
             # Of a model that diverges no more is known.
             return Answer(identified, followed, False, {}, unmoved, False)
         causes = causes_of(identified, flights, setup.signals, setup.limits, options, workers)
-        model, noise = identified.members[0], identified.noise(setup.signals)
-        unit = Unit(setup.seed).part(len(flights), 1, number)
+        model, unit = identified.members[0], Unit(setup.seed).part(len(flights), 1, number)
         missed = misses_any(model, followed, flights, noise, causes, unit, setup.limits, workers)
         lost = _lost(identified, followed, flights, setup, workers)
-        return Answer(identified, followed, 2 * lost <= len(flights), causes, unmoved, missed)
+        return Answer(identified, followed, 2 * len(lost) <= len(flights), causes, unmoved, missed, lost=lost)
 
     def misses(self, flights: Sequence[Experiment], setup: Setup, workers: _core.Workers) -> list[Miss]:
         """States that the best member misses by more than noise and known disturbances explain.
@@ -144,16 +145,36 @@ def _lost(
     flights: Sequence[Experiment],
     setup: Setup,
     workers: _core.Workers,
-) -> int:
-    """Number of flights that the best member does not follow; where commands were sent in pulses, under those."""
+) -> list[int]:
+    """Places of the flights that the best member does not follow; where commands were sent in pulses, under those."""
     scales = np.array([state.scale for state in setup.signals.states])
-    noise = float(np.square(identified.sensors(len(scales)) / scales).mean())
+    seen = np.square(identified.sensors(len(scales)) / scales)
     free, frozen = followed.free[0], followed.frozen
-    lost = np.array([left(*row, noise) for row in zip(free.tolist(), frozen.tolist(), strict=True)])
+    rows = zip(free.tolist(), frozen.tolist(), strict=True)
+    lost = np.array([left(*row, float(seen.mean())) for row in rows])
+    model, limits = identified.members[0], setup.limits
+    short = [j for j in _shortened(identified, followed, flights, setup) if not lost[j]]
+    if short:
+        parts = followed.lengths[short], [flights[j] for j in short]
+        each, still = of_each_state(model, *parts, limits, workers)
+        for j, off, held in zip(short, each.tolist(), still.tolist(), strict=True):
+            lost[j] = any(map(left, off, held, seen.tolist()))
     numbers: list[int] = np.flatnonzero(lost).tolist()
     pulsed = in_pulses([flights[j] for j in numbers])
     again = [j for j in numbers if flights[j].number in pulsed]
     if again:
-        model = identified.members[0]
-        lost[again] = in_pieces(model, [flights[j] for j in again], setup.limits, workers) > WRONG
-    return int(lost.sum())
+        lost[again] = in_pieces(model, [flights[j] for j in again], limits, workers) > WRONG
+    found: list[int] = np.flatnonzero(lost).tolist()
+    return found
+
+
+def _shortened(
+    identified: Identified, followed: Following, flights: Sequence[Experiment], setup: Setup
+) -> list[int]:
+    """Places of the flights that are followed in pieces which disturbances may have shortened.
+
+    In a short piece an angle goes on as its rate began, whatever the law: so each state has to be followed there.
+    """
+    if not identified.noise(setup.signals).correlated:
+        return []
+    return [j for j, run in enumerate(flights) if followed.lengths[j] < run.trajectory.steps]

@@ -28,6 +28,7 @@ def diagnostics_of(
     unmoved: Sequence[str] = (),
     without_test: bool = False,
     pieces: Sequence[int] = (),
+    disturbed: Sequence[str] = (),
 ) -> list[Remark]:
     """What speaks against the data or the twin.
 
@@ -42,6 +43,7 @@ def diagnostics_of(
         unmoved: states that move though their equations say that nothing moves them.
         without_test: whether the flights that it does not follow are all without a test, replayed without a controller.
         pieces: steps of those in which each experiment is followed; empty: all in whole.
+        disturbed: states with disturbances that would take free runs of a right twin as far; empty: none would.
 
     Returns:
         Remarks, none where nothing does.
@@ -55,7 +57,7 @@ def diagnostics_of(
     ]
     said += _in_pieces(experiments, pieces, signals.dt)
     if not follows:
-        said += _does_not_follow(any(remark.serious for remark in said), without_test)
+        said += _does_not_follow(any(remark.serious for remark in said), without_test, disturbed)
     elif misses:
         said += _free_run(misses, len(experiments), signals)
     return [*said, *_model_error(recurring), *_copies(experiments), *_none_complete(experiments, steps)]
@@ -110,15 +112,24 @@ def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
         )
 
 
-def _does_not_follow(explained: bool, without_test: bool) -> Iterator[Remark]:
+def _does_not_follow(explained: bool, without_test: bool, disturbed: Sequence[str]) -> Iterator[Remark]:
     """That the twin does not follow its own flights, and why, where no remark before has explained it."""
+    replayed = (
+        "those that it leaves have no test, so their recorded commands are replayed, and no controller corrects the"
+        " twin"
+    )
     if explained:
         cause = "the remarks before this one say why"
+    elif without_test and disturbed:
+        cause = (
+            f"{replayed}. What seems to disturb {', '.join(disturbed)} would take a replay of the right law as far."
+            " So these logs cannot tell wind, for example, from a model error. Fly a test of a campaign: under its"
+            " controller a right twin follows. Or log calmer conditions, or larger motions"
+        )
     elif without_test:
         cause = (
-            "those that it leaves have no test, so their recorded commands are replayed and no controller corrects the"
-            " twin. It leaves them even as far as a right model of its stability could be followed. There is an effect"
-            " that no term describes, or the logs show too little motion beside the sensors' noise: log larger"
+            f"{replayed}. It leaves them even as far as a right model of its stability could be followed. There is an"
+            " effect that no term describes, or the logs show too little motion beside the sensors' noise: log larger"
             " motions, or begin a campaign without these logs"
         )
     else:
@@ -144,8 +155,9 @@ def _in_pieces(experiments: Sequence[Experiment], pieces: Sequence[int], dt: flo
         yield note(
             "in-pieces",
             f"{len(short)} of the runs without a test {'was' if len(short) == 1 else 'were'} followed in pieces of"
-            f" {least if least == most else f'{least} to {most}'} s, each begun at its own reading: without its"
-            " controller the system is unstable, so no model could be followed for longer under recorded commands.",
+            f" {least if least == most else f'{least} to {most}'} s, each begun at its own reading: under recorded"
+            " commands no controller corrects what noise and disturbances do, so no model could be followed for"
+            " longer.",
         )
 
 

@@ -14,6 +14,7 @@ from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.replaying import as_flown, lengths_of, start_of
 from twinloop.law.flight import drawn_runs
+from twinloop.law.noise import Noise
 from twinloop.law.pieces import held
 from twinloop.test import Test
 
@@ -61,7 +62,7 @@ def following(
     flights: Sequence[Experiment],
     limits: Limits,
     workers: _core.Workers,
-    sensors: Floats | None = None,
+    noise: Noise | None = None,
 ) -> Following:
     """Flies each model as the system was flown, from where each flight began to where its record ends.
 
@@ -73,14 +74,14 @@ def following(
         flights: N of them, at least one.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
-        sensors: standard deviations of their noise (n_x,), as identified; None: guessed from each flight.
+        noise: of the sensors, and disturbances, as identified; None: of sensors alone, guessed from each flight.
 
     Returns:
         How well they follow.
     """
     free, lasted = np.empty((2, len(models), len(flights)))
     frozen = np.empty(len(flights))
-    lengths = lengths_of(models[0], flights, limits, workers, sensors)
+    lengths = lengths_of(models[0], flights, limits, workers, noise)
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
         frozen[j] = squares(states[1:], held(states, lengths[j]), limits).mean()

@@ -28,7 +28,6 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.terms.directions import Direction, of_mixer
-from twinloop.law.pieces import WRONG
 from twinloop.remarks import Remark, note, serious
 
 PLAIN = 1_000_000
@@ -167,19 +166,15 @@ class Learner:
 
     def _lesson(self, answer: Answer, book: Logbook) -> Lesson:
         identified, follows = answer.identified, answer.follows
-        free = free_errors(
-            identified.members[0], book, self.workers, identified.sensors(self.setup.signals.n_x)
-        )
+        noise = identified.noise(self.setup.signals)
+        free = free_errors(identified.members[0], book, self.workers, noise)
         names = self.setup.signals.state_names
         recurring, undecided = (
             tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
             for kind in ("law", "undecided")
         )
-        lost = [
-            run
-            for run, found in zip(book.experiments, free, strict=True)
-            if not found.error <= WRONG * found.frozen
-        ]
+        lost = [book.experiments[place] for place in answer.lost]
+        blown = () if answer.missed else [names[gust.states[0]] for gust in noise.correlated]
         misses = answer.misses(book.experiments, self.setup, self.workers)
         explained = follows and not misses and not is_rough(identified)
         actuation, signals = identified.actuation, self.setup.signals
@@ -215,6 +210,7 @@ class Learner:
                     [names[state] for state in answer.unmoved],
                     without_test=bool(lost) and all(run.test is None for run in lost),
                     pieces=[found.length for found in free],
+                    disturbed=blown,
                 ),
             ),
             recurring=recurring,

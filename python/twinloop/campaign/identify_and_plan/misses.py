@@ -76,8 +76,8 @@ def misses_of(
         limits: where a run counts as diverged.
         workers: how the work is carried out.
     """
-    lengths = lengths_of(model, flights, limits, workers, noise.sensors)
-    off, frozen = _off(model, lengths, flights, limits, workers)
+    lengths = lengths_of(model, flights, limits, workers, noise)
+    off, frozen = of_each_state(model, lengths, flights, limits, workers)
     steered = np.array([[run.test is not None] for run in flights])
 
     def beyond(part: int, *causes_out: Cause) -> Floats:
@@ -202,14 +202,25 @@ def _caused(causes: Mapping[int, Cause], *by: Cause) -> list[int]:
     return [state for state, found in causes.items() if found in by]
 
 
-def _off(
+def of_each_state(
     model: _core.Model,
     lengths: Integers,
     flights: Sequence[Experiment],
     limits: Limits,
     workers: _core.Workers,
 ) -> tuple[Floats, Floats]:
-    """Mean squares of each state's free run, infinite where that diverges, and of the one that never moves (N, n_x)."""
+    """What a model's free runs miss of each state, and what the model that never moves misses.
+
+    Args:
+        model: that is flown.
+        lengths: steps of the pieces in which each flight is followed (N,).
+        flights: N of them, at least one.
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+
+    Returns:
+        Mean squares in units of the states' scales (N, n_x), twice; the first infinite where a free run diverges.
+    """
     off, frozen = np.empty((2, len(flights), limits.signals.n_x))
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
