@@ -9,9 +9,10 @@ import twinloop as tl
 from strategies import program_text
 from twinloop import _core
 from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
 from twinloop._ground.streams import Unit
 from twinloop.campaign.identify_and_plan.following import following
-from twinloop.campaign.identify_and_plan.misses import misses_any, misses_of
+from twinloop.campaign.identify_and_plan.misses import expected_misses, misses_any, misses_of
 from twinloop.law.noise import CorrelatedDisturbance, Noise
 
 DT, STEPS, SENSOR, GUST, CALM = 0.02, 200, 1e-4, 0.5, 0.4
@@ -100,3 +101,15 @@ def test_a_state_is_missed_that_is_small_beside_the_others():
 def test_a_twin_that_diverges_misses_every_state():
     found = misses_of(model(push=1e9), flights(GUST), GUSTS, {1: "undecided"}, *BESIDE)
     assert [miss.state for miss in found] == [0, 1, 2] and all(np.isinf(miss.times) for miss in found)
+
+
+def test_without_noise_and_disturbances_nothing_is_expected_to_be_missed_in_pieces_either():
+    """A replay that begins again is read at its anchors; what it came to before them is no noise."""
+    (flown,) = flights(GUST, count=1)
+    replayed = Replay(SIGNALS, flown.trajectory.states[0], flown.trajectory.commands)
+    log = SimpleNamespace(test=None, number=None, replayed=replayed, trajectory=flown.trajectory)
+    calm, gusty = Noise.of_sensors(np.zeros(3)), GUSTS
+    (nothing,) = expected_misses(model(), np.array([10]), [log], calm, *BESIDE)
+    np.testing.assert_array_equal(nothing, 0.0)
+    (some,) = expected_misses(model(), np.array([10]), [log], gusty, *BESIDE)
+    assert (some[:2] > 0.0).all()

@@ -171,8 +171,10 @@ def expected_misses(
             workers=workers,
         )
         lasted = bool((runs.lasted == steps).all())
+        # What is measured where a piece begins is its anchor; what a free run misses there is what it came to before.
+        read = np.asarray(runs.read)
         with np.errstate(invalid="ignore"):
-            off = squares(runs.measured[1:], runs.read[0], limits).mean(axis=(0, 1))
+            off = squares(read[1:] + seen, read[0], limits).mean(axis=(0, 1))
         found[j] = off if lasted else np.inf
     return found
 
