@@ -436,6 +436,15 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
         ("t,angle,rate,torqe\n0,0,0,0\n", "did you mean 'torqe'"),
         ("t,angle,rate,torque\n0,0,x,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found 'x'"),
         ("t,angle,rate,torque\n0,0,0,0\n0.05,0\n", "line 3"),
+        ("t;angle;rate;torque\n0;0,1;0;0\n0,05;0;0;0\n", "for t, found '0,05'; write decimals with a point"),
+        (
+            "t,angle,rate,torque\n25.10.2026 00:30:00,0,0,0\n",
+            "line 2: .*; write times in s from any start, such as that of the first row, not as dates",
+        ),
+        (
+            "t,angle,rate,torque\n0,0,0,0\n0.05,0,,0\n0.1,0,,0\n0.15,0,0,0\n",
+            "for rate in each row, found nan in row 2, t = 0.05 s .2 such rows.; fill it in, or cut",
+        ),
         ("t,angle,rate,torque\n0.05,0,0,0\n0,0,0,0\n", "log.csv: .*times that grow"),
         (
             "t,angle,rate,torque\n0,0,0,0\n0.05,0,nan,0\n",

@@ -121,3 +121,14 @@ def test_a_log_without_a_column_and_a_strange_archive_are_misuse(checked, tmp_pa
     assert shaped.exit_code == 2 and "(4, 3)" in shaped.stderr
     np.savez(tmp_path / "x.npz", t=np.zeros(4), states=np.array([["a"] * 2] * 4), commands=np.zeros((3, 1)))
     assert invoke("check", str(tmp_path / "x.npz"), rig).exit_code == 2
+
+
+def test_empty_cells_of_a_historian_are_counted_and_a_slow_period_is_told_in_seconds(tmp_path):
+    (tmp_path / "oven.toml").write_text(
+        'dt = 10.0\n[states.heat]\nunit = "K"\nscale = 10.0\n[commands.power]\nunit = "W"\nbounds = [0.0, 9.0]\n'
+    )
+    rows = [f"{10 * k};{'' if k in (5, 9) else np.sin(k / 5)};{k % 9}" for k in range(60)]
+    (tmp_path / "oven.csv").write_text("\n".join(["t;heat;power", *rows]))
+    said = invoke("check", str(tmp_path / "oven.csv"), str(tmp_path / "oven.toml"))
+    assert "60 rows over 590 s, one in 10 s." in said.stdout
+    assert said.exit_code == 1 and "heat has no finite number in 2 of 60 rows: fill in" in said.stdout

@@ -68,10 +68,13 @@ def _numbers(what: str, values: Floats, shape: tuple[int, ...]) -> Floats:
     return np.asarray(values, dtype=np.float64)
 
 
+def _period(seconds: float) -> str:
+    """A period as people say it: with its rate where it is short."""
+    return f"{seconds:.4g} s" if seconds >= 1.0 else f"{1e3 * seconds:.4g} ms ({1.0 / seconds:.4g} Hz)"
+
+
 def _text(log: Path, found: LogCheck) -> str:
-    rate = (
-        "" if found.period is None else f", one in {1e3 * found.period:.4g} ms ({1.0 / found.period:.4g} Hz)"
-    )
+    rate = "" if found.period is None else f", one in {_period(found.period)}"
     lines = [f"{log}: {found.rows} rows over {found.seconds:.4g} s{rate}."]
     rows = [
         [

@@ -145,7 +145,7 @@ def _refuse_no_number(t: Floats, names: Sequence[str], parts: Sequence[Floats]) 
         if len(rows) and rows[0] < len(t):
             raise InvalidInput(
                 f"expected a finite number for {name} in each row, found {column[rows[0]]} in row {rows[0] + 1}, t ="
-                f" {t[rows[0]]:g} s ({len(rows)} such row{'s' * (len(rows) > 1)}); cut the log before it."
+                f" {t[rows[0]]:g} s ({len(rows)} such row{'s' * (len(rows) > 1)}); fill it in, or cut the log before."
             )
 
 
@@ -222,10 +222,21 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
 
 
 def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -> float:
+    """The number of a cell; NaN where it is empty, as a historian leaves a reading that it does not have."""
     text = row[place].strip() if place < len(row) else ""
     try:
-        return float(text)
+        return float(text) if text or place >= len(row) else np.nan
     except ValueError as reason:
         raise InvalidInput(
-            f"Log {called}, line {line}: expected a number for {name}, found {text!r}; correct or remove the line."
+            f"Log {called}, line {line}: expected a number for {name}, found {text!r}; {_advice(text, name)}."
         ) from reason
+
+
+def _advice(text: str, name: str) -> str:
+    """What to do about a cell that is no number."""
+    whole, comma, rest = text.partition(",")
+    if comma and whole.lstrip("+-").isdigit() and rest.isdigit():
+        return "write decimals with a point"
+    if name == TIME and any(mark in text for mark in ":-/"):
+        return "write times in s from any start, such as that of the first row, not as dates"
+    return "correct it, or leave the cell empty where there is no reading"

@@ -228,8 +228,8 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
     if column.missing:
         yield serious(
             "not-a-number",
-            f"{name} has no finite number in {column.missing} of {rows} rows: remove these rows, or cut"
-            " the log there.",
+            f"{name} has no finite number in {column.missing} of {rows} rows: fill in single ones from their"
+            " neighbours, or cut the log there.",
         )
         return
     if column.command:
