@@ -9,7 +9,7 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Band, Figure, Level, Line, Mark, Panel
-from twinloop.faces.figures.units import labelled, said, shown_unit, words
+from twinloop.faces.figures.units import in_words, labelled, said, shown_unit, words
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory, continued
 
@@ -51,7 +51,7 @@ def unseen(found: Examination) -> Figure | None:
     how = "its recorded commands" if last.number is None else "the test's own controller"
     return Figure(
         "unseen",
-        f"The twin against {said(last.number)}, which it had not learnt from",
+        f"The twin against {in_words(last.number)}, which it had not learnt from",
         panels,
         f"Free run from the first reading by the twin of {last.learnt} experiment{'s' * (last.learnt != 1)}, under"
         f" {how}; no reading after the first was used.{band}{others}",

@@ -11,7 +11,7 @@ import numpy as np
 
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
-from twinloop.faces.figures.units import said, words
+from twinloop.faces.figures.units import in_words, words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
 from twinloop.faces.text import quality_words
 
@@ -109,7 +109,8 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
 def _scope(found: Examination) -> str:
     """For what the twin may be trusted: as long and as far as was flown."""
     longest = max(float(run.trajectory.t[-1] - run.trajectory.t[0]) for run in found.experiments)
-    held = f"This holds within the flown range, for flights of up to {longest:.3g} s"
+    length = f"{longest:.3g}" if longest < 1000.0 else f"{longest:.0f}"
+    held = f"This holds within the flown range, for flights of up to {length} s"
     if found.beyond is None:
         return f"{held}."
     share = f"{100.0 * found.beyond:.0f}"
@@ -122,7 +123,7 @@ def _unseen(found: Examination) -> str:
     if not found.unseen:
         return ""
     last = found.unseen[-1]
-    which = f"For {said(last.number)}, which it had not learnt from,"
+    which = f"For {in_words(last.number)}, which it had not learnt from,"
     if not np.isfinite(last.rmse).all():
         return f" {which} its free run diverged."
     fits = np.where(np.isfinite(last.fit), last.fit, np.inf)
