@@ -69,7 +69,14 @@ def test_the_page_has_what_there_is_and_nothing_of_a_controller(folder, done):
         and "under its recorded commands" in page
     )
     assert "of them held out" in page and "For a record, which it had not learnt from" in page
-    for absent in ("twinloop learn<", 'id="controller"', 'id="next"', "controller to fly", "Do not fly", 'id="gains-table"'):
+    for absent in (
+        "twinloop learn<",
+        'id="controller"',
+        'id="next"',
+        "controller to fly",
+        "Do not fly",
+        'id="gains-table"',
+    ):
         assert absent not in page, absent
     for target in ("checks", "twin", "campaign", "again", "crosscorrelation"):
         assert f'href="#{target}"' in page and f'id="{target}"' in page
