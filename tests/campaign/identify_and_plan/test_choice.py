@@ -84,7 +84,7 @@ def chosen(
 def test_gains_that_have_not_flown_must_promise_more_than_predictions_have_missed_of_late():
     """Two misses by 4 % and 9 %: their geometric mean is 6 %."""
     runs = [experiment(1.04, spread=0.1), experiment(1.09, spread=0.1)]
-    answer, reason = chosen(0.95, experiments=runs)
+    answer, reason = chosen(0.95, experiments=runs, measured=1.1)
     assert answer == "flown" and "better by 6 % or more in only 0 %" in reason
     assert chosen(0.93, experiments=runs)[0] == "tuned"
     # Predictions that come true show of how little gains can be trusted to be better.
@@ -107,7 +107,7 @@ def test_gains_that_have_not_flown_must_promise_more_than_predictions_have_misse
 )
 def test_gains_are_preferred_where_so_large_a_share_of_the_predictions_prefers_them(new, confidence, answer):
     exact = [experiment(predicted=1.0), experiment(predicted=1.0)]
-    assert chosen(new, confidence=confidence, experiments=exact)[0] == answer
+    assert chosen(new, confidence=confidence, experiments=exact, measured=1.5)[0] == answer
 
 
 def test_a_flight_that_was_measured_better_for_an_excitation_is_named():
@@ -116,12 +116,19 @@ def test_a_flight_that_was_measured_better_for_an_excitation_is_named():
     assert answer == "flown" and "Test 3 was measured better; without excitation these are better." in reason
 
 
-def test_a_twin_that_expects_worse_of_its_own_gains_and_of_those_measured_is_not_believed():
-    assert chosen(0.9, recorded=1.1, again=1.2)[0] == "flown"
-    assert "is not used here" in chosen(0.9, recorded=1.1, again=1.2)[1]
-    # It sees the flight that was measured as it was, or expects no worse of its own.
-    assert chosen(0.9, recorded=1.1, again=1.0)[0] == "tuned"
-    assert chosen(0.9, recorded=0.9, again=1.2)[0] == "tuned"
+def test_gains_that_have_not_flown_must_promise_more_than_was_measured_of_the_best_flown():
+    """A twin that is as far off about these as about others promises nothing better than what they have done."""
+    runs = [experiment(1.04, spread=0.1), experiment(1.09, spread=0.1)]
+    answer, reason = chosen(0.9, old=1.1, recorded=0.95, experiments=runs)
+    assert answer == "flown"
+    assert (
+        "predicts 0.95 for others, which is not better by 6 % or more than the 1 of these, as measured"
+        in reason
+    )
+    assert chosen(0.9, old=1.1, recorded=0.93, experiments=runs)[0] == "tuned"
+    assert chosen(0.9, old=1.1, recorded=0.95, experiments=runs, measured=1.1)[0] == "tuned"
+    # What was never measured on the task is known by the twin alone.
+    assert chosen(0.9, old=1.1, recorded=0.95, experiments=runs, measured=None)[0] == "tuned"
 
 
 def test_where_the_last_flight_was_not_as_predicted_others_must_be_better_by_two_spreads():

@@ -24,8 +24,6 @@ from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 
-DOUBT = 3.0
-"""Standard deviations of predicted flights by which they may be worse than one that was measured."""
 SURE = 2.0
 """Spreads of a predicted quality that a flight may be off it and still confirm it."""
 NEARLY = 0.1
@@ -180,11 +178,6 @@ class Choice:
                     f" others, corrected for that, would be no better ({predicted:.3g} predicted) than these"
                     f" ({alone:.3g})"
                 )
-        if measured is not None and self._doubtful(members, flown, recorded, measured, without):
-            return (
-                "the twin predicts worse for others than was measured with these, but for these it also predicts worse"
-                " than was measured, so its prediction is not used here"
-            )
         if alone is not None and not confirmed(self.book.experiments):
             predicted, spread = of_others()
             if not predicted + SURE * spread < alone:
@@ -195,23 +188,14 @@ class Choice:
                     "the last flight was not as predicted, and for others the twin predicts"
                     f" {predicted:.3g} ± {spread:.2g} where {worth}"
                 )
+        if alone is not None:
+            predicted, _ = of_others()
+            if not predicted < (1.0 - self._worth) * alone:
+                return (
+                    f"the twin predicts {predicted:.3g} for others, which is not better by {self._more} than the"
+                    f" {alone:.3g} of these, as measured"
+                )
         return ""
-
-    def _doubtful(
-        self, members: Sequence[_core.Model], flown: Test, recorded: Floats, measured: float, share: float
-    ) -> bool:
-        """Whether the twin expects less of its own gains than was measured of the best, and of that flight too.
-
-        `share` is what the best are worth without the excitation of that flight.
-        """
-        ends = flown.initial_state[np.newaxis], flown.target_state[np.newaxis]
-        excitation = None if flown.excitation is None else flown.excitation[np.newaxis]
-        again = self.planner.judge(
-            members, flown.genes[np.newaxis], self.committee.sds, self.draws, excitation, ends,
-            measured=True, hold_back=flown.hold_back,
-        )  # fmt: skip
-        least = 1.01 * measured + DOUBT * again.scatter
-        return bool(recorded[:, :, 0].mean() > share * least and again.mean[0] > least)
 
     def _tuned(self, genes: Floats, judged: Judged, recorded: Floats, reason: str) -> Test:
         same = next((test for test in self.book.tests if test.genes.tobytes() == genes.tobytes()), None)
