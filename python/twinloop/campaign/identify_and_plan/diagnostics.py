@@ -192,6 +192,11 @@ def _none_complete(experiments: Sequence[Experiment], steps: int) -> Iterator[Re
         )
 
 
+def _of_range(share: float) -> str:
+    """How far a state is missed, beside how far it went: two digits of a share of 1 or more are no percentage."""
+    return f"{100.0 * share:.2g} % of its range" if share < 0.995 else f"{share:.2g} times its range"
+
+
 def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[Remark]:
     """Which states the twin misses when it is flown by itself, on how many runs, and by how much."""
     worst = sorted(misses, key=lambda miss: (not miss.diverges, -miss.times))
@@ -199,7 +204,7 @@ def _free_run(misses: Sequence[Miss], runs: int, signals: Signals) -> Iterator[R
         what = f"diverges on {max(miss.flights for miss in worst if miss.diverges)}"
     else:
         named = [
-            f"{signals.state_names[miss.state]} on {miss.flights} (up to {100.0 * miss.share:.2g} % of its range,"
+            f"{signals.state_names[miss.state]} on {miss.flights} (up to {_of_range(miss.share)},"
             f" {miss.times:.2g} times what noise and disturbances explain)"
             for miss in worst[:NAMED]
         ]
