@@ -117,7 +117,7 @@ def test_the_states_that_a_free_run_misses_are_named():
     )
     (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[rate])
     assert "may be an external disturbance or a model error" in remark.sentence
-    (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(1, 1, 11.2, 9.0, True)])
+    (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(2, 1, 11.2, 9.0, True)])
     assert "rate on 1 (up to 11 times its range, 9 times what" in remark.sentence
     (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(0, 1, np.inf, np.inf, False)])
     assert "the twin diverges on 1." in remark.sentence
