@@ -111,7 +111,7 @@ def test_an_excitation_that_states_outran_is_not_borne_though_they_kept_the_enve
 
 
 @given(events)
-def test_gains_have_reached_what_their_flights_that_kept_the_envelope_have_read(wanted):
+def test_gains_have_reached_what_all_their_flights_that_kept_the_envelope_have_read(wanted):
     book, _, _ = written(wanted)
     for gains in range(3):
         genes = genes_of(gains)
@@ -123,8 +123,18 @@ def test_gains_have_reached_what_their_flights_that_kept_the_envelope_have_read(
         found = standing.reached(book, genes)
         assert (found is None) == (not read)
         if read:
-            states = np.concatenate(read)
-            assert (found == [states.min(axis=0), states.max(axis=0)]).all()
+            lows, highs = ([end(states, axis=0) for states in read] for end in (np.min, np.max))
+            assert (found == [np.max(lows, axis=0), np.min(highs, axis=0)]).all()
+
+
+def test_what_one_flight_alone_has_reached_was_its_gusts_or_its_excitation_and_not_the_controller():
+    book = Logbook(SETUPS["default"])
+    for low, high in ((-3.0, 2.0), (-1.0, 5.0)):
+        run = run_of(book.new_test(genes_of(0)))
+        states = run.trajectory.states.copy()
+        states[3:5, 1] = low, high
+        book.enter(replace(run, trajectory=replace(run.trajectory, states=states)))
+    assert standing.reached(book, genes_of(0))[:, 1].tolist() == [-1.0, 2.0]
 
 
 def best_of(lives, order, groups):

@@ -176,7 +176,7 @@ def test_a_rate_has_no_more_room_than_what_it_is_the_rate_of_in_the_time_of_a_sw
     assert HoldBack.between(signals, np.zeros(4), np.zeros(4), 0.1).none[1][1] == 7.0 * ENDS
 
 
-def test_where_the_controller_leads_by_itself_nothing_is_held_back_as_long_as_a_fifth_of_the_room_is_left():
+def test_an_excitation_may_lead_as_far_as_the_controller_by_itself_as_long_as_a_fifth_of_the_room_is_left():
     signals = tl.Signals(
         [
             tl.State("x", "m", 1.0, envelope=(-2.0, 4.0)),
@@ -187,17 +187,27 @@ def test_where_the_controller_leads_by_itself_nothing_is_held_back_as_long_as_a_
         0.1,
     )
     start, target = np.zeros(3), [1.0, 0.0, 0.0]
-    # Of x's upper room, 3, it has used 1; its lower end is within the task. Of v it has used nearly all.
-    held = HoldBack.between(signals, start, target, 0.5, [[0.5, -8.9, -7.0], [2.0, 1.0, 7.0]])
-    assert np.allclose(held.full[0], [-BEGINS * 2.0, 2.0 + BEGINS * 2.0])
-    assert np.allclose(held.none[0], [-ENDS * 2.0, 2.0 + ENDS * 2.0])
-    # A fifth of 9 is left below, and less than 2 / 0.5 above.
-    assert np.allclose(held.none[1], [-7.2 - ENDS * 1.8, 1.0 + ENDS * 2.0 / 0.5])
+    # Of x's upper room, 3, it has used 2; its lower end is within the task. Of v it has used nearly all below.
+    held = HoldBack.between(signals, start, target, 0.5, [[0.5, -8.9, -7.0], [3.0, 1.0, 7.0]])
+    assert np.allclose(held.none[0], [-ENDS * 2.0, 3.0])
+    assert np.allclose(held.full[0], [-BEGINS * 2.0, 3.0 - (ENDS - BEGINS) * 3.0])
+    # A fifth of 9 is left below. Above, it has used less than an excitation may without it.
+    assert np.allclose(held.none[1], [-7.2, ENDS * 3.0 / 0.5])
+    assert np.allclose(held.full[1], [-7.2 + (ENDS - BEGINS) * 2.0 / 0.5, BEGINS * 3.0 / 0.5])
     assert np.isinf(held.none[2]).all()
     # Beyond the envelope it still has a say.
-    assert np.allclose(HoldBack.between(signals, start, target, None, [[-5.0] * 3, [9.0] * 3]).none[0], [
-        -1.6 - ENDS * 0.4, 1.0 + 2.4 + ENDS * 0.6
-    ])  # fmt: skip
+    beyond = HoldBack.between(signals, start, target, None, [[-5.0] * 3, [9.0] * 3])
+    assert np.allclose(beyond.none[0], [-1.6, 1.0 + 2.4])
+
+
+def test_a_controller_that_has_used_little_changes_nothing():
+    signals = tl.Signals(
+        [tl.State("x", "m", 1.0, envelope=(-2.0, 4.0))], [tl.Command("u", "V", (-1.0, 1.0))], 0.1
+    )
+    alone = HoldBack.between(signals, [0.0], [1.0])
+    for reached in ([[0.0], [1.0]], [[-0.7], [2.1]]):
+        held = HoldBack.between(signals, [0.0], [1.0], None, reached)
+        assert np.array_equal(held.full, alone.full) and np.array_equal(held.none, alone.none)
 
 
 @pytest.mark.parametrize("beyond", [-1.5, 1.5])

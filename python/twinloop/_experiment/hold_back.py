@@ -110,9 +110,10 @@ class HoldBack(Recorded, kind="hold_back"):
             initial_state: of the flight (n_x,), SI units, radians.
             target_state: of the flight (n_x,), or a row for each state (n + 1, n_x), the same units.
             swing: time in which a state may use up its room, s; None: derivatives have the room of their envelopes.
-            reached: smallest and largest value of each state in flights of the same controller that kept the envelope
-                (2, n_x); None: there were none. What the controller does anyway is no reason to hold back: the room
-                begins there, but has a fifth of what the task leaves at least.
+            reached: smallest and largest value of each state that every flight of the same controller has reached that
+                kept the envelope (2, n_x); None: there were none. Where the controller leads anyway, an excitation may
+                lead, too, and no further: its outer range then ends there, but at least a fifth of the room before the
+                envelope.
 
         Returns:
             The ranges; None if no state counts.
@@ -121,15 +122,19 @@ class HoldBack(Recorded, kind="hold_back"):
         farthest = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
         rooms = np.array([_rooms(state, ends) for state, ends in zip(signals.states, farthest, strict=True)])
         outwards = np.array([-1.0, 1.0])
-        if reached is not None:
-            beyond = outwards * (np.asarray(reached, dtype=np.float64).T - farthest)
-            beyond = np.clip(beyond, 0.0, (1.0 - LEFT) * rooms)
-            farthest, rooms = farthest + outwards * beyond, rooms - beyond
+        most = (1.0 - LEFT) * rooms
         if swing is not None:
             place = signals.state_names.index
             for rate, of in _rates(signals).items():
                 rooms[place(rate)] = np.minimum(rooms[place(rate)], rooms[place(of)] / swing)
-        full, none = (farthest + outwards * share * rooms for share in (BEGINS, ENDS))
+        # From the task's farthest points outwards: where the excitation is nothing, and where it begins to be less.
+        ends = ENDS * rooms
+        if reached is not None:
+            beyond = outwards * (np.asarray(reached, dtype=np.float64).T - farthest)
+            ends = np.maximum(ends, np.clip(beyond, 0.0, most))
+        counts = np.isfinite(rooms)
+        begins = np.where(counts, ends - (ENDS - BEGINS) * np.where(counts, rooms, 0.0), np.inf)
+        full, none = (farthest + outwards * share for share in (begins, ends))
         return cls(full, none) if np.isfinite(none).any() else None
 
 

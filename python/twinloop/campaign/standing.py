@@ -143,7 +143,9 @@ def borne(book: Logbook) -> int:
 
 
 def reached(book: Logbook, genes: Floats) -> Floats | None:
-    """Smallest and largest reading of each state (2, n_x) in flights of some gains that kept the envelope, if any did.
+    """Smallest and largest value of each state (2, n_x) that all flights of some gains that kept the envelope reached.
+
+    What only one of them has reached was its excitation or a gust, and not the controller. None where there are none.
 
     Args:
         book: of the campaign.
@@ -154,7 +156,10 @@ def reached(book: Logbook, genes: Floats) -> Floats | None:
         for run in book.experiments
         if run.test is not None and run.kept_envelope and run.test.genes.tobytes() == genes.tobytes()
     ]
-    return read_in(book, kept) if kept else None
+    if not kept:
+        return None
+    each = np.stack([read_in(book, [run]) for run in kept])
+    return np.stack([each[:, 0].max(axis=0), each[:, 1].min(axis=0)])
 
 
 def read_in(book: Logbook, flights: Sequence[Experiment]) -> Floats:
