@@ -143,3 +143,15 @@ def test_a_risk_that_no_predicted_flight_shows_is_no_estimate():
     assert "< 0.4 %" in text and "0.003876" not in text
     result["controller"]["risk"] = 2.5 / 129.0
     assert "Risk of leaving the envelope: 1.9 %." in render(result)
+
+
+def test_gains_that_are_fixed_at_nothing_are_counted_rather_than_listed():
+    result = result_of_default()
+    fixed = {"unit": "N m/rad", "low": None, "high": None}
+    for name, value in (("rate.kp", 0.0), ("rate.ki", 0.0), ("rate.kd", 0.7)):
+        result["controller"]["gains"].append({"name": name, "value": value, **fixed})
+        result["first_controller"]["gains"][name] = value
+    text = render(result)
+    assert "\n2 gains fixed at 0 left out.\n" in text and "rate.kp" not in text and "rate.ki" not in text
+    (row,) = [line for line in text.splitlines() if line.startswith("rate.kd")]
+    assert row.split() == ["rate.kd", "0.7", "0.7", "N", "m/rad", "fixed"]

@@ -11,7 +11,7 @@ from twinloop.planning.leaving import risk_words
 
 
 def _gains(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[list[object]]:
-    """A row a gain: name, value, the first controller's, unit, bounds."""
+    """A row a gain, but for those that are absent: name, value, the first controller's, unit, bounds."""
     return [
         [
             gain["name"],
@@ -23,20 +23,32 @@ def _gains(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[lis
             else f"{gain['low']:g} to {gain['high']:g}" + (f", {held_at(gain)}" if held_at(gain) else ""),
         ]
         for gain in best["gains"]
+        if not _absent(gain)
     ]
+
+
+def _absent(gain: Mapping[str, Any]) -> bool:
+    """Whether a gain is fixed at 0: of a full state feedback most are often declared so."""
+    return gain["low"] is None and gain["value"] == 0.0
+
+
+def _table(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> str:
+    """The gains, with how many are left out."""
+    absent = sum(_absent(gain) for gain in best["gains"])
+    said = f"\n{absent} {'gain' if absent == 1 else 'gains'} fixed at 0 left out." if absent else ""
+    return table(["gain", "value", "first", "unit", "bounds"], _gains(best, first)) + said
 
 
 def tuned_controller_text(result: Mapping[str, Any]) -> str:
     """The best controller of the paper beside the first."""
     best, first = result["controller"], result["first_controller"]
-    rows = _gains(best, first)
     measured, reference = best["measured"], first["measured"]
     quality = (
         f"Final distance on the system: {cell(measured)}; first controller: {cell(reference)}; "
         f"doing nothing: {result['task']['distance']:.4g}; predicted by the twin: {cell(best['predicted'])}."
     )
     title = f"BEST CONTROLLER FLOWN: TEST {best['test']}"
-    return f"{title}\n{table(['gain', 'value', 'first', 'unit', 'bounds'], rows)}\n{quality}"
+    return f"{title}\n{_table(best, first)}\n{quality}"
 
 
 def controller_text(result: Mapping[str, Any]) -> str:
@@ -44,7 +56,6 @@ def controller_text(result: Mapping[str, Any]) -> str:
     best, first = result["controller"], result["first_controller"]
     if best is None:
         return f"NO CONTROLLER TO FLY\n{result['no_controller'].removeprefix('No controller to fly: ')}"
-    gains = _gains(best, first)
     state = f"TEST {best['test']}, FLOWN" if best["flown"] else "NOT FLOWN YET"
     qualities = [["this controller", best["predicted"], best["spread"], best["measured"]]]
     if first is not None:
@@ -54,7 +65,7 @@ def controller_text(result: Mapping[str, Any]) -> str:
     return "\n".join(
         [
             f"CONTROLLER TO FLY: {state}",
-            table(["gain", "value", "first", "unit", "bounds"], gains),
+            _table(best, first),
             "",
             table(["quality", "predicted", "± spread", "measured"], qualities),
             f"{best['why']}{_risk(best['risk'], predicted_flights(result))}{excited}",
