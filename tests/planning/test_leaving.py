@@ -17,6 +17,7 @@ def test_where_none_leaves_the_words_say_so():
     assert risk_words(of(0, 128), 128) == "less than 0.4 % (none of 128 predicted flights leaves it)"
     assert short_risk(of(0, 128), 128) == "< 0.4 %"
     assert risk_words(of(3, 128), 128) == "2.7 %" == short_risk(of(3, 128), 128)
+    assert risk_words(of(128, 128), 128) == "100 %" == short_risk(of(128, 128), 128)
     assert short_risk(None, 128) is None and risk_words(of(0, 128), None) == "0.39 %"
 
 

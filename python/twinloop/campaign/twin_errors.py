@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.replaying import free_errors
 from twinloop.law.accuracy import TestErrors
@@ -12,7 +11,7 @@ from twinloop.objectives import open_loop
 
 
 def errors_of(
-    model: _core.Model, book: Logbook, workers: _core.Workers, noise: Noise | Floats | None = None
+    model: _core.Model, book: Logbook, workers: _core.Workers, noise: Noise | None = None
 ) -> list[TestErrors]:
     """How well a model follows each run.
 
@@ -20,16 +19,14 @@ def errors_of(
         model: to be judged.
         book: with the runs.
         workers: how the work is carried out.
-        noise: of the sensors, and disturbances, as identified; of sensors alone (n_x,): nothing disturbs the system;
-            None: guessed from each flight.
+        noise: of the sensors, and disturbances, as identified; None: of sensors alone, guessed from each flight.
 
     Returns:
         A row for each experiment, in the order of `tell`.
     """
-    known = noise if noise is None or isinstance(noise, Noise) else Noise.of_sensors(noise)
     steps, runs = (
         open_loop([model], book.selected, workers)[0].tolist(),
-        free_errors(model, book, workers, known),
+        free_errors(model, book, workers, noise),
     )
     return [
         TestErrors(run.number, step, free.error, free.normalised, run.before, free.error)

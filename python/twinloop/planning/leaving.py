@@ -24,7 +24,7 @@ def risk_words(risk: float, flights: int | None) -> str:
         flights: that are predicted at most; None: unknown.
     """
     if not none_leaves(risk, flights):
-        return f"{100.0 * risk:.2g} %"
+        return _percent(risk)
     count = round(0.5 / risk - 1.0)
     return f"less than {_above(100.0 * risk):g} % (none of {count} predicted flights leaves it)"
 
@@ -38,7 +38,11 @@ def short_risk(risk: float | None, flights: int | None) -> str | None:
     """
     if risk is None:
         return None
-    return f"< {_above(100.0 * risk):g} %" if none_leaves(risk, flights) else f"{100.0 * risk:.2g} %"
+    return f"< {_above(100.0 * risk):g} %" if none_leaves(risk, flights) else _percent(risk)
+
+
+def _percent(risk: float) -> str:
+    return f"{float(f'{100.0 * risk:.2g}'):g} %"
 
 
 def _above(percent: float) -> float:

@@ -113,3 +113,22 @@ def test_without_noise_and_disturbances_nothing_is_expected_to_be_missed_in_piec
     np.testing.assert_array_equal(nothing, 0.0)
     (some,) = expected_misses(model(), np.array([10]), [log], gusty, *BESIDE)
     assert (some[:2] > 0.0).all()
+
+
+def test_a_replay_is_expected_to_miss_what_the_noise_of_its_first_reading_grows_to():
+    """Of a double integrator: the angle's own noise, that of its start, and that of the rate over the time since."""
+    commands = np.zeros((STEPS, 1))
+    run = tl.Trajectory(DT * np.arange(STEPS + 1), np.zeros((STEPS + 1, 3)), commands)
+    log = SimpleNamespace(
+        test=None, number=None, replayed=Replay(SIGNALS, np.zeros(3), commands), trajectory=run
+    )
+    noise = Noise.of_sensors(np.full(3, SENSOR))
+    found = [
+        expected_misses(model(), np.array([STEPS]), [log], noise, Unit(seed), *BESIDE[1:])[0]
+        for seed in range(40)
+    ]
+    since = DT * np.arange(1, STEPS + 1)
+    scales = np.array([state.scale for state in SIGNALS.states])
+    of_angle, of_rate = 2.0 + np.square(since).mean(), 2.0
+    expected = SENSOR**2 * np.array([of_angle, of_rate]) / scales[:2] ** 2
+    np.testing.assert_allclose(np.mean(found, axis=0)[:2], expected, rtol=0.15)

@@ -290,8 +290,7 @@ class IdentifyAndPlan:
         """The best model, with the committee and the sensors' noise for its band."""
         latest = self._latest()
         identified = latest.identified
-        sensors = identified.sensors(self.setup.signals.n_x)
-        errors = errors_of(identified.model, book, self.workers, sensors)
+        errors = errors_of(identified.model, book, self.workers, identified.noise(self.setup.signals))
         return Knowledge(self.setup, self.options, book).twin(latest, errors)
 
     @property

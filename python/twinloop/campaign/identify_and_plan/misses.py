@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop._experiment.limits import Limits
+from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Cause, Experiment
@@ -20,6 +21,7 @@ from twinloop.campaign.replaying import as_flown, lengths_of
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
 from twinloop.law.pieces import held
+from twinloop.test import Test
 
 DRAWS = 8
 """Of noise and disturbances, by which it is said how far these take a flight."""
@@ -164,7 +166,7 @@ def expected_misses(
         seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
         runs = drawn_runs(
             model,
-            as_flown(model, flight, lengths[j]),
+            _begun_as_read(as_flown(model, flight, lengths[j])),
             limits,
             noise=np.concatenate([np.zeros((1, *seen.shape[1:])), seen]),
             disturbance=np.concatenate([np.zeros((1, *moved.shape[1:])), moved]),
@@ -177,6 +179,15 @@ def expected_misses(
             off = squares(read[1:] + seen, read[0], limits).mean(axis=(0, 1))
         found[j] = off if lasted else np.inf
     return found
+
+
+def _begun_as_read(flown: Test | Replay) -> Test | Replay:
+    """The same, where a replay begins at a reading, with the noise of that: no controller corrects it later on."""
+    if not isinstance(flown, Replay) or flown.anchors is not None:
+        return flown
+    anchors = np.full((flown.steps + 1, len(flown.initial_state)), np.nan)
+    anchors[0] = flown.initial_state
+    return replace(flown, anchors=anchors)
 
 
 def unexplained(free: Floats, frozen: Floats, expected: Floats, steered: NDArray[np.bool_]) -> Floats:
