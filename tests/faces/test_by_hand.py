@@ -272,6 +272,8 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     assert (run_.ended, run_.reason) == ("aborted", "a gust")
     run("ask", "rig.db")
     assert "failed" in run("tell", "rig.db", "1", "--failed", "motor cut out").stdout
+    twice = run("tell", "rig.db", "1", "--failed", "motor cut out")
+    assert twice.exit_code == 2 and "'motor cut out' recorded already" in twice.stderr
     assert look().failures[0].reason == "motor cut out"
     run("ask", "rig.db")
     assert run("abandon", "rig.db", "2").exit_code == 0

@@ -117,7 +117,8 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
         The test.
 
     Raises:
-        InvalidInput: no such test, one with a recorded flight, no reason, or a log that cannot be used.
+        InvalidInput: no such test, one with a recorded flight, no reason, the same failure once more, or a log that
+            cannot be used.
         StoreFailure: the store cannot be written.
     """
     test = numbered(campaign, number)
@@ -126,6 +127,11 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
         raise InvalidInput(
             f"Test {number}: expected one without a recorded flight, found one that was {status}; if that was recorded"
             f" by mistake, withdraw it first: twinloop withdraw STORE {number} --reason WHY."
+        )
+    if log is None and any((told.test.number, told.reason) == (number, reason) for told in campaign.failures):
+        raise InvalidInput(
+            f"Test {number}: expected a failure that is not recorded yet, found {reason!r} recorded already; if it was"
+            " flown again and failed again, say so in other words."
         )
     run = None if log is None else load(log, campaign.signals, ended="aborted", reason=reason)
     campaign.tell_failed(test, reason, run)
