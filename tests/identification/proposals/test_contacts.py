@@ -73,6 +73,8 @@ def free_run_error(twin, derivative, start, commands, signals):
     """Mean square over that of standing still, on a run that nobody has learnt."""
     truth = flown(derivative, start, commands, signals, 0.0, 0)
     free = twin.simulate_commands(truth.states[0], truth.commands)
+    if len(free.states) < len(truth.states):
+        return np.inf
     scales = np.array([state.scale for state in signals.states])
     off = np.square((free.states - truth.states) / scales).mean()
     return off / np.square((truth.states - truth.states[0]) / scales).mean()

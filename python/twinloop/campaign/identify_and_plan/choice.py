@@ -107,6 +107,11 @@ class Choice:
     # Inside
 
     @cached_property
+    def _gusts(self) -> dict[bytes, Moved]:
+        """What disturbances do to flights of gains, without excitation, that it was asked of so far."""
+        return {}
+
+    @cached_property
     def _worth(self) -> float:
         """Share of a quality by which tuned gains must be better: by more than predictions have missed of late."""
         least = missed(self.book.experiments) if self.planner.options.track_record else 0.0
@@ -226,7 +231,10 @@ class Choice:
 
     def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
         """The quality to be measured of a flight, and its calibrated spread, disturbances included."""
-        predicted, spread = self.gusts(test).added_to(*expected(recorded))
+        genes = test.genes.tobytes()
+        if genes not in self._gusts:
+            self._gusts[genes] = self.gusts(test)
+        predicted, spread = self._gusts[genes].added_to(*expected(recorded))
         return predicted, calibrated(spread, predicted, self.book.experiments)
 
     def _judge(
