@@ -85,7 +85,7 @@ class Choice:
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
         better = float((new < (1.0 - self._worth) * old).mean())
         if flies and not refused:
-            refused = self._not_preferred(members, recorded, tuned, flown, better)
+            refused = self._not_preferred(recorded, tuned, flown, better)
         if not refused:
             share = f"{100 * better:.3g} %"
             found = f"by {self._more} in {share} of its predictions"
@@ -148,15 +148,12 @@ class Choice:
         corners = np.stack([family.from_unit(np.full(family.size, place)) for place in (0.0, 1.0)])
         return bool((self._judge(members, corners).qualities == judged.qualities[:, :, :1]).all())
 
-    def _not_preferred(
-        self, members: Sequence[_core.Model], recorded: Floats, tuned: Floats, flown: Test, better: float
-    ) -> str:
+    def _not_preferred(self, recorded: Floats, tuned: Floats, flown: Test, better: float) -> str:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         if tuned.tobytes() == flown.genes.tobytes():
             return "the twin finds no better ones"
-        if self.planner.options.track_record and (
-            spoken := self._spoken_against(members, recorded, tuned, flown)
-        ):
+        counts = self.planner.options.track_record
+        if counts and (spoken := self._spoken_against(recorded, tuned, flown)):
             return spoken
         if better < self.confidence:
             sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
@@ -164,15 +161,11 @@ class Choice:
                 f"newly tuned ones are better by {self._more} in only {sure} of the twin's predictions, and proven"
                 f" gains are replaced from {asked} on"
             )
-        return ""
+        return self._no_better_than_measured(recorded, tuned, flown) if counts else ""
 
-    def _spoken_against(
-        self, members: Sequence[_core.Model], recorded: Floats, tuned: Floats, flown: Test
-    ) -> str:
+    def _spoken_against(self, recorded: Floats, tuned: Floats, flown: Test) -> str:
         """Why what the twin said of the last flights speaks against gains that it prefers; nothing if it does not."""
-        measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
-        without = share_of(self.planner, self.committee, flown, self.draws)
-        alone = None if measured is None else measured * without
+        alone = self._measured_alone(flown)
         promised = over_promised(self.book.experiments)
         of_others = partial(self._expected, self.book.of_task(tuned, flown.number), recorded[:, :, 0])
         if alone is not None and promised > 1.0:
@@ -193,14 +186,28 @@ class Choice:
                     "the last flight was not as predicted, and for others the twin predicts"
                     f" {predicted:.3g} ± {spread:.2g} where {worth}"
                 )
-        if alone is not None:
-            predicted, _ = of_others()
-            if not predicted < (1.0 - self._worth) * alone:
-                return (
-                    f"the twin predicts {predicted:.3g} for others, which is not better by {self._more} than the"
-                    f" {alone:.3g} of these, as measured"
-                )
         return ""
+
+    def _no_better_than_measured(self, recorded: Floats, tuned: Floats, flown: Test) -> str:
+        """That what is promised of tuned gains is hardly better than what was measured of the flown; nothing if it is.
+
+        A twin that sees the flown gains worse than they are sees others better than they are for no good reason.
+        """
+        alone = self._measured_alone(flown)
+        predicted, _ = self._expected(self.book.of_task(tuned, flown.number), recorded[:, :, 0])
+        if alone is None or predicted < (1.0 - self._worth) * alone:
+            return ""
+        return (
+            f"{alone:.3g} was measured with these, without their excitation, and the twin predicts {predicted:.3g} for"
+            f" others: not better by {self._more}"
+        )
+
+    def _measured_alone(self, flown: Test) -> float | None:
+        """Quality that was measured of flown gains, without the effect of their excitation; None of another task."""
+        measured = standing.measured(self.book, flown.number) if standing.on_task(self.book, flown) else None
+        return (
+            None if measured is None else measured * share_of(self.planner, self.committee, flown, self.draws)
+        )
 
     def _tuned(self, genes: Floats, judged: Judged, recorded: Floats, reason: str) -> Test:
         same = next((test for test in self.book.tests if test.genes.tobytes() == genes.tobytes()), None)
