@@ -40,11 +40,11 @@ def excited(test: Test, run: Trajectory) -> Excited:
     """
     if test.excitation is None:
         return Excited.HELD_BACK
-    asked = apart(run.commands, given(test, run.states), test)
+    asked = _off(test, run)
     if asked <= SEEN * SEEN:
         return Excited.HELD_BACK
     others = (Excited.WHOLE, Excited.NOT)
-    off = {how: apart(run.commands, given(as_excited(test, how), run.states), test) for how in others}
+    off = {how: _off(as_excited(test, how), run) for how in others}
     best = min(off, key=lambda how: off[how])
     return best if off[best] < BETTER * asked else Excited.HELD_BACK
 
@@ -85,15 +85,20 @@ def given(test: Test, states: Floats) -> Floats:
     return np.array([controller.command(state, test.target(k)) for k, state in enumerate(states[:-1])])
 
 
-def apart(sent: Floats, commands: Floats, test: Test) -> float:
-    """Mean square between commands (n, n_u), in units of their spans.
+def apart(sent: Floats, asked: Floats, test: Test) -> Floats:
+    """Mean squares of what commands (n, n_u) are off from others, in units of their spans (n_u,).
 
     Args:
         sent: on record.
-        commands: others.
+        asked: by a controller.
         test: with the signals.
     """
-    return float(np.square((sent - commands) / span_of(test)).mean())
+    return np.asarray(np.square((sent - asked) / span_of(test)).mean(axis=0))
+
+
+def _off(test: Test, run: Trajectory) -> float:
+    """How far recorded commands are from those of a test, mean square over all of them."""
+    return float(apart(run.commands, given(test, run.states), test).mean())
 
 
 def span_of(test: Test) -> Floats:

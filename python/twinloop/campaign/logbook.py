@@ -9,7 +9,6 @@ from typing import Any
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.entering import Judge, flown_test, partial_run, replay_of_record, with_run
-from twinloop.campaign.excited import as_it_was_flown
 from twinloop.campaign.history import Experiment, Failure, Planned, TestLoop, Withdrawal
 from twinloop.campaign.setup import Setup
 from twinloop.campaign.withdrawing import as_it_counts, check_withdrawals, withdrawal_of
@@ -251,7 +250,7 @@ class Logbook(Recorded, kind="logbook"):
         Args:
             run: of a test of this campaign, or an attached run.
         """
-        counting = as_it_counts(as_it_was_flown(run), len(self.recorded), self.withdrawals)
+        counting = as_it_counts(run, len(self.recorded), self.withdrawals)
         self.selected = with_run(self.selected, counting.replayed, counting.trajectory)
         self.recorded.append(run)
         self.experiments.append(counting)
@@ -321,7 +320,7 @@ class Logbook(Recorded, kind="logbook"):
         """What counts, of all that was entered."""
         runs, failures = ({getattr(each, key) for each in self.withdrawals} for key in ("run", "failure"))
         self.experiments = [
-            as_it_counts(as_it_was_flown(run), place, self.withdrawals)
+            as_it_counts(run, place, self.withdrawals)
             for place, run in enumerate(self.recorded)
             if place not in runs
         ]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from twinloop.campaign.excited import as_it_was_flown
 from twinloop.campaign.history import Experiment, Failure, Withdrawal
 from twinloop.errors import InvalidInput
 from twinloop.test import Test
@@ -50,13 +51,14 @@ def withdrawal_of(book: Logbook, which: object, reason: str, known: Sequence[int
 
 
 def as_it_counts(run: Experiment, place: int, withdrawals: Sequence[Withdrawal]) -> Experiment:
-    """A run without what was predicted of it by a twin that had learnt a withdrawn flight.
+    """A run as it was flown, without what was predicted of it by a twin that had learnt a withdrawn flight.
 
     Args:
         run: as it was recorded.
         place: among all that were.
         withdrawals: of the campaign.
     """
+    run = as_it_was_flown(run)
     test = run.test
     if test is not None and any(test.number in each.planned for each in withdrawals):
         run = replace(run, replayed=replace(test, predicted=None, spread=None, risk=None))

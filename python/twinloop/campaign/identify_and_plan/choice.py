@@ -152,8 +152,9 @@ class Choice:
         """Why the best gains flown are better than those tuned; nothing if they are not."""
         if tuned.tobytes() == flown.genes.tobytes():
             return "the twin finds no better ones"
-        counts = self.planner.options.track_record
-        if counts and (spoken := self._spoken_against(recorded, tuned, flown)):
+        alone = self._measured_alone(flown) if self.planner.options.track_record else None
+        of_others = partial(self._expected, self.book.of_task(tuned, flown.number), recorded[:, :, 0])
+        if alone is not None and (spoken := self._spoken_against(alone, flown, of_others)):
             return spoken
         if better < self.confidence:
             sure, asked = (f"{100 * part:.3g} %" for part in (better, self.confidence))
@@ -161,14 +162,18 @@ class Choice:
                 f"newly tuned ones are better by {self._more} in only {sure} of the twin's predictions, and proven"
                 f" gains are replaced from {asked} on"
             )
-        return self._no_better_than_measured(recorded, tuned, flown) if counts else ""
+        return "" if alone is None else self._no_better_than_measured(alone, flown, of_others)
 
-    def _spoken_against(self, recorded: Floats, tuned: Floats, flown: Test) -> str:
-        """Why what the twin said of the last flights speaks against gains that it prefers; nothing if it does not."""
-        alone = self._measured_alone(flown)
+    def _spoken_against(self, alone: float, flown: Test, of_others: Callable[[], tuple[float, float]]) -> str:
+        """Why what the twin said of the last flights speaks against gains that it prefers; nothing if it does not.
+
+        Args:
+            alone: quality that was measured of the flown gains, without the effect of their excitation.
+            flown: their test.
+            of_others: gives the quality that is predicted of the gains that the twin prefers, and its spread.
+        """
         promised = over_promised(self.book.experiments)
-        of_others = partial(self._expected, self.book.of_task(tuned, flown.number), recorded[:, :, 0])
-        if alone is not None and promised > 1.0:
+        if promised > 1.0:
             predicted, _ = of_others()
             if not predicted * promised < alone:
                 return (
@@ -176,31 +181,26 @@ class Choice:
                     f" others, corrected for that, would be no better ({predicted:.3g} predicted) than these"
                     f" ({alone:.3g})"
                 )
-        if alone is not None and not confirmed(self.book.experiments):
+        if not confirmed(self.book.experiments):
             predicted, spread = of_others()
             if not predicted + SURE * spread < alone:
-                worth = f"{alone:.3g} was measured with these"
-                if flown.excitation is not None:
-                    worth = f"these, without the excitation of their flight, reach {alone:.3g}"
                 return (
                     "the last flight was not as predicted, and for others the twin predicts"
-                    f" {predicted:.3g} ± {spread:.2g} where {worth}"
+                    f" {predicted:.3g} ± {spread:.2g} where {_reaches(alone, flown)}"
                 )
         return ""
 
-    def _no_better_than_measured(self, recorded: Floats, tuned: Floats, flown: Test) -> str:
-        """That what is promised of tuned gains is hardly better than what was measured of the flown; nothing if it is.
+    def _no_better_than_measured(
+        self, alone: float, flown: Test, of_others: Callable[[], tuple[float, float]]
+    ) -> str:
+        """That tuned gains are predicted to be hardly better than the flown ones were measured; nothing if they are.
 
-        A twin that sees the flown gains worse than they are sees others better than they are for no good reason.
+        Predictions that are too bad for the flown gains are no evidence for others. Arguments as for `_spoken_against`.
         """
-        alone = self._measured_alone(flown)
-        predicted, _ = self._expected(self.book.of_task(tuned, flown.number), recorded[:, :, 0])
-        if alone is None or predicted < (1.0 - self._worth) * alone:
+        predicted, _ = of_others()
+        if predicted < (1.0 - self._worth) * alone:
             return ""
-        return (
-            f"{alone:.3g} was measured with these, without their excitation, and the twin predicts {predicted:.3g} for"
-            f" others: not better by {self._more}"
-        )
+        return f"{_reaches(alone, flown)}, and the twin predicts {predicted:.3g} for others: not better by {self._more}"
 
     def _measured_alone(self, flown: Test) -> float | None:
         """Quality that was measured of flown gains, without the effect of their excitation; None of another task."""
@@ -248,6 +248,13 @@ class Choice:
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None
     ) -> Judged:
         return self.planner.judge(members, genes, self.committee.sds, self.draws, measured=measured, off=off)
+
+
+def _reaches(alone: float, flown: Test) -> str:
+    """What flown gains are worth, in words."""
+    if flown.excitation is None:
+        return f"{alone:.3g} was measured with these"
+    return f"these, without the excitation of their flight, reach {alone:.3g}"
 
 
 def over_promised(experiments: Sequence[Experiment]) -> float:

@@ -8,9 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.excited import as_excited, excited, given, span_of
+from twinloop.campaign.excited import apart, as_excited, excited, given, span_of
 from twinloop.campaign.history import Experiment
 from twinloop.test import Test
+from twinloop.trajectory import Trajectory
 
 OTHER = 0.5
 """Share of what a command does, or all do on average, that may differ from what their controller gives, squared."""
@@ -48,16 +49,18 @@ def exchanged(run: Experiment) -> tuple[int, int] | None:
     Args:
         run: of a test.
     """
-    if run.test is None:
-        return None
-    test = _as_flown(run)
-    sent, asked = run.trajectory.commands, given(test, run.trajectory.states)
-    before = _off(sent, asked, test)
-    for pair in combinations(range(sent.shape[1]), 2):
-        first, second = pair
-        crossed = _off(sent[:, [second, first]], asked[:, pair], test, pair)
-        if before[[first, second]].min() > max(LITTLE * LITTLE, EXCHANGED * crossed.max()):
-            return pair
+    return None if run.test is None else _exchanged(*_sent_and_asked(run.test, run.trajectory), run.test)
+
+
+def _exchanged(sent: Floats, asked: Floats, test: Test) -> tuple[int, int] | None:
+    before = apart(sent, asked, test)
+    for first, second in combinations(range(sent.shape[1]), 2):
+        pair = [first, second]
+        crossed = sent.copy()
+        crossed[:, pair] = sent[:, pair[::-1]]
+        after = apart(crossed, asked, test)[pair]
+        if before[pair].min() > max(LITTLE * LITTLE, EXCHANGED * after.max()):
+            return first, second
     return None
 
 
@@ -67,29 +70,24 @@ def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
     for run in experiments:
         if run.test is None or run.test.number in found:
             continue
-        test = _as_flown(run)
-        sent, asked, span = run.trajectory.commands, given(test, run.trajectory.states), span_of(test)
+        sent, asked = _sent_and_asked(run.test, run.trajectory)
+        span = span_of(run.test)
         size = np.square((asked - asked.mean(axis=0)) / span).mean(axis=0)
-        off = _off(sent, asked, test)
+        off = apart(sent, asked, run.test)
         far = (off > OTHER * np.maximum(size, size.mean())) & (off > LITTLE * LITTLE)
         if far.any():
             found[run.test.number] = _pulses(sent[:, far], asked[:, far], span[far])
-        elif exchanged(run) is not None:
+        elif _exchanged(sent, asked, run.test) is not None:
             found[run.test.number] = False
     return found
 
 
-def _as_flown(run: Experiment) -> Test:
-    """The test of a run, excited as it was: an excitation that was left out, or not held back, is a fault by itself."""
-    assert run.test is not None
-    return as_excited(run.test, excited(run.test, run.trajectory))
+def _sent_and_asked(test: Test, run: Trajectory) -> tuple[Floats, Floats]:
+    """Commands on record (n, n_u), and those of the controller with its excitation as it was flown.
 
-
-def _off(sent: Floats, asked: Floats, test: Test, columns: Sequence[int] | None = None) -> Floats:
-    """Mean squares of what commands are off from those that the controller gives, in units of their spans."""
-    span = span_of(test) if columns is None else span_of(test)[list(columns)]
-    off: Floats = np.square((sent - asked) / span).mean(axis=0)
-    return off
+    An excitation that was left out, or not held back, is another fault, and is said by itself.
+    """
+    return run.commands, given(as_excited(test, excited(test, run)), run.states)
 
 
 def _pulses(sent: Floats, asked: Floats, span: Floats) -> bool:
