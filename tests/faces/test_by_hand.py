@@ -426,6 +426,9 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
     text = (tmp_path / "log.csv").read_text(encoding="utf-8").replace(",", ";")
     (tmp_path / "log.csv").write_text("\ufeff" + text + "\n\n", encoding="utf-8")
     assert same(tl.load(tmp_path / "log.csv", SIGNALS), run)
+    # A separator behind the last cell of each row is no number.
+    (tmp_path / "log.csv").write_text(text.replace("\n", ";\n"), encoding="utf-8")
+    assert same(tl.load(tmp_path / "log.csv", SIGNALS), run)
     full = np.vstack([run.commands, run.commands[-1:]])
     np.savez(tmp_path / "log.npz", t=run.t, states=run.states, commands=full)
     assert same(tl.load(tmp_path / "log.npz", SIGNALS), run)
@@ -438,6 +441,10 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
         ("t,angle,rate,torqe\n0,0,0,0\n", "did you mean 'torqe'"),
         ("t,angle,rate,torque\n0,0,x,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found 'x'"),
         ("t,angle,rate,torque\n0,0,0,0\n0.05,0\n", "line 3"),
+        (
+            "t,angle,rate,torque\n0,0,1,0,0\n0,05,0,0,0,0\n",
+            "line 2: expected 4 cells, .*found 5; write decimals",
+        ),
         ("t;angle;rate;torque\n0;0,1;0;0\n0,05;0;0;0\n", "for t, found '0,05'; write decimals with a point"),
         (
             "t,angle,rate,torque\n25.10.2026 00:30:00,0,0,0\n",

@@ -209,6 +209,7 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
             f" {'is' if len(missing) == 1 else 'are'} missing: {advice}"
         )
     body = rows[1:]
+    _refuse_longer(body, len(names), called)
 
     def column(name: str, count: int) -> list[float]:
         place = names.index(name)
@@ -219,6 +220,16 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
 
     n = len(body)
     return np.array(column(TIME, n)), matrix(signals.state_names, n), matrix(signals.command_names, n - 1)
+
+
+def _refuse_longer(body: Sequence[Sequence[str]], columns: int, called: str) -> None:
+    """Refuses rows of more cells than there are columns: decimal commas between commas move every number after them."""
+    for i, row in enumerate(body):
+        if any(cell.strip() for cell in row[columns:]):
+            raise InvalidInput(
+                f"Log {called}, line {i + 2}: expected {columns} cells, one for each column, found {len(row)}; write"
+                " decimals with a point, and one number in a cell."
+            )
 
 
 def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -> float:
