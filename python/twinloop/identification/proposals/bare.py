@@ -1,7 +1,7 @@
 """Bare: the law of what is logged alone, where a hidden state is believed.
 
-A hidden state is believed early, on few terms. Later ones may describe without it what it stood in for; but who has
-come to a law with a hidden state never comes back to one without. So in the end that law is searched once more.
+A hidden state is accepted early, while there are few terms. Terms that are found later may describe its effect without
+it, but no other proposal drops it again. So in the end the law is searched once more without hidden states.
 """
 
 from __future__ import annotations
