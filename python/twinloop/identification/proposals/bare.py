@@ -11,9 +11,9 @@ from dataclasses import replace
 
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
-from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.hidden import without_hidden
+from twinloop.identification.proposals.second_look import looked_again
 from twinloop.identification.search.selection import climbed
 
 FAR = 200.0
@@ -31,7 +31,5 @@ def bare(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     yield found
     if not found.evidence.stable or found.evidence.length > hypothesis.evidence.length + FAR:
         return
-    again = smoothed(context, found)
-    if again is not None:
-        context.watch("smoothed")
-        yield fitted(context, climbed(context, again, brief=True))
+    if (again := looked_again(context, found)) is not None:
+        yield again

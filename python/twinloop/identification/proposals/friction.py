@@ -17,9 +17,10 @@ from twinloop.identification.fit.models import model_of
 from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.fit.tuning import tune
 from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.proposals.second_look import looked_again
 from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import climbed, posed
+from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import Sum, priced
 from twinloop.identification.sensors.noise import RIDGE, calm
 from twinloop.identification.terms.friction import entered, frictions, frictions_in
@@ -84,11 +85,8 @@ def _rubs(hypothesis: Hypothesis) -> bool:
 
 def _reselected(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     """The hypothesis with its terms selected again on states that it has smoothed, if innovations say so."""
-    again = smoothed(context, hypothesis)
-    if again is None:
-        return hypothesis
-    other = fitted(context, climbed(context, again, brief=True))
-    if not other.evidence.stable:
+    other = looked_again(context, hypothesis)
+    if other is None or not other.evidence.stable:
         return hypothesis
     other = by_innovations(context, other)
     return other if shorter(other.evidence.length, hypothesis.evidence.length) else hypothesis

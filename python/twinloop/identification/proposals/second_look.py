@@ -34,3 +34,17 @@ def second_look(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis
         yield latest
         if not latest.evidence.stable:
             return
+
+
+def looked_again(context: Context, hypothesis: Hypothesis) -> Hypothesis | None:
+    """The hypothesis with its terms selected and fitted again on states that it has smoothed; None where it cannot.
+
+    Args:
+        context: of the identification.
+        hypothesis: that was fitted.
+    """
+    again = smoothed(context, hypothesis)
+    if again is None:
+        return None
+    context.watch("smoothed")
+    return fitted(context, climbed(context, again, brief=True))
