@@ -17,7 +17,7 @@ from twinloop.identification.records import Run, guessed_noise, stages
 from twinloop.identification.search.implicit import Quotient
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.quotients import with_quotients
+from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.search.walks import Walks
@@ -174,6 +174,19 @@ def _fitted(problem, chain, terms):
     gram = problem.regression(chain, problem.values(terms)).gram(chain.sensors, chain.motion, WORKERS)
     weights, _, left = gram.solve(list(range(len(terms))), 1e-9)
     return Sum(dict(zip(terms, weights.tolist(), strict=True)), left + 200.0, chain)
+
+
+def test_a_denominator_whose_terms_are_dropped_while_another_one_is_refined_is_gone():
+    signals = signals_of("sp", 8.0)
+    problem, (chain, _) = problem_of(flown(saturating, (5.0, 0.2), 8.0), signals)
+    pool = problem.pool
+    both = [over(pool, 0, ((0, 1.2),)), over(pool, pool.product(1, 1), ((pool.product(1, 1), 0.1),))]
+    problem.usable(both)
+    (found,) = renewed(problem, signals, [_fitted(problem, chain, both)], Walks(12_500, 16, Unit(0, (1,))))
+    ((term, constant),) = denominators(pool, found.weights)[0]
+    assert term == 0
+    assert constant == pytest.approx(1.25, rel=1e-4)
+    assert len(found.weights) == 1
 
 
 def test_where_no_quotient_is_worth_its_price_sums_stay_the_very_same():

@@ -134,6 +134,8 @@ class _Finder:
     def renewed(self, known: Sum) -> Sum:
         """A sum with its denominators refined."""
         for own in self._all([known]):
+            if not self._split(known, own).above:
+                continue  # what was refined before it has taken its terms
             there = refined(self.problem, known.chain, self._split(known, own))
             new = self._carried(known, own, there, self._share(own, [known]))
             known = new if shorter(new.description_length, known.description_length) else known
