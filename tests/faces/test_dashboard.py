@@ -207,6 +207,16 @@ def test_names_of_strangers_stay_text(tmp_path):
         assert call(address, "GET", "/c/1/tests/0/sheet")[0] == 200
 
 
+def test_the_first_test_of_a_campaign_may_be_approved(tmp_path):
+    campaign = stored(tmp_path / "new.db", preset="default")
+    campaign.test(PENDULUM_GAINS)
+    campaign.close()
+    with served(tmp_path / "new.db") as address:
+        assert call(address, "POST", "/c/1/tests/0/approve")[0] == 200
+        (test,) = json.loads(call(address, "GET", "/c/1/tests")[2])["tests"]
+        assert test["number"] == 0 and test["approved"]
+
+
 def test_only_one_long_thing_goes_on_at_a_time(store, monkeypatch):
     table = desk.Desk(str(store), threads=1)
     held = threading.Event()

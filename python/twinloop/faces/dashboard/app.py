@@ -19,7 +19,7 @@ from starlette.routing import Route
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
 from twinloop.faces.cautions import serious_of
-from twinloop.faces.dashboard.desk import Desk
+from twinloop.faces.dashboard.desk import Desk, to_be_flown
 from twinloop.faces.dashboard.fence import App, Fence
 from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
@@ -184,9 +184,7 @@ class Pages:
 
     def _waiting(self, name: str) -> dict[str, object]:
         campaign, may = self.desk.look(name), self.desk.approved(name)
-        first = not campaign.experiments
         units = {gain.name: gain.unit for gain in campaign.family.law_gains}
-        tests = [test for test in campaign.tests if test in campaign.waiting or (first and test.number == 0)]
         return {
             "experiments": len(campaign.experiments),
             "tests": [
@@ -205,7 +203,7 @@ class Pages:
                     "reason": test.reason,
                     "approved": may.get(test.number) if test.number is not None else None,
                 }
-                for test in tests
+                for test in to_be_flown(campaign)
             ],
         }
 

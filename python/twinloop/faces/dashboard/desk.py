@@ -12,6 +12,7 @@ from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
 from twinloop.faces.telling import attach, numbered, tell, tell_failed
 from twinloop.store import Doing, approve, approved, doing, listed, opened, state
+from twinloop.test import Test
 
 LOST = 120.0
 """Seconds after which a writer that says nothing may have ended without a word: no step is silent for much longer."""
@@ -89,7 +90,7 @@ class Desk:
             InvalidInput: it is not waiting to be flown.
             StoreFailure: the store cannot be written.
         """
-        if number not in [test.number for test in self.look(name).waiting]:
+        if number not in [test.number for test in to_be_flown(self.look(name))]:
             raise InvalidInput(f"Test {number}: expected one that waits to be flown, found another one.")
         with closing(opened(self.store)) as base:
             approve(base, name, number)
@@ -216,6 +217,15 @@ class Desk:
 
     def _campaign(self, name: str) -> closing[Campaign]:
         return closing(Campaign.load(self.store, name, threads=self.threads, progress=None))
+
+
+def to_be_flown(campaign: Campaign) -> list[Test]:
+    """Tests without a run that nobody has given up: asked for, made by hand, or with a run that was withdrawn.
+
+    Args:
+        campaign: of them.
+    """
+    return [test for test in campaign.tests if campaign.status(test) == "asked"]
 
 
 def in_words(seen: Doing) -> str:
