@@ -90,6 +90,53 @@ def test_a_log_that_was_told_is_not_told_twice(store, tmp_path):
     assert len(look(store).experiments) == 1
 
 
+def test_a_flight_that_was_recorded_by_mistake_is_withdrawn_and_its_test_waits_again(store, tmp_path):
+    wrong = json.dumps({"reason": "degrees, not radians"})
+    other = flight(tmp_path / "other.csv", look(store).tests[1])
+    with served(store) as address:
+        assert call(address, "POST", "/c/1/log?file=other.csv", other)[0] == 200
+        shown = json.loads(call(address, "GET", "/c/1/tests")[2])["recorded"]
+        assert [each["which"] for each in shown] == ["0", "attached-1"]
+        assert [each["words"] for each in shown] == ["the flight of test 0", "attached flight 1 (20 steps)"]
+        status, _, said = call(address, "POST", "/c/1/flights/attached-1/withdraw", wrong)
+        assert status == 200 and "attached flight 1 (20 steps). 1 experiment left." in said
+        status, _, said = call(address, "POST", "/c/1/flights/0/withdraw", wrong)
+        assert status == 200 and "Test 1 abandoned: planned with it." in said
+        shown = json.loads(call(address, "GET", "/c/1/tests")[2])
+        assert [test["number"] for test in shown["tests"]] == [0] and shown["recorded"] == []
+        # What waits again may be approved and told again, also the test that nobody asked for.
+        assert call(address, "POST", "/c/1/tests/0/approve")[0] == 200
+        right = flight(tmp_path / "right.csv", look(store).tests[0])
+        assert call(address, "POST", "/c/1/tests/0/log?file=right.csv", right)[0] == 200
+    campaign = look(store)
+    assert [(each.test, each.reason) for each in campaign.withdrawals] == [
+        (None, "degrees, not radians"),
+        (0, "degrees, not radians"),
+    ]
+    assert [campaign.status(test) for test in campaign.tests] == ["flown", "abandoned"]
+
+
+@pytest.mark.parametrize(
+    ("which", "word"),
+    [("7", "expected a recorded flight, 0, found 7"), ("attached-1", "found attached-1"), ("1", "found 1"),
+     ("other.csv", "found other.csv"), ("..%2Fother.csv", "Not Found")],
+)  # fmt: skip
+def test_only_a_recorded_flight_is_withdrawn_and_no_file_is_read(store, tmp_path, monkeypatch, which, word):
+    monkeypatch.chdir(tmp_path)
+    flight(tmp_path / "other.csv", look(store).tests[0])
+    with served(store) as address:
+        status, _, said = call(address, "POST", f"/c/1/flights/{which}/withdraw", json.dumps({"reason": "x"}))
+        assert status in (404, 422) and word in said
+        status, _, said = call(address, "POST", "/c/1/flights/0/withdraw", json.dumps({"reason": " "}))
+        assert status == 422 and "say why" in said
+        elsewhere = {"Origin": "http://evil.example"}
+        assert (
+            call(address, "POST", "/c/1/flights/0/withdraw", json.dumps({"reason": "x"}), **elsewhere)[0]
+            == 403
+        )
+    assert look(store).withdrawals == ()
+
+
 @pytest.mark.parametrize("path", ["/c/1/tests/1/log", "/c/1/log"])
 @pytest.mark.parametrize("body", [b"no columns", b"t,angle,rate,torque\n0,0,0,0\n.05,x,0,0\n", b"\xff"])
 def test_messages_call_a_log_as_it_was_called_where_it_came_from(store, path, body):

@@ -101,6 +101,43 @@ def test_a_log_that_is_chosen_is_told_too(chromium, tmp_path):
         assert said == []
 
 
+@pytest.mark.parametrize("size", ["desktop", "phone"])
+def test_a_flight_is_withdrawn_once_that_is_confirmed_and_said_why(chromium, tmp_path, size):
+    store = begun(tmp_path / "hover.db")
+    with served(store) as address, shown(chromium, address, size) as (page, said):
+        asked, answers = [], iter([False, True])
+
+        def answer(dialog):
+            asked.append(dialog.message)
+            dialog.accept() if next(answers) else dialog.dismiss()
+
+        page.on("dialog", answer)
+        page.get_by_text("Withdraw a flight that was recorded by mistake").click()
+        button = page.get_by_role("button", name="Withdraw")
+        page.get_by_role("combobox", name="Flight").select_option("the flight of test 0")
+        button.click()
+        page.get_by_role("alert").get_by_text("say why").wait_for()
+        assert asked == [] and serious(page) == []
+        kept(page, f"dashboard-withdrawing-{size}")
+        page.get_by_label("What was wrong with it").fill("columns exchanged")
+        button.click()
+        page.wait_for_timeout(300)
+        assert (
+            len(asked) == 1 and "Withdraw the flight of test 0?" in asked[0] and look(store).withdrawals == ()
+        )
+        button.click()
+        page.get_by_role("alert").get_by_text(
+            "Withdrawn: the flight of test 0. 0 experiments left."
+        ).wait_for()
+        page.get_by_role("heading", name="Test 0").wait_for()
+        page.get_by_text("Withdraw a flight that was recorded by mistake").wait_for(state="hidden")
+        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+        assert wide[0] <= wide[1]
+        assert [text for text in said if "422" not in text] == []
+    (withdrawn,) = look(store).withdrawals
+    assert (withdrawn.test, withdrawn.reason) == (0, "columns exchanged")
+
+
 def test_a_campaign_that_another_process_runs_is_seen_to_work_and_grow(chromium, tmp_path):
     """Nobody touches the page: it says what is being done, then shows what came of it."""
     store = begun(tmp_path / "hover.db")

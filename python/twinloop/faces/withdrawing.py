@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from twinloop.campaign import Campaign
-from twinloop.campaign.history import Experiment, Withdrawal
+from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput
 from twinloop.faces.answering import answer, json_option
 from twinloop.faces.telling import counted
@@ -37,12 +37,18 @@ def withdraw(store: str, which: str, reason: str, name: str | None, as_json: boo
     """
     with closing(Campaign.load(store, name)) as campaign:
         campaign.withdraw(chosen(campaign, which), reason)
-        withdrawn = campaign.withdrawals[-1]
-        given_up = [test.number for test in campaign.tests if _given_up(campaign, withdrawn, test.number)]
+        test = campaign.withdrawals[-1].test
         facts = {
-            "test": withdrawn.test, "reason": reason, "abandoned": given_up, "experiments": len(campaign.experiments),
+            "test": test, "reason": reason, "abandoned": given_up(campaign), "experiments": len(campaign.experiments),
         }  # fmt: skip
-        answer(facts, _sentences(withdrawn, given_up, counted(campaign), shown_name(store)), as_json)
+        shown = shown_name(store)
+        lines = [
+            f"Saved: {named(test)} withdrawn; {counted(campaign)} in {shown}.",
+            *given_up_words(campaign),
+        ]
+        if test is not None:
+            lines.append(f"Its right log, if there is one: twinloop tell {shown} {test} FLIGHT.csv")
+        answer(facts, "\n".join(lines), as_json)
 
 
 def chosen(campaign: Campaign, which: str) -> int | Experiment:
@@ -81,8 +87,47 @@ def named(test: int | None) -> str:
     return "an attached flight" if test is None else f"the flight of test {test}"
 
 
-def _given_up(campaign: Campaign, withdrawn: Withdrawal, number: int) -> bool:
-    return number in withdrawn.planned and campaign.status(campaign.tests[number]) == "abandoned"
+def recorded(campaign: Campaign) -> dict[str, str]:
+    """What `chosen` calls each flight and each failure that can be withdrawn, and what people call it; the last first.
+
+    Args:
+        campaign: that they were recorded in.
+    """
+    tests = {
+        str(test.number): f"the {'failure' if status == 'failed' else 'flight'} of test {test.number}"
+        for test in campaign.tests
+        if (status := campaign.status(test)) in ("flown", "aborted", "failed")
+    }
+    attached = (run for run in campaign.experiments if run.attached)
+    flights = {
+        f"attached-{i}": f"attached flight {i} ({run.replayed.steps} steps)"
+        for i, run in enumerate(attached, start=1)
+    }
+    return dict(reversed({**flights, **tests}.items()))
+
+
+def given_up(campaign: Campaign) -> list[int]:
+    """Tests that were planned with the flight that was withdrawn last, and will not be flown.
+
+    Args:
+        campaign: with a withdrawn flight.
+    """
+    planned = campaign.withdrawals[-1].planned
+    return [number for number in planned if campaign.status(campaign.tests[number]) == "abandoned"]
+
+
+def given_up_words(campaign: Campaign) -> list[str]:
+    """The same in a sentence; none if there are no such tests.
+
+    Args:
+        campaign: with a withdrawn flight.
+    """
+    numbers = given_up(campaign)
+    if not numbers:
+        return []
+    return [
+        f"Test{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))} abandoned: planned with it."
+    ]
 
 
 def _names(attached: list[Experiment]) -> str:
@@ -90,13 +135,3 @@ def _names(attached: list[Experiment]) -> str:
         return "attached-N for an attached flight (there is none)"
     runs = (f"attached-{i} ({run.replayed.steps} steps)" for i, run in enumerate(attached, start=1))
     return ", ".join(runs)
-
-
-def _sentences(withdrawn: Withdrawal, given_up: list[int], told: str, store: str) -> str:
-    lines = [f"Saved: {named(withdrawn.test)} withdrawn; {told} in {store}."]
-    if given_up:
-        tests = f"Test{'s' if len(given_up) > 1 else ''} {', '.join(map(str, given_up))}"
-        lines.append(f"{tests} abandoned: planned with it.")
-    if withdrawn.test is not None:
-        lines.append(f"Its right log, if there is one: twinloop tell {store} {withdrawn.test} FLIGHT.csv")
-    return "\n".join(lines)

@@ -25,6 +25,7 @@ from twinloop.faces.report.page import source_page, style, templates
 from twinloop.faces.report.source import source
 from twinloop.faces.sheet import columns, sheet
 from twinloop.faces.telling import numbered
+from twinloop.faces.withdrawing import recorded
 from twinloop.logs import MOST_BYTES, write_columns
 from twinloop.planning.leaving import risk_words
 from twinloop.planning.quality import quality_unit
@@ -61,6 +62,7 @@ def application(desk: Desk, hosts: tuple[str, ...], token: str = "") -> App:
         Route("/c/{place:int}/tests/{number:int}/log", pages.tell, methods=["POST"]),
         Route("/c/{place:int}/tests/{number:int}/failed", pages.fail, methods=["POST"]),
         Route("/c/{place:int}/tests/{number:int}/abandon", pages.abandon, methods=["POST"]),
+        Route("/c/{place:int}/flights/{which}/withdraw", pages.withdraw, methods=["POST"]),
     ]
     handlers: dict[Any, Any] = {TwinloopError: _refused}
     return Fence(Starlette(routes=routes, exception_handlers=handlers), hosts, token)
@@ -146,6 +148,13 @@ class Pages:
             self.desk.fail, await self._named(request), request.path_params["number"], reason
         )
 
+    async def withdraw(self, request: Request) -> Response:
+        """Takes back a flight that was recorded by mistake, and keeps why."""
+        reason = _reason(await _words(request), needed=True)
+        return await self._done(
+            self.desk.withdraw, await self._named(request), request.path_params["which"], reason
+        )
+
     async def tell(self, request: Request) -> Response:
         """Tells a log: the body is the file, its name and the reason of an abort stand in the address."""
         name, number = await self._named(request), request.path_params["number"]
@@ -205,6 +214,7 @@ class Pages:
                 }
                 for test in to_be_flown(campaign)
             ],
+            "recorded": [{"which": which, "words": words} for which, words in recorded(campaign).items()],
         }
 
     def _report(self, name: str) -> str:

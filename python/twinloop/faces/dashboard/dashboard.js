@@ -14,14 +14,17 @@
   };
   const send = async (path, body) => {
     say("");
+    let done = false;
     try {
       const answer = await fetch(at + path, { method: "POST", body });
       const found = await answer.json();
-      say(found.said || found.failed, !answer.ok);
+      done = answer.ok;
+      say(found.said || found.failed, !done);
     } catch (failure) {
       say("The dashboard does not answer: " + failure.message, true);
     }
     await look();
+    return done;
   };
   const words = (path, what) => send(path, JSON.stringify(what));
   const log = (path, file, reason) => {
@@ -68,6 +71,19 @@
     return part;
   };
 
+  const choose = (recorded) => {
+    const which = get("which"), chosen = which.value;
+    which.replaceChildren(...recorded.map((flight) => new Option(flight.words, flight.which)));
+    if (recorded.some((flight) => flight.which === chosen)) which.value = chosen;
+    get("withdrawing").hidden = !recorded.length;
+  };
+  const withdraw = async () => {
+    const flight = get("which").selectedOptions[0], wrong = get("wrong");
+    // Without a reason nothing can be withdrawn: the answer says so.
+    if (wrong.value.trim() && !confirm("Withdraw " + flight.textContent + "? Nothing is learnt from it any more; its record stays, with the reason.")) return;
+    if (await words("/flights/" + flight.value + "/withdraw", { reason: wrong.value })) wrong.value = "";
+  };
+
   const show = async () => {
     const found = await (await fetch(at + "/tests")).json();
     const cards = found.tests ? found.tests.map(card) : [];
@@ -77,6 +93,7 @@
       cards.push(none);
     }
     get("tests").replaceChildren(...cards);
+    choose(found.recorded || []);
     if (state !== null) frame.contentWindow.location.replace(at + "/report");
   };
   const look = async () => {
@@ -107,6 +124,7 @@
     new ResizeObserver(fit).observe(frame.contentDocument.body);
   });
   get("ask").addEventListener("click", () => words("/ask", { last: get("last").checked }));
+  get("withdraw").addEventListener("click", withdraw);
   droppable(get("attach"), get("attached"), (file) => log("/log", file, ""));
   look();
   setInterval(look, 2000);

@@ -1,4 +1,4 @@
-"""The desk: what people do with a campaign of a store: ask, approve, tell, fail, abandon. One thing at a time."""
+"""The desk: what people do with a campaign of a store: ask, approve, tell, withdraw. One thing at a time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from pathlib import Path
 from twinloop.campaign import Campaign
 from twinloop.campaign.remaining import USUAL, duration
 from twinloop.errors import InvalidInput, NotAvailable, TwinloopError
-from twinloop.faces.telling import attach, numbered, tell, tell_failed
+from twinloop.faces.telling import attach, counted, numbered, tell, tell_failed
+from twinloop.faces.withdrawing import chosen, given_up_words, recorded
 from twinloop.store import Doing, approve, approved, doing, listed, opened, state
 from twinloop.test import Test
 
@@ -161,6 +162,29 @@ class Desk:
         with self._writing(name) as campaign:
             campaign.abandon(numbered(campaign, number))
             return f"Test {number} will not be flown."
+
+    def withdraw(self, name: str, which: str, reason: str) -> str:
+        """Takes back a flight that was recorded by mistake.
+
+        Args:
+            name: of the campaign.
+            which: number of a test, or attached-N. A file of this machine, as the command takes it, is none of them.
+            reason: what was wrong with it.
+
+        Raises:
+            InvalidInput: no such flight, or no reason.
+            StoreFailure: somebody else writes the campaign.
+        """
+        with self._writing(name) as campaign:
+            known = recorded(campaign)
+            if which not in known:
+                raise InvalidInput(
+                    f"Withdraw: expected a recorded flight, {' or '.join(known) or 'of which there is none'}, found"
+                    f" {which}; nothing was changed."
+                )
+            campaign.withdraw(chosen(campaign, which), reason)
+            said = f"Withdrawn: {known[which]}. {counted(campaign)} left."
+            return " ".join([said, *given_up_words(campaign)])
 
     def ask(self, name: str, last: bool) -> str:
         """Begins to plan the next test; it goes on behind.
