@@ -105,7 +105,7 @@ def test_a_flight_that_there_is_not_is_refused(flights, which, sentence):
 
 def test_a_test_with_a_flight_has_not_failed_until_that_is_withdrawn(flights):
     said = run("tell", "rig.db", "0", "--failed", "oops")
-    assert said.exit_code == 2 and "withdraw it first: twinloop withdraw STORE 0 --reason WHY" in said.stderr
+    assert said.exit_code == 2 and "withdraw it first: twinloop withdraw rig.db 0 --reason WHY" in said.stderr
     withdrawn("0")
     assert run("tell", "rig.db", "0", "--failed", "oops").exit_code == 0
     assert look().status(look().tests[0]) == "failed"

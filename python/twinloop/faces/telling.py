@@ -126,7 +126,7 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
     if status in ("flown", "aborted"):
         raise InvalidInput(
             f"Test {number}: expected one without a recorded flight, found one that was {status}; if that was recorded"
-            f" by mistake, withdraw it first: twinloop withdraw STORE {number} --reason WHY."
+            f" by mistake, withdraw it first: twinloop withdraw {campaign.store or 'STORE'} {number} --reason WHY."
         )
     if log is None and any((told.test.number, told.reason) == (number, reason) for told in campaign.failures):
         raise InvalidInput(
