@@ -286,9 +286,16 @@ def test_failures_aborted_flights_strangers_and_abandoned_tests_are_kept(folder)
     )
 
 
-def test_where_no_test_was_made_no_range_of_numbers_is_named():
+def test_a_range_of_numbers_is_named_only_where_there_are_several_tests():
+    campaign = lives.new("default")
     with pytest.raises(tl.InvalidInput, match="expected one that was made, found 0; ask for one first"):
-        numbered(lives.new("default"), 0)
+        numbered(campaign, 0)
+    campaign.test(lives.PENDULUM_GAINS)
+    with pytest.raises(tl.InvalidInput, match="expected 0, the only test so far, found 1; ask for one first"):
+        numbered(campaign, 1)
+    campaign.test(lives.OTHER_GAINS)
+    with pytest.raises(tl.InvalidInput, match="expected a number from 0 to 1, found 2; ask for one first"):
+        numbered(campaign, 2)
 
 
 @pytest.mark.parametrize(

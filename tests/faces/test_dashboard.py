@@ -156,7 +156,7 @@ def test_messages_call_a_log_as_it_was_called_where_it_came_from(store, path, bo
         ("/c/1/tests/1/failed", b"{}", "say why"),
         ("/c/1/tests/1/failed", b"[1", "JSON"),
         ("/c/1/tests/0/approve", b"", "waits"),
-        ("/c/7/tests/1/approve", b"", "of this store"),
+        ("/c/7/tests/1/approve", b"", "expected 1, the only one of this store, found 7"),
         ("/c/..%2F..%2Fetc/tests/1/approve", b"", "Not Found"),
     ],
 )

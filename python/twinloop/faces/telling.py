@@ -24,9 +24,17 @@ def numbered(campaign: Campaign, number: int) -> Test:
         InvalidInput: no such test.
     """
     if not 0 <= number < len(campaign.tests):
-        wanted = f"a number from 0 to {len(campaign.tests) - 1}" if campaign.tests else "one that was made"
-        raise InvalidInput(f"Test: expected {wanted}, found {number}; ask for one first.")
+        raise InvalidInput(
+            f"Test: expected {_numbers(len(campaign.tests))}, found {number}; ask for one first."
+        )
     return campaign.tests[number]
+
+
+def _numbers(made: int) -> str:
+    """Which numbers tests have, in words."""
+    if made < 2:
+        return "0, the only test so far" if made else "one that was made"
+    return f"a number from 0 to {made - 1}"
 
 
 def counted(campaign: Campaign) -> str:

@@ -174,7 +174,10 @@ class Pages:
         place: int = request.path_params["place"]
         known = await run_in_threadpool(self.desk.campaigns)
         if not 1 <= place <= len(known):
-            raise InvalidInput(f"Campaign: expected 1 to {len(known)} of this store, found {place}.")
+            there = f"1 to {len(known)}" if len(known) > 1 else "1, the only one" if known else "none"
+            raise InvalidInput(
+                f"Campaign: expected {there} of this store, found {place}; the page / lists them."
+            )
         return str(known[place - 1]["name"])
 
     async def _done(self, act: Callable[..., str], *given: object, status: int = 200) -> Response:
