@@ -303,7 +303,11 @@ def test_a_range_of_numbers_is_named_only_where_there_are_several_tests():
     [
         (("tell", "rig.db", "0"), "--failed REASON"),
         (("tell", "rig.db", "0", "--failed", "a", "--aborted", "x.csv"), "found both"),
-        (("tell", "rig.db", "0", "--aborted", "x.csv"), "check its name"),
+        (
+            ("tell", "rig.db", "0", "--aborted", "x.csv"),
+            "write: twinloop tell rig.db 0 --aborted x.csv --reason why.",
+        ),
+        (("tell", "rig.db", "0", "--aborted", "x.csv", "--reason", "a gust"), "check its name"),
         (("tell", "rig.db", "0", "--aborted", "x.csv", "--reason", " "), "a few words"),
         (("tell", "rig.db", "0", "x.csv", "--reason", "a gust"), "beside --aborted FLIGHT"),
         (("tell", "rig.db", "0", "--failed", "a", "--reason", "b"), "--failed REASON"),

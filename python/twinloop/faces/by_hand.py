@@ -29,9 +29,6 @@ from twinloop.planning.quality import quality_unit
 from twinloop.store import shown_name
 from twinloop.test import Test
 
-STOPPED = "stopped before its end"
-"""Why a flight was aborted, where nobody says it."""
-
 
 @click.command()
 @click.argument("file", type=Path)
@@ -116,7 +113,7 @@ def _shown(store: str, campaign: Campaign, test: Test) -> tuple[str, dict[str, o
     "--failed", metavar="REASON", help="Why the test failed; FLIGHT is its partial log, if there is one."
 )
 @click.option("--aborted", type=Path, metavar="FLIGHT", help="Log of a test that was stopped before its end.")
-@click.option("--reason", metavar="REASON", help="With --aborted: why it was stopped.")
+@click.option("--reason", metavar="REASON", help="Required with --aborted: why it was stopped.")
 @json_option
 def tell(
     store: str,
@@ -138,7 +135,7 @@ def tell(
                 campaign,
                 test,
                 log,
-                aborted="" if aborted is None else STOPPED if reason is None else reason,
+                aborted=reason or "",
                 otherwise=f"record a test that was stopped early: {_aborted(store, test, log, 'why')}",
             )
         text = (
@@ -173,13 +170,19 @@ def _told(
             "tell: expected --reason with a few words beside --aborted FLIGHT, found it without one of the two; a test"
             " that failed says why itself: --failed REASON."
         )
+    if aborted is not None and reason is None:
+        raise InvalidInput(
+            "tell: expected why the flight was stopped, found no --reason; write:"
+            f" {_aborted(store, test, aborted, 'why')}."
+        )
     if failed is not None and not failed.strip():
         raise InvalidInput(
             'tell: expected what happened behind --failed, found nothing; such as "motor cut out".'
         )
     if failed is None and flight is None and aborted is None:
         raise InvalidInput(
-            "tell: expected a flight, found none; name its file, or say --aborted FLIGHT or --failed REASON."
+            "tell: expected a flight, found none; name its file, or say --aborted FLIGHT --reason REASON, or --failed"
+            " REASON."
         )
     return flight if aborted is None else aborted
 
