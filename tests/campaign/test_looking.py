@@ -1,6 +1,7 @@
 """Looking changes nothing: what is asked next, what flies in the end and the band are functions of `tell` and `ask`."""
 
 import copy
+import pickle
 
 import pytest
 from hypothesis import given, settings
@@ -79,6 +80,13 @@ def test_looking_changes_no_bit_of_what_follows_attached_failed_abandoned_and_wi
 
     expected = outcome(lived(new(preset), life))
     assert outcome(lived(new(preset), life, look)) == expected
+
+
+def test_a_campaign_is_not_pickled_and_the_refusal_says_what_keeps_it():
+    campaign = new("default")
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        with pytest.raises(tl.InvalidInput, match=r"campaign\.save\(path\).*campaign\.to_record\(\)"):
+            pickle.dumps(campaign, protocol)
 
 
 @pytest.mark.parametrize("preset", ["paper", "default"])

@@ -8,7 +8,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from twinloop import _core
 from twinloop._ground.arrays import whole
@@ -142,6 +142,17 @@ class Persistent(Recorded):
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """As `copy.copy`: what both share are values that never change."""
         return copy.copy(self)
+
+    def __reduce__(self) -> NoReturn:
+        """A pickle runs code where it is read, and knows no versions: a record does neither.
+
+        Raises:
+            InvalidInput: always.
+        """
+        raise InvalidInput(
+            "Campaign: expected a store or a record to keep it in, found pickle; use campaign.save(path) and"
+            " Campaign.load(path), or campaign.to_record() and Campaign.from_record(record)."
+        )
 
     def save(self, where: str | Path, name: str = "campaign") -> None:
         """Writes the campaign into a store, or what is new into one where it was saved before.
