@@ -18,7 +18,7 @@ from lives import SIGNALS, SMALL
 from sameness import same
 from twinloop.campaign.campaign_file import _toml, read_file, read_signals, template
 from twinloop.faces.cli import main
-from twinloop.faces.sheet import foretold
+from twinloop.faces.sheet import foretold, sheet
 from twinloop.faces.telling import numbered
 from twinloop.logs import write_columns
 from twinloop.planning.leaving import risk_words
@@ -104,6 +104,18 @@ def test_the_sheet_says_what_to_set_and_the_file_what_to_add_and_expect(folder):
     # What was asked for is shown again, and not planned anew.
     assert run("ask", "rig.db").stdout == sheet and len(look().tests) == 2
     assert json.loads(run("ask", "rig.db", "--again", "--json").stdout)["test"] == 2
+
+
+def test_rows_after_the_twin_has_diverged_say_so():
+    campaign = lives.new("default")
+    test = campaign.test(lives.PENDULUM_GAINS)
+    predicted = lives.cut(lives.PLANT.run(test), 7, ended="diverged")
+    shown = sheet("rig.db", test, predicted, "rig-test-0.csv", campaign.setup)
+    rows = [line.split() for line in shown.splitlines()]
+    rows = {round(float(row[0]) / SIGNALS.dt): row[1:] for row in rows if row and row[0][0].isdigit()}
+    assert set(rows) >= {0, 6, 8, 20}
+    for step, row in rows.items():
+        assert (row[-2:] == ["diverged", "diverged"]) == (step > 7), row
 
 
 def test_a_flight_without_its_excitation_is_noticed_at_once(folder):

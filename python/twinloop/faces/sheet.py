@@ -58,7 +58,7 @@ def _expected(test: Test, predicted: Trajectory | None) -> str:
                 middle = [
                     f"{one} ({low:.3g} to {high:.3g})" for one, (low, high) in zip(middle, ends, strict=True)
                 ]
-            cells.append(middle)
+            cells.append(middle + ["diverged"] * (test.steps + 1 - len(middle)))
     chosen = sorted({round(k) for k in np.linspace(0, test.steps, min(test.steps, ROWS) + 1).tolist()})
     rows = [[column[k] if k < len(column) else "" for column in cells] for k in chosen]
     return table(heads, rows)
