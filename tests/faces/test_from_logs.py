@@ -68,7 +68,8 @@ def test_the_page_has_what_there_is_and_nothing_of_a_controller(folder, done):
         and 'figure id="coverage"' in page
         and "under its recorded commands" in page
     )
-    assert "of them held out" in page and "For a record, which it had not learnt from" in page
+    assert "of them held out" in page and "For a log, which it had not learnt from" in page
+    assert ">log<" in page and ">record<" not in page and "a record" not in page
     for absent in (
         "twinloop learn<",
         'id="controller"',

@@ -87,7 +87,7 @@ def _of_unseen(found: Examination) -> Iterator[Check]:
         )  # fmt: skip
         return
     last = found.unseen[-1]
-    which = "a record" if last.number is None else f"test {last.number}"
+    which = "a log" if last.number is None else f"test {last.number}"
     good = last.error <= LEFT
     yield Check(
         "unseen-flight", "twin", last.error, LEFT, good, True,

@@ -44,9 +44,9 @@ def quality_label(found: Examination) -> str:
 
 def said(number: int | None) -> str:
     """What a flight is called."""
-    return "record" if number is None else f"test {number}"
+    return "log" if number is None else f"test {number}"
 
 
 def in_words(number: int | None) -> str:
     """What a flight is called in a sentence."""
-    return "a record" if number is None else said(number)
+    return "a log" if number is None else said(number)
