@@ -326,6 +326,8 @@ def test_a_range_of_numbers_is_named_only_where_there_are_several_tests():
         (("tell", "rig.db", "7", "--failed", "a"), "ask for one first"),
         (("tell", "rig.db", "0", "x.csv"), "check its name"),
         (("ask", "other.db"), "twinloop new other.toml"),
+        (("ask", "rig.toml"), "name its store, by default rig.db"),
+        (("show", "rig.toml"), "name its store, by default rig.db"),
         (("new", "rig.toml"), "found one"),
         (("new", "rig.txt"), "end in .toml"),
     ],

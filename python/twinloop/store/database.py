@@ -191,6 +191,11 @@ def _is_full(name: str) -> bool:
 def _check_file(path: Path, create: bool) -> None:
     if path.is_dir():
         raise InvalidInput(f"Store {path}: expected a file, found a folder; name a file in it.")
+    if path.suffix == ".toml":
+        raise InvalidInput(
+            f"Store {path}: expected a store, found the name of a campaign file; name its store, by default"
+            f" {path.with_suffix('.db')}."
+        )
     if not path.parent.is_dir():
         raise InvalidInput(
             f"Store {path}: expected an existing folder, found none; make {path.parent} first."
