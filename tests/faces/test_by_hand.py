@@ -326,6 +326,8 @@ def test_a_range_of_numbers_is_named_only_where_there_are_several_tests():
         (("tell", "rig.db", "7", "--failed", "a"), "ask for one first"),
         (("tell", "rig.db", "0", "x.csv"), "check its name"),
         (("ask", "other.db"), "twinloop new other.toml"),
+        (("ask", "rig"), "expected rig.db, which has the campaign of rig.toml"),
+        (("attach", "rig.sqlite", "x.csv"), "expected rig.db, which has the campaign of rig.toml"),
         (("ask", "rig.toml"), "name its store, by default rig.db"),
         (("show", "rig.toml"), "name its store, by default rig.db"),
         (("new", "rig.toml"), "found one"),
@@ -336,6 +338,7 @@ def test_misuse_is_one_sentence_with_what_to_do(folder, arguments, word):
     run("ask", "rig.db")
     refused = run(*arguments)
     assert refused.exit_code == 2 and word in refused.stderr and refused.stderr.count("\n") == 1
+    assert not Path("rig").exists() and not Path("rig.sqlite").exists()
 
 
 def test_a_changed_campaign_file_is_refused(folder):

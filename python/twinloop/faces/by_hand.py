@@ -256,6 +256,14 @@ def _campaign(store: str, threads: int | None = None) -> Campaign:
     """The campaign of a store; it is begun from the file beside it where there is none."""
     file = file_beside(store)
     if file is not None and file.exists():
+        begun = file.with_suffix(".db")
+        if (
+            begun.exists() and not Path(store).exists()
+        ):  # a name that was mistyped must not begin a second campaign
+            raise InvalidInput(
+                f"Store {store}: expected {begun}, which has the campaign of {file}, found another name; for another"
+                " campaign, copy the file."
+            )
         return read_file(file).campaign(store=store, threads=threads)
     if file is None or Path(store).exists():
         return Campaign.load(store, threads=threads)
