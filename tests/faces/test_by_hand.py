@@ -389,6 +389,13 @@ def test_the_body_that_stands_in_the_file_as_a_comment_can_be_declared(tmp_path)
     assert read_signals(file)[0].kinematics == tl.RigidBody(("roll", "pitch", "yaw"), ("p", "q", "r"))
 
 
+@pytest.mark.parametrize("alone", ['"angle"', '["angle"]'])
+def test_an_axis_may_be_an_angle_alone(tmp_path, alone):
+    file = tmp_path / "rig.toml"
+    file.write_text(PENDULUM.replace('["angle", "rate"]', alone, 1), encoding="utf-8")
+    assert read_file(file).arguments["controller"].axes == (("angle", None),)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "word"),
     [
@@ -398,6 +405,12 @@ def test_the_body_that_stands_in_the_file_as_a_comment_can_be_declared(tmp_path)
         ("[first]", "[frist]", "did you mean 'first'"),
         ('"pid"', '"pit"', "did you mean 'pid'"),
         ('"angle.kp" = [0.0, 6.0]', '"angle.kq" = [0.0, 6.0]', "angle.k"),
+        (
+            '"angle.kd" = [0.0, 1.0]\n',
+            "",
+            r"\[controller\]: PID, gains: .* none for angle.kd; add them, or a number",
+        ),
+        ('["angle", "rate"]', "7", r"\[controller\]: .*axes\[0\]: expected a list, found 7"),
         ("seed = 0", "sed = 0", "did you mean 'seed'"),
         ("seed = 0", "seed = -1", "seed"),
         ("scale = 3.14", 'scale = "3.14"', "number"),

@@ -320,12 +320,14 @@ def _tagged(table: Any, kind: Any) -> Any:
 def _controller(table: Any) -> UnboundFamily:
     found = {"version": 1, **_table(table, "controller")}
     if isinstance(found.get("axes"), list):
+        axes = [[axis] if isinstance(axis, str) else axis for axis in found["axes"]]
         found["axes"] = [
-            [*axis, None] if isinstance(axis, list) and len(axis) == 1 else axis for axis in found["axes"]
+            [*axis, None] if isinstance(axis, list) and len(axis) == 1 else axis for axis in axes
         ]
     if isinstance(found.get("output"), Mapping):
         found["output"] = {"kind": "mixer", "version": 1, **found["output"]}
-    family: UnboundFamily = read(UnboundFamily, found, "controller")
+    with at("Campaign file, [controller]"):
+        family: UnboundFamily = read(UnboundFamily, found, "controller")
     return family
 
 

@@ -96,7 +96,7 @@ def bounds_by_name(family: str, bounds: object, names: Sequence[str]) -> dict[st
     if missing:
         raise InvalidInput(
             f"{family}, gains: expected bounds for all {len(names)}, found none for {', '.join(missing)}; add"
-            " them."
+            " them, or a number such as 0 that fixes a gain."
         )
     return {name: gain_bounds(f"Gain {name!r}, bounds", bounds[name]) for name in names}
 
