@@ -1,6 +1,7 @@
 """Which candidate flies next, beside slow flights of every candidate on a committee of three and the rules in words."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from committees import MOTORS, STEPS, TASK, TUNED, committee_of, member, planner
 from oracles import rk4, same_bits
 from twinloop.planning.candidates import candidates
 from twinloop.planning.comparison import Comparison
+from twinloop.planning.gusts import Moved
 from twinloop.planning.proposal import Flown, Wanted
 from twinloop.planning.seen import Seen
 
@@ -261,3 +263,19 @@ def test_a_task_that_leads_far_may_be_reached_and_is_no_reason_to_go_further():
     flights, task = np.array([[0.0, -0.5], [0.4, 0.5]]), np.array([[0.2, 0.0], [3.0, 0.0]])
     bounds = Seen(flights, task).around(2.0, KNOWN)
     np.testing.assert_allclose(bounds, [[-0.8, -2.5], [3.8, 2.5]])
+
+
+def test_a_candidate_that_known_disturbances_drive_out_oftener_than_the_flown_gains_gives_way_to_the_next():
+    chosen = compared(goal="both").proposal()
+
+    def blown(left_of_chosen, left_of_flown):
+        def on(test):
+            mine = test.genes.tobytes() == chosen.genes.tobytes()
+            return Moved(0.0, 0.0, left=left_of_chosen if mine else left_of_flown)
+
+        return compared(replace(COMMITTEE, gusts=SimpleNamespace(on=on)), goal="both").proposal()
+
+    assert same_bits(blown(2, 2).genes, chosen.genes)
+    other = blown(2, 1)
+    assert other.genes.tobytes() != chosen.genes.tobytes()
+    assert other.disagreement <= chosen.disagreement and other.safe

@@ -200,11 +200,24 @@ class Comparison:
         for at in range(0, min(len(ordered), TRIED), TOGETHER):
             batch = list(ordered[at : at + TOGETHER])
             flights = self._noisy(batch)
-            lasts = np.flatnonzero(~outside(flights.worst_usage) & (flights.mean <= worst))
-            if len(lasts):
-                i = int(lasts[0])
-                return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])
+            for i in np.flatnonzero(~outside(flights.worst_usage) & (flights.mean <= worst)).tolist():
+                if self._bears_gusts(batch[i]):
+                    return batch[i], Judged(flights.qualities[:, :, [i]], flights.usages[:, :, [i]])
         return None
+
+    def _bears_gusts(self, candidate: int) -> bool:
+        """Whether known disturbances drive a candidate out of the envelope no oftener than the best gains flown."""
+        drafts = self.drafts
+        start, target = (states[candidate] for states in drafts.ends)
+        test = self.judge.test(drafts.genes[candidate], start, target, drafts.excitation[candidate])
+        return self.committee.moved_by_gusts(test).left <= self._left_in_gusts
+
+    @cached_property
+    def _left_in_gusts(self) -> int:
+        """How many of the drawn flights of the best gains flown leave the envelope in known disturbances."""
+        task = self.judge.task
+        flown = self.judge.test(self.flown.best, task.initial_state, task.target_state)
+        return self.committee.moved_by_gusts(flown).left
 
     def _why(self, chosen: int, safe: bool, disagreement: float) -> Why:
         row, state, high, low = self.where[chosen].tolist()

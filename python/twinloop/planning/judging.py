@@ -15,7 +15,9 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
 from twinloop.controllers import Family
 from twinloop.flights import candidates, qualities
+from twinloop.planning.gusts import UNMOVED, Gusts, Moved
 from twinloop.planning.quality import Quality
+from twinloop.test import Test
 
 Ends = tuple[Floats, Floats]
 """Initial states and target states (K, n_x)."""
@@ -40,6 +42,7 @@ class Committee:
         trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
         delayed: models with more delay than was seen, which gains have to tolerate.
         explains: whether the best one explains the runs.
+        gusts: disturbances that are known; None: nothing disturbs.
     """
 
     members: Sequence[_core.Model]
@@ -47,6 +50,7 @@ class Committee:
     trusted: bool
     delayed: Sequence[_core.Model] = ()
     explains: bool = True
+    gusts: Gusts | None = None
 
     @property
     def predicts_limits(self) -> bool:
@@ -55,6 +59,10 @@ class Committee:
         Of a model that does not explain the runs, the gains that are best within limits are best because of its errors.
         """
         return self.trusted and self.explains
+
+    def moved_by_gusts(self, test: Test) -> Moved:
+        """What known disturbances do to a flight."""
+        return UNMOVED if self.gusts is None else self.gusts.on(test)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +152,18 @@ class Judge:
         self.limits = limits
         self.unit = Unit(seed)
         self.workers = workers
+
+    def test(self, genes: Floats, start: Floats, target: Floats, excitation: Floats | None = None) -> Test:
+        """One flight, of the task's length.
+
+        Args:
+            genes: of its gains (size,).
+            start: where it begins (n_x,).
+            target: where it leads, (n_x,) or a row for each state.
+            excitation: (n, n_u); of zeros or None: there is none.
+        """
+        added = None if excitation is None or not excitation.any() else excitation
+        return Test(self.family, genes, start, target, self.task.steps, added)
 
     def judge(
         self,

@@ -17,9 +17,9 @@ from twinloop.campaign.identify_and_plan.choice import (
     nearly_confirmed_in_a_row,
     over_promised,
 )
-from twinloop.campaign.identify_and_plan.gusts import UNMOVED, Moved
 from twinloop.campaign.identify_and_plan.starts import linear_gains
 from twinloop.controllers import StateFeedback, lqr_gains
+from twinloop.planning.gusts import UNMOVED, Moved
 from twinloop.planning.judging import Committee, Judged
 from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared
@@ -40,7 +40,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
     experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED, explained=True,
-    fared=KEPT,
+    fared=KEPT, in_gusts=None,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -65,8 +65,9 @@ def chosen(
         family=FAMILY, judge=judge, stable_members=lambda members, genes: members,
         options=PlanningOptions(track_record=track_record),
     )  # fmt: skip
-    committee = Committee([None], np.zeros(2), trusted, explains=explained)
-    choice = Choice(planner, committee, book, 4, confidence, lambda test: gusts)
+    blown = SimpleNamespace(on=lambda test: in_gusts if in_gusts and (test.genes == TUNED).all() else gusts)
+    committee = Committee([None], np.zeros(2), trusted, explains=explained, gusts=blown)
+    choice = Choice(planner, committee, book, 4, confidence)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
         unfit=lambda book: list(unfit), on_task=lambda book, test: True,
@@ -75,8 +76,9 @@ def chosen(
     ):  # fmt: skip
         found = choice.between(TUNED, best)
     told = [found.reason, found.predicted, found.spread]
+    moved = blown.on(found)
     assert found.risk == pytest.approx(
-        max(0.5 / 5.0, fared.risk if (found.genes == FLOWN.genes).all() else 0.0)
+        max(0.5 / 5.0, moved.risk, fared.risk if (found.genes == FLOWN.genes).all() else 0.0)
     )
     return ("tuned" if (found.genes == TUNED).all() else "flown"), told[0] if gusts is UNMOVED else told
 
@@ -139,6 +141,14 @@ def test_where_the_last_flight_was_not_as_predicted_others_must_be_better_by_two
     assert chosen(1.01 * enough)[0] == "tuned"
     # Whatever else disturbs them: what gusts will add was measured in the flight, too.
     assert chosen(0.99 * enough, experiments=missed, gusts=Moved(0.1, 0.0))[0] == "flown"
+
+
+def test_gains_that_known_disturbances_drive_out_of_the_envelope_are_not_preferred():
+    blown_out = Moved(0.0, 0.0, left=3)
+    answer, reason = chosen(0.5, in_gusts=blown_out)
+    assert answer == "flown" and "in disturbances as the flights felt them" in reason
+    # No worse than those that have flown in the same disturbances.
+    assert chosen(0.5, gusts=blown_out)[0] == "tuned"
 
 
 def test_what_gusts_add_is_predicted():

@@ -15,10 +15,10 @@ from twinloop.campaign import standing
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated, missed
-from twinloop.campaign.identify_and_plan.gusts import Moved
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
+from twinloop.planning.gusts import Moved
 from twinloop.planning.judging import Committee, Judged, expected, risk
 from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared
@@ -44,7 +44,6 @@ class Choice:
         draws: of the sensors' noise.
         confidence: share of members and draws that must find tuned gains better than the best flown, by half a percent
             or more, and by more than predictions have missed of late.
-        gusts: what disturbances do to the quality of a flight.
     """
 
     planner: Planner
@@ -52,7 +51,6 @@ class Choice:
     book: Logbook
     draws: int
     confidence: float
-    gusts: Callable[[Test], Moved]
 
     def between(self, tuned: Floats, best: Test | None) -> Test:
         """The controller to fly, without excitation, for the campaign's own task.
@@ -69,7 +67,7 @@ class Choice:
         members = self.planner.stable_members(self.committee.members, genes)
         judged = self._judge(members, genes)
         recorded = self._judge(members, genes, measured=True).qualities
-        refused = self._refused(members, judged, tuned)
+        refused = self._refused(members, judged, tuned, flown)
         if flown is None:
             if refused:
                 raise NotAvailable(
@@ -107,7 +105,7 @@ class Choice:
     # Inside
 
     @cached_property
-    def _gusts(self) -> dict[bytes, Moved]:
+    def _known_moves(self) -> dict[bytes, Moved]:
         """What disturbances do to flights of gains, without excitation, that it was asked of so far."""
         return {}
 
@@ -128,7 +126,9 @@ class Choice:
             return ""
         return f" Test {better.number} was measured better; without excitation these are better."
 
-    def _refused(self, members: Sequence[_core.Model], judged: Judged, tuned: Floats) -> str:
+    def _refused(
+        self, members: Sequence[_core.Model], judged: Judged, tuned: Floats, flown: Test | None
+    ) -> str:
         """Why tuned gains cannot be answered for; nothing if they can."""
         if not self.committee.trusted:
             return "the twin does not follow the runs that it was learnt from"
@@ -140,6 +140,9 @@ class Choice:
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
             return "a model predicts that those preferred by the twin leave the envelope"
+        borne = 0 if flown is None else self._moved(flown).left
+        if self._moved(self.book.of_task(tuned, len(self.book.tests))).left > borne:
+            return "in disturbances as the flights felt them, those preferred by the twin leave the envelope"
         return ""
 
     def _no_gains_count(self, members: Sequence[_core.Model], judged: Judged) -> bool:
@@ -227,7 +230,7 @@ class Choice:
     ) -> Test:
         predicted, spread = self._expected(test, recorded[:, :, pick])
         usages = judged.usages[:, :, pick]
-        least = self._fared(test).risk
+        least = max(self._fared(test).risk, self._moved(test).risk)
         return replace(test, predicted=predicted, measured=measured).explained(
             spread, max(risk(usages), least), reason
         )
@@ -238,11 +241,16 @@ class Choice:
 
     def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
         """The quality to be measured of a flight, and its calibrated spread, disturbances included."""
-        genes = test.genes.tobytes()
-        if genes not in self._gusts:
-            self._gusts[genes] = self.gusts(test)
-        predicted, spread = self._gusts[genes].added_to(*expected(recorded))
+        predicted, spread = self._moved(test).added_to(*expected(recorded))
         return predicted, calibrated(spread, predicted, self.book.experiments)
+
+    def _moved(self, test: Test) -> Moved:
+        """What known disturbances do to the task's flight with the gains of a test, without excitation."""
+        genes = test.genes.tobytes()
+        if genes not in self._known_moves:
+            task = self.book.of_task(test.genes, test.number or 0)
+            self._known_moves[genes] = self.committee.moved_by_gusts(task)
+        return self._known_moves[genes]
 
     def _judge(
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None

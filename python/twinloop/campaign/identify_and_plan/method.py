@@ -21,7 +21,6 @@ from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
 from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed_in_a_row
-from twinloop.campaign.identify_and_plan.gusts import Moved, moved_by_gusts
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
@@ -34,6 +33,7 @@ from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
 from twinloop.law.twin import Twin
+from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared, Flown, Proposal
@@ -166,11 +166,11 @@ class IdentifyAndPlan:
             self._exploits(book, tuned, last),
             last and self.options.exploit_last,
         )
-        gusts = self._gusts(book, self._as_test(book, found))
+        gusts = committee.moved_by_gusts(self._as_test(book, found))
         predicted, spread = gusts.added_to(found.predicted, found.spread)
         spread = calibrated(spread, predicted, book.experiments)
         own = standing.fared(book, found.genes, found.excitation is not None)
-        found = replace(found, predicted=predicted, spread=spread, risk=max(found.risk, own.risk))
+        found = replace(found, predicted=predicted, spread=spread, risk=max(found.risk, own.risk, gusts.risk))
         test = book.new_test(
             found.genes,
             excitation=found.excitation,
@@ -199,22 +199,6 @@ class IdentifyAndPlan:
             book.of_task(found.genes, len(book.tests)),
             initial_state=found.initial_state, target_state=found.target_state, excitation=found.excitation,
         )  # fmt: skip
-
-    def _gusts(self, book: Logbook, flight: Test) -> Moved:
-        """What disturbances do to the quality of a flight; none that are known to be a model error."""
-        latest, setup = self._latest(), self.setup
-        lesson, noise = latest.lessons[-1], latest.identified.noise(setup.signals)
-        errors = [i for i, name in enumerate(setup.signals.state_names) if lesson.cause(name) == "law"]
-        unit = Unit(setup.seed).part(len(book.experiments), 3)
-        return moved_by_gusts(
-            latest.identified.model,
-            noise.without(errors),
-            flight,
-            setup.quality,
-            unit,
-            setup.limits,
-            self.workers,
-        )
 
     def _asked_of_nobody(self, book: Logbook) -> Test:
         """A test that no committee chose."""
@@ -263,7 +247,6 @@ class IdentifyAndPlan:
             book,
             self.options.draws,
             self.options.confidence,
-            partial(self._gusts, book),
         )
         if at_once:
             tuned, note = known_gains(self.memory, best)
@@ -332,7 +315,16 @@ class IdentifyAndPlan:
         # The lag of a linear twin that stands for what no law explains is such a margin already.
         wanted = self.options.delay_margin and not stands_in(latest.identified)
         slower = [delayed(latest.believed[0], self.setup.signals, periods)] if wanted else []
-        return Committee(latest.believed, sensors, latest.follows, slower, latest.explained)
+        gusts = self._gusts(latest, len(book.experiments))
+        return Committee(latest.believed, sensors, latest.follows, slower, latest.explained, gusts)
+
+    def _gusts(self, latest: Learnt, told: int) -> Gusts:
+        """Disturbances that are known; none that are known to be a model error."""
+        setup, lesson = self.setup, latest.lessons[-1]
+        errors = [i for i, name in enumerate(setup.signals.state_names) if lesson.cause(name) == "law"]
+        noise = latest.identified.noise(setup.signals).without(errors)
+        unit = Unit(setup.seed).part(told, 3)
+        return Gusts(latest.identified.model, noise, setup.quality, unit, setup.limits, self.workers)
 
     def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
         """Whether the tuned gains are flown as they are, unless that is what a test that is waiting does."""

@@ -8,32 +8,35 @@ from strategies import program_text
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.streams import Unit
-from twinloop.campaign.identify_and_plan.gusts import UNMOVED, Moved, moved_by_gusts
 from twinloop.law.noise import CorrelatedDisturbance, Noise
+from twinloop.planning.gusts import DRAWS, UNMOVED, Gusts, Moved
 from twinloop.planning.quality import quality_of
 
 DT, STEPS, KICK = 0.1, 60, 0.01
 SIGNALS = tl.Signals([tl.State("x", "m", 2.0)], [tl.Command("u", "N", (-1.0, 1.0))], DT)
-FAMILY = tl.controllers.PID(axes=[("x", None)], gains={"x.kp": (0.0, 1.0), "x.ki": 0.0, "x.kd": 0.0}).bind(
-    SIGNALS
-)
 WORKERS = _core.Workers(1)
 
 
-def moved(noise, growth=0.0, start=5.0):
+UNIT = Unit(3).part(0)
+
+
+def moved(noise, growth=0.0, start=5.0, envelope=None):
     """Of x' = growth x, which no command drives, so that it stays far from its target at 0."""
+    signals = tl.Signals([tl.State("x", "m", 2.0, envelope=envelope)], SIGNALS.commands, DT)
+    family = tl.controllers.PID(
+        axes=[("x", None)], gains={"x.kp": (0.0, 1.0), "x.ki": 0.0, "x.kd": 0.0}
+    ).bind(signals)
     lines = [[f"r2 = r0 * {growth!r}"]]
-    model = _core.Model(_core.Program.parse(program_text(2, 1, 3, lines)), "acceleration", SIGNALS.engine)
-    test = tl.Test(FAMILY, FAMILY.genes({"x.kp": 0.0}), [start], [0.0], STEPS)
-    return moved_by_gusts(
-        model, noise, test, quality_of("iae", SIGNALS, [1.0]), Unit(3).part(0), Limits(SIGNALS), WORKERS
-    )
+    model = _core.Model(_core.Program.parse(program_text(2, 1, 3, lines)), "acceleration", signals.engine)
+    test = tl.Test(family, family.genes({"x.kp": 0.0}), [start], [0.0], STEPS)
+    quality = quality_of("iae", signals, [1.0])
+    return Gusts(model, noise, quality, UNIT, Limits(signals), WORKERS).on(test)
 
 
 def test_kicks_add_up_to_what_a_random_walk_adds_to_an_integrated_error():
     # |x| = x, so that the error's integral moves by DT Σ of the walk, of which kick j is in all readings after it.
     expected = DT * KICK * np.sqrt(np.square(np.arange(1, STEPS + 1)).sum())
-    bias, spread = moved(Noise(np.zeros(1), np.array([KICK]), dt=DT))
+    bias, spread, *_ = moved(Noise(np.zeros(1), np.array([KICK]), dt=DT))
     assert spread == pytest.approx(expected, rel=0.35)
     # In proportion: as often better as worse, by as much.
     assert bias == pytest.approx(0.0, abs=1e-12)
@@ -41,7 +44,7 @@ def test_kicks_add_up_to_what_a_random_walk_adds_to_an_integrated_error():
 
 def test_at_the_target_every_disturbance_is_a_bias():
     # |walk| is √(2/π) of its standard deviation on average, KICK √j after j kicks; the first reading is the start.
-    bias, spread = moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), start=0.0)
+    bias, spread, *_ = moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), start=0.0)
     expected = DT * KICK * np.sqrt(2.0 / np.pi) * np.sqrt(np.arange(1, STEPS + 1)).sum()
     assert bias == pytest.approx(expected, rel=0.4) and spread > 0.0
 
@@ -62,3 +65,23 @@ def test_a_gust_that_is_forgotten_slowly_moves_it_more_than_one_that_is_forgotte
 def test_sensors_alone_and_flights_that_diverge_add_nothing():
     assert moved(Noise(np.array([0.1]), np.zeros(1), dt=DT)) == UNMOVED
     assert moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), growth=4.0) == UNMOVED
+
+
+@pytest.mark.parametrize("bound", [0.05, 0.1, 0.2, 1.0])
+def test_flights_that_walk_out_of_the_envelope_are_counted(bound):
+    noise = Noise(np.zeros(1), np.array([KICK]), dt=DT)
+    walks = noise.disturbance(DRAWS // 2, STEPS, UNIT.stream("repeats"))[:, :, 0].cumsum(axis=1)
+    beyond = int((np.abs(walks).max(axis=1) > bound).sum())
+    found = moved(noise, start=0.0, envelope=(-bound, bound))
+    # The same with the opposite sign leave on the other side.
+    assert found.left == 2 * beyond
+    assert found.risk == pytest.approx((2 * beyond + 0.5) / (DRAWS + 1.0) if beyond else 0.0)
+
+
+def test_flights_that_diverge_have_left():
+    found = moved(Noise(np.zeros(1), np.array([KICK]), dt=DT), growth=3.0, start=0.0)
+    assert found.left == DRAWS and np.isfinite([found.bias, found.spread]).all()
+
+
+def test_where_nothing_disturbs_nothing_is_moved():
+    assert moved(Noise.of_sensors(np.ones(1))) == UNMOVED
