@@ -36,7 +36,8 @@ class IdentificationOptions:
             equation of a state is between two numbers, either of which may be left out; bounds that exclude 0 mean
             that the term is in the law.
         most_readings: largest number of readings that a twin is learnt from, with all states at one time counted
-            once; if there are more, whole flights are left out: old ones that the twin predicted well.
+            once; if there are more, flights are left out, old ones that the twin predicted well, and of long logs
+            without a test the liveliest parts are learnt.
         operators: that evolved programs may use.
         generations: of evolved features; 0: none.
         restarts: of the evolution.

@@ -16,7 +16,7 @@ from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
-from twinloop.campaign.identify_and_plan.selection import learnt_from
+from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from, shortened
 from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
 from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
@@ -147,17 +147,20 @@ class Learner:
 
     def _identification(self, book: Logbook) -> partial[Identified]:
         """Identification of the flights that are learnt from; what it lacks are options and a number."""
-        flights = learnt_from(book.experiments, self.options.most_readings)
+        selected = self._selected(book)
         return partial(
             identify_runs,
-            [Run.of(run.trajectory.states, run.trajectory.commands) for run in flights],
+            [Run.of(states, commands) for one in selected for states, commands in one.recorded()],
             self.setup.signals,
-            rests=resting_commands(self.setup, flights),
+            rests=resting_commands(self.setup, [one.experiment for one in selected]),
             axes=self._axes(),
             seed=self.setup.seed,
             workers=self.workers,
             watch=self.watch,
         )
+
+    def _selected(self, book: Logbook) -> list[Selected]:
+        return learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
 
     def _axes(self) -> list[Direction]:
         """Directions in which the controller's axes move alike commands, as its mixer says."""
@@ -197,6 +200,7 @@ class Learner:
             follows=follows,
             remarks=(
                 *identified.remarks,
+                *shortened(self._selected(book), signals.dt),
                 *stand_ins(actuation, signals, explained),
                 *diagnostics_of(
                     book.experiments,
