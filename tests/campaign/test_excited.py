@@ -1,4 +1,4 @@
-"""How the excitation of a test was flown, by its recorded commands: as the test says, in full, or not at all."""
+"""How the excitation of a test was flown, by its recorded commands: as the test says, in full, twice, or not at all."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -60,6 +60,7 @@ def test_how_an_excitation_was_flown_is_seen_in_the_commands(test, noise):
         assert seen(flight) is how and other_commands([flight]) == []
     assert ("excitation", "note") in codes(flown(test, Excited.NOT, noise))
     assert ("excitation", "serious") in codes(flown(test, Excited.WHOLE, noise))
+    assert ("excitation", "serious") in codes(flown(test, Excited.TWICE, noise))
     assert "excitation" not in dict(codes(flown(test, noise=noise)))
 
 
@@ -96,6 +97,20 @@ def test_other_faults_of_commands_are_no_other_excitation(test, change):
 def test_where_the_excitation_was_flown_otherwise_small_faults_hide_nothing(test):
     for how in (Excited.NOT, Excited.WHOLE):
         assert seen(sent(flown(test, how), lambda commands: 0.02 * np.round(commands / 0.02))) is how
+
+
+def test_a_program_that_adds_the_excitation_to_commands_that_have_it_is_seen(test):
+    asked = dataclasses.replace(test, hold_back=None)
+    controller = asked.controller()
+    controller.reset()
+    states, commands = [asked.initial_state], []
+    for k in range(asked.steps):
+        twice = controller.command(states[-1], asked.target(k)) + asked.excitation[k]
+        commands.append(np.clip(twice, *TORQUE))
+        states.append(pendulum_step(states[-1], commands[-1]))
+    run = tl.Trajectory(SIGNALS.dt * np.arange(asked.steps + 1), np.array(states), np.array(commands))
+    flight = SimpleNamespace(test=asked, number=asked.number, trajectory=run)
+    assert seen(flight) is Excited.TWICE and other_commands([flight]) == []
 
 
 def test_a_test_without_an_excitation_has_none_that_could_be_left_out(test):

@@ -1,7 +1,8 @@
 """Excited: how the excitation of a test was flown, as the recorded commands show it.
 
-A program that flies a test may leave its excitation out, or may not be able to hold it back. The flight is learnt as it
-was flown, so a twin that is held against it has to be flown in the same way.
+A program that flies a test may leave its excitation out, may not be able to hold it back, or may add it once more to
+commands that have it already. The flight is learnt as it was flown, so a twin that is held against it has to be flown
+in the same way.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ class Excited(Enum):
     HELD_BACK = "as the test says"
     WHOLE = "without holding it back"
     NOT = "not at all"
+    TWICE = "twice"
 
 
 def excited(test: Test, run: Trajectory) -> Excited:
@@ -43,7 +45,7 @@ def excited(test: Test, run: Trajectory) -> Excited:
     asked = _off(test, run)
     if asked <= SEEN * SEEN:
         return Excited.HELD_BACK
-    others = (Excited.WHOLE, Excited.NOT)
+    others = (Excited.WHOLE, Excited.NOT, Excited.TWICE)
     off = {how: _off(as_excited(test, how), run) for how in others}
     best = min(off, key=lambda how: off[how])
     return best if off[best] < BETTER * asked else Excited.HELD_BACK
@@ -58,6 +60,8 @@ def as_excited(test: Test, how: Excited) -> Test:
     """
     if how is Excited.NOT:
         return test.quiet()
+    if how is Excited.TWICE and test.excitation is not None:
+        return replace(test, excitation=2.0 * test.excitation, hold_back=None)
     return replace(test, hold_back=None) if how is Excited.WHOLE else test
 
 

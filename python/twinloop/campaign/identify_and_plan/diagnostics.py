@@ -81,7 +81,7 @@ def from_other_controllers(tests: Sequence[int], exchanged: Sequence[str] = ()) 
 
 
 def from_another_excitation(test: int, how: Excited) -> Iterator[Remark]:
-    """That the excitation of a test was not flown, or not held back.
+    """That the excitation of a test was not flown, not held back, or flown twice.
 
     Args:
         test: its number.
@@ -99,6 +99,12 @@ def from_another_excitation(test: int, how: Excited) -> Iterator[Remark]:
             f"The excitation of test {test} was flown without holding it back: such a flight may lead further than its"
             " sheet says. Scale it by the readings, as the sheet tells; for a program that cannot do this, set"
             " hold_back = false under [options] and begin a new campaign: then the excitation stays small.",
+        )
+    elif how is Excited.TWICE:
+        yield serious(
+            "excitation",
+            f"The excitation of test {test} was flown twice as strong: such a flight may lead further than its sheet"
+            " says. The commands of test.controller() have it already: send them as they are.",
         )
 
 
