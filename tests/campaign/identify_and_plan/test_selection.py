@@ -92,7 +92,12 @@ def test_logs_share_the_room_and_tests_are_learnt_whole(lengths, most):
         assert all(0 <= first < last <= steps for first, last in one.parts)
         assert all(a[1] <= b[0] for a, b in zip(one.parts, one.parts[1:], strict=False))
     if most >= 40 * (len(logs) + 1):
+        # Each has its share of what the test leaves.
+        share = max(most - 8, most // 2) // len(logs)
         assert len(learnt) == len(logs) + 1
+        assert all(
+            one.readings >= min(share, one.experiment.trajectory.steps + 1) - PARTS for one in learnt[:-1]
+        )
 
 
 def test_a_twin_of_a_long_log_is_held_against_all_of_it_and_says_what_it_has_learnt():

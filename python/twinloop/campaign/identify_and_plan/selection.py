@@ -72,7 +72,10 @@ def learnt_from(experiments: Sequence[Experiment], most: int, signals: Signals) 
     runs = [Selected(run, ((0, run.trajectory.steps),)) for run in distinct(experiments)]
     if sum(run.readings for run in runs) <= most:
         return runs
-    share = most // len(runs)
+    of_tests = sum(run.readings for run in runs if run.experiment.test is not None)
+    logs = sum(run.experiment.test is None for run in runs)
+    # What tests leave, but no less than half: the newest of them have room in any case.
+    share = max(most - of_tests, most // 2) // max(1, logs)
     runs = [_liveliest(run, share, signals) if run.experiment.test is None else run for run in runs]
     numbers = range(len(runs))
     surprising = sorted(numbers, key=lambda i: _surprise(runs[i].experiment), reverse=True)
