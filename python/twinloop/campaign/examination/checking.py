@@ -180,9 +180,8 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         yield Check(
             "envelope", "controller", best.risk, RISK, safe, True,
             f"The probability that it leaves the envelope is"
-            f" {risk_words(best.risk, found.setup.predicted_flights)} according to the committee and to flights"
-            f" of these gains; at most"
-            f" {100.0 * RISK:g} % is allowed.",
+            f" {risk_words(best.risk, found.setup.predicted_flights)} according to the committee, to gusts as the"
+            f" flights felt them and to flights of these gains; at most {100.0 * RISK:g} % is allowed.",
         )  # fmt: skip
     flown = any(run.number == best.number and run.kept_envelope for run in found.experiments)
     yield Check(
