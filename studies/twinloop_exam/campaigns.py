@@ -37,8 +37,9 @@ def campaign(
         threads: of the engine; None: all that there are. No number but the seconds depends on it.
 
     Yields:
-        What was measured after each experiment, Υ0 first. `ask_seconds` is the time of the `ask` that
-        followed the experiment, learning included; after the last one there is `learn_seconds` instead.
+        What was measured after each experiment, Υ0 first. `ask_seconds` is what the `ask` that followed the
+        experiment took of processors, learning included, so that nothing else on the machine counts; after the
+        last one there is `learn_seconds` instead.
     """
     clock, rig = time.monotonic(), subject.rig(seed)
     arguments = dict(who.arguments)
@@ -65,10 +66,10 @@ def campaign(
         if k:
             measures |= _foretold(predicts, twin, test, flight)
         loop.tell(test, flight)
-        started = time.monotonic()
+        started = time.process_time()
         following = loop.ask() if k < experiments else None
         twin = loop.twin
-        measures["ask_seconds" if following is not None else "learn_seconds"] = time.monotonic() - started
+        measures["ask_seconds" if following is not None else "learn_seconds"] = time.process_time() - started
         measures |= of_twin(twin, held_out) | of_controller(subject, controller_to_fly(loop)[0])
         yield k, measures, flight, time.monotonic() - clock
         clock = time.monotonic()

@@ -195,8 +195,8 @@ def _fits(task: Task, who: Fitter, judged: Subject) -> Iterator[Measured]:
     assert task.judge is not None
     judge = held_out.unpacked(judged, task.judge)
     for k in task.job.ks:
-        clock = time.monotonic()
+        clock, started = time.monotonic(), time.process_time()
         model = who.fit(list(task.flights[: k + 1]), judged.signals, task.job.address.seed)
-        seconds = time.monotonic() - clock
+        seconds = time.process_time() - started
         measures = campaigns.of_twin(Twin(model, judged.signals), judge)
         yield k, {**measures, "learn_seconds": seconds}, None, time.monotonic() - clock

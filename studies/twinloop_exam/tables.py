@@ -185,7 +185,7 @@ def _conduct(results: Results, system: str, learners: Sequence[str]) -> Table:
         "|predicted − flown|",
         "in 90 % band",
     ]
-    notes = ("Seconds: median / largest. The others: medians over seeds and experiments.",)
+    notes = ("Seconds of processors: median / largest. The others: medians over seeds and experiments.",)
     return Table(f"{system}: safety, time, size, honesty", head, rows, notes)
 
 
