@@ -10,14 +10,11 @@ import twinloop as tl
 from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign import standing
-from twinloop.campaign.identify_and_plan.choice import (
-    SURE,
-    Choice,
-    confirmed,
-    nearly_confirmed_in_a_row,
-    over_promised,
-)
+from twinloop.campaign.identify_and_plan.choice import Choice
 from twinloop.campaign.identify_and_plan.starts import linear_gains
+from twinloop.campaign.identify_and_plan.track_record import (
+    SURE,
+)
 from twinloop.controllers import StateFeedback, lqr_gains
 from twinloop.planning.gusts import UNMOVED, Moved
 from twinloop.planning.judging import Committee, Judged
@@ -158,26 +155,6 @@ def test_what_gusts_add_is_predicted():
     assert spread == pytest.approx(0.3)
 
 
-@pytest.mark.parametrize(
-    ("ratios", "answer"),
-    [
-        ([], 1.0),
-        ([1.3], 1.0),
-        ([1.3, 0.9], 1.0),
-        ([0.9, 1.3], 1.0),
-        ([1.1, 1.3], 1.1),
-        ([0.5, 1.3, 1.05], 1.05),
-    ],
-)
-def test_two_flights_in_a_row_that_were_worse_than_promised_count(ratios, answer):
-    runs = [experiment(0.8, 0.8 * ratio) for ratio in ratios]
-    assert over_promised([experiment(None), *runs, experiment(None), experiment(np.nan)]) == pytest.approx(
-        answer
-    )
-    # A flight that was cut has no quality.
-    assert over_promised([*runs, experiment(0.8, None)]) == pytest.approx(answer)
-
-
 def test_a_twin_that_has_promised_too_much_twice_must_promise_more_by_as_much():
     twice = [experiment(0.9, 1.0, 0.2), experiment(0.94, 1.0, 0.2)]
     assert chosen(0.9, experiments=twice)[0] == "tuned"
@@ -192,24 +169,6 @@ def test_who_has_no_track_record_is_taken_at_his_word():
     for against in ({"experiments": twice}, {"experiments": missed}, {"recorded": 1.1, "again": 1.2}):
         assert chosen(0.95, **against)[0] == "flown"
         assert chosen(0.95, **against, track_record=False)[0] == "tuned"
-
-
-@pytest.mark.parametrize(
-    ("runs", "answer"),
-    [
-        ([], True),
-        ([experiment(None)], True),
-        ([experiment(np.nan)], True),
-        ([experiment(0.981, 1.0, 0.01)], True),
-        ([experiment(0.979, 1.0, 0.01)], False),
-        ([experiment(0.98, None, 0.01)], False),
-        ([experiment(0.98, 1.0, None)], False),
-        ([experiment(0.5), experiment(1.0)], True),
-        ([experiment(1.0), experiment(0.5), experiment(None)], False),
-    ],
-)
-def test_the_last_flight_that_was_predicted_confirms_within_two_spreads(runs, answer):
-    assert confirmed(runs) is answer
 
 
 @pytest.mark.parametrize(
@@ -273,26 +232,3 @@ def test_no_other_family_has_starts_by_lqr():
         options=SMALL,
     )  # fmt: skip
     assert linear_gains(campaign.setup, Committee([None], np.zeros(2), True)) == []
-
-
-@pytest.mark.parametrize(
-    ("predicted", "spread", "quality", "true"),
-    [(1.0, 0.1, 1.19, True), (1.0, 0.1, 1.3, False), (1.0, 0.0, 1.05, True), (None, None, 1.0, False)],
-)
-def test_a_prediction_comes_true_within_two_spreads_or_a_tenth(predicted, spread, quality, true):
-    def flight(predicted, spread, quality, gain):
-        test = SimpleNamespace(predicted=predicted, spread=spread, genes=np.array([gain]))
-        return SimpleNamespace(test=test, quality=quality)
-
-    run = flight(predicted, spread, quality, 1.0)
-    unasked = SimpleNamespace(test=None, quality=5.0)
-    assert nearly_confirmed_in_a_row([run]) == nearly_confirmed_in_a_row([unasked, run]) == true
-    # One that missed ends the row; of what was not predicted nothing is said.
-    came_true = flight(1.0, 0.1, 1.0, 2.0)
-    in_a_row = 2 if true else int(predicted is None)
-    assert nearly_confirmed_in_a_row([came_true, run, unasked]) == in_a_row
-    assert nearly_confirmed_in_a_row([run, came_true]) == 1 + true
-    # Of gains that flew before the twin knows how they fly: that they do so again says nothing of others.
-    again, missed = flight(1.0, 0.1, 1.0, 1.0), flight(1.0, 0.1, 2.0, 1.0)
-    assert nearly_confirmed_in_a_row([run, again]) == true
-    assert nearly_confirmed_in_a_row([run, came_true, missed]) == 0

@@ -12,9 +12,9 @@ from twinloop import _core
 from twinloop._experiment.envelope import outside
 from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
-from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated, missed
+from twinloop.campaign.identify_and_plan.track_record import SURE, confirmed, over_promised, unproven_risk
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
@@ -24,10 +24,6 @@ from twinloop.planning.planner import Planner
 from twinloop.planning.proposal import Fared
 from twinloop.test import Test
 
-SURE = 2.0
-"""Spreads of a predicted quality that a flight may be off it and still confirm it."""
-NEARLY = 0.1
-"""Share of a quality by which a prediction may be off it and still have come true."""
 WORTH = 0.005
 """Share of a quality by which gains that have not flown must be better to be worth it."""
 UNKNOWN = "No controller to fly: "
@@ -230,7 +226,8 @@ class Choice:
     ) -> Test:
         predicted, spread = self._expected(test, recorded[:, :, pick])
         usages = judged.usages[:, :, pick]
-        least = max(self._fared(test).risk, self._moved(test).risk)
+        own = self._fared(test)
+        least = max(own.risk, self._moved(test).risk, unproven_risk(self.book.experiments, own, test.signals))
         return replace(test, predicted=predicted, measured=measured).explained(
             spread, max(risk(usages), least), reason
         )
@@ -263,74 +260,6 @@ def _reaches(alone: float, flown: Test) -> str:
     if flown.excitation is None:
         return f"{alone:.3g} was measured with these"
     return f"these, without the excitation of their flight, reach {alone:.3g}"
-
-
-def over_promised(experiments: Sequence[Experiment]) -> float:
-    """Ratio by which both of the last two flights that something was predicted of were worse; 1 if they were not.
-
-    Gains that are tuned on a twin are those that its errors flatter most. One flight that misses its prediction teaches
-    the twin; two in a row show that it is flattered again.
-
-    Args:
-        experiments: in the order of `tell`.
-    """
-    ratios = [
-        run.quality / predicted
-        for run, predicted in _predicted(experiments)
-        if run.quality is not None and np.isfinite(predicted) and predicted > 0.0
-    ]
-    return max(1.0, min(ratios[-2:])) if len(ratios) > 1 else 1.0
-
-
-def confirmed(experiments: Sequence[Experiment]) -> bool:
-    """Whether the last flight that something was predicted of came out as predicted; so where none was.
-
-    Args:
-        experiments: in the order of `tell`.
-    """
-    run = _last_predicted(experiments)
-    return run is None or _came_true(run, 0.0)
-
-
-def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
-    """How many of the last flights in a row came within two spreads of what was predicted, or a tenth of themselves.
-
-    Where nothing was predicted yet, nothing is confirmed. Gains that had flown before count only where they miss: the
-    twin has learnt how they fly, and what it says of others is not put to the test.
-
-    Args:
-        experiments: in the order of `tell`.
-    """
-    flown, count = set[bytes](), 0
-    for run in experiments:
-        if run.test is None:
-            continue
-        genes, predicted = run.test.genes.tobytes(), _predicted([run])
-        if predicted and not _came_true(run, NEARLY):
-            count = 0
-        elif predicted and genes not in flown:
-            count += 1
-        flown.add(genes)
-    return count
-
-
-def _predicted(experiments: Sequence[Experiment]) -> list[tuple[Experiment, float]]:
-    """Flights that something was predicted of, each with that."""
-    asked = [(run, run.test.predicted) for run in experiments if run.test is not None]
-    return [(run, predicted) for run, predicted in asked if predicted is not None and not np.isnan(predicted)]
-
-
-def _last_predicted(experiments: Sequence[Experiment]) -> Experiment | None:
-    found = _predicted(experiments)
-    return found[-1][0] if found else None
-
-
-def _came_true(run: Experiment, share: float) -> bool:
-    """Whether a quality was predicted, and came out within two spreads of that, or within a share of itself."""
-    test = run.test
-    if test is None or test.predicted is None or test.spread is None or run.quality is None:
-        return False
-    return bool(abs(test.predicted - run.quality) <= max(SURE * test.spread, share * run.quality))
 
 
 def off_start(book: Logbook) -> Floats | None:

@@ -20,11 +20,12 @@ from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
-from twinloop.campaign.identify_and_plan.choice import Choice, nearly_confirmed_in_a_row
+from twinloop.campaign.identify_and_plan.choice import Choice
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.learning import Learner, stands_in
 from twinloop.campaign.identify_and_plan.memory import Learnt, Memory
 from twinloop.campaign.identify_and_plan.starts import first_genes, known_gains, starts_of
+from twinloop.campaign.identify_and_plan.track_record import nearly_confirmed_in_a_row, unproven_risk
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
@@ -170,7 +171,9 @@ class IdentifyAndPlan:
         predicted, spread = gusts.added_to(found.predicted, found.spread)
         spread = calibrated(spread, predicted, book.experiments)
         own = standing.fared(book, found.genes, found.excitation is not None)
-        found = replace(found, predicted=predicted, spread=spread, risk=max(found.risk, own.risk, gusts.risk))
+        unproven = unproven_risk(book.experiments, own, self.setup.signals)
+        risk = max(found.risk, own.risk, gusts.risk, unproven)
+        found = replace(found, predicted=predicted, spread=spread, risk=risk)
         test = book.new_test(
             found.genes,
             excitation=found.excitation,

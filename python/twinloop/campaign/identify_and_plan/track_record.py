@@ -1,0 +1,102 @@
+"""Track record: what has come of the predictions of a campaign's flights, and what that is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop.campaign.history import Experiment
+from twinloop.planning.proposal import Fared
+from twinloop.signals import Signals
+
+SURE = 2.0
+"""Spreads of a predicted quality that a flight may be off it and still confirm it."""
+NEARLY = 0.1
+"""Share of a quality by which a prediction may be off it and still have come true."""
+UNPROVEN = 0.028
+"""Least risk of gains that have not flown, as long as no prediction has come true since the last one that did not: of
+88 second flights of the zoo and of machines outside it 2 left their envelopes, (2 + 1/2) / (88 + 1)."""
+
+
+def over_promised(experiments: Sequence[Experiment]) -> float:
+    """Ratio by which both of the last two flights that something was predicted of were worse; 1 if they were not.
+
+    Gains that are tuned on a twin are those that its errors flatter most. One flight that misses its prediction teaches
+    the twin; two in a row show that it is flattered again.
+
+    Args:
+        experiments: in the order of `tell`.
+    """
+    ratios = [
+        run.quality / predicted
+        for run, predicted in _predicted(experiments)
+        if run.quality is not None and np.isfinite(predicted) and predicted > 0.0
+    ]
+    return max(1.0, min(ratios[-2:])) if len(ratios) > 1 else 1.0
+
+
+def confirmed(experiments: Sequence[Experiment]) -> bool:
+    """Whether the last flight that something was predicted of came out as predicted; so where none was.
+
+    Args:
+        experiments: in the order of `tell`.
+    """
+    run = _last_predicted(experiments)
+    return run is None or _came_true(run, 0.0)
+
+
+def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
+    """How many of the last flights in a row came within two spreads of what was predicted, or a tenth of themselves.
+
+    Where nothing was predicted yet, nothing is confirmed. Gains that had flown before count only where they miss: the
+    twin has learnt how they fly, and what it says of others is not put to the test.
+
+    Args:
+        experiments: in the order of `tell`.
+    """
+    flown, count = set[bytes](), 0
+    for run in experiments:
+        if run.test is None:
+            continue
+        genes, predicted = run.test.genes.tobytes(), _predicted([run])
+        if predicted and not _came_true(run, NEARLY):
+            count = 0
+        elif predicted and genes not in flown:
+            count += 1
+        flown.add(genes)
+    return count
+
+
+def _predicted(experiments: Sequence[Experiment]) -> list[tuple[Experiment, float]]:
+    """Flights that something was predicted of, each with that."""
+    asked = [(run, run.test.predicted) for run in experiments if run.test is not None]
+    return [(run, predicted) for run, predicted in asked if predicted is not None and not np.isnan(predicted)]
+
+
+def _last_predicted(experiments: Sequence[Experiment]) -> Experiment | None:
+    found = _predicted(experiments)
+    return found[-1][0] if found else None
+
+
+def _came_true(run: Experiment, share: float) -> bool:
+    """Whether a quality was predicted, and came out within two spreads of that, or within a share of itself."""
+    test = run.test
+    if test is None or test.predicted is None or test.spread is None or run.quality is None:
+        return False
+    return bool(abs(test.predicted - run.quality) <= max(SURE * test.spread, share * run.quality))
+
+
+def unproven_risk(experiments: Sequence[Experiment], fared: Fared, signals: Signals) -> float:
+    """Least risk of a flight while nothing shows that the twin can foretell one; 0 of gains that have flown.
+
+    A law from one gentle flight may be wrong elsewhere in a way that no member of a committee shows.
+
+    Args:
+        experiments: in the order of `tell`.
+        fared: how the gains of the flight have fared.
+        signals: without an envelope nothing can leave one.
+    """
+    bounded = any(state.envelope is not None for state in signals.states)
+    proven = fared.flights > 0 or nearly_confirmed_in_a_row(experiments) > 0
+    return UNPROVEN if bounded and not proven else 0.0
