@@ -10,7 +10,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop.errors import engine_input
+from twinloop.signals import Signals
+
+
+def usages_of(signals: Signals, states: Floats) -> Floats:
+    """The most that any state uses of its envelope (n,); 0 where none is declared.
+
+    Args:
+        signals: of the system.
+        states: (n, n_x).
+    """
+    with engine_input():
+        return _core.usages(signals.engine, [state.envelope for state in signals.states], states)
 
 
 def outside(usages: Floats) -> NDArray[np.bool_]:

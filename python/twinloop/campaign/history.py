@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from twinloop import _core
-from twinloop._experiment.envelope import readings_leave
+from twinloop._experiment.envelope import readings_leave, usages_of
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.law.actuation import HiddenState
 from twinloop.objectives import normalised_error
 from twinloop.records import Record, Recorded, with_names
@@ -86,11 +84,7 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
 
     def _usages(self) -> Floats:
         """The most that any state used at each reading (n + 1,)."""
-        signals = self.replayed.signals
-        with engine_input():
-            return _core.usages(
-                signals.engine, [state.envelope for state in signals.states], self.trajectory.states
-            )
+        return usages_of(self.replayed.signals, self.trajectory.states)
 
 
 @dataclass(frozen=True)

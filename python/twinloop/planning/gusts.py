@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from twinloop import _core
-from twinloop._experiment.envelope import outside
+from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
-from twinloop.errors import engine_input
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
+from twinloop.planning.leaving import least_risk
 from twinloop.planning.quality import Quality
-from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -32,14 +32,12 @@ class Moved(NamedTuple):
     Args:
         bias: what they add to its quality on average; most flights are worse for them.
         spread: standard deviation of what they add.
-        left: of so many drawn flights, how many they drive out of the envelope, or make diverge.
-        drawn: number of these flights.
+        left: how many of the `DRAWS` flights they drive out of the envelope, or make diverge.
     """
 
     bias: float
     spread: float
     left: int = 0
-    drawn: int = DRAWS
 
     def added_to(self, predicted: float, spread: float) -> tuple[float, float]:
         """A quality that was predicted without disturbances, and its standard deviation, with them."""
@@ -47,11 +45,8 @@ class Moved(NamedTuple):
 
     @property
     def risk(self) -> float:
-        """Probability of leaving the envelope in them; 0 where no drawn flight does, which shows no more than others.
-
-        Half a flight is added on either side: few flights are no certainty.
-        """
-        return (self.left + 0.5) / (self.drawn + 1.0) if self.left else 0.0
+        """Least probability of leaving the envelope in them; 0 where no drawn flight does."""
+        return least_risk(self.left, DRAWS)
 
 
 UNMOVED = Moved(0.0, 0.0)
@@ -60,13 +55,13 @@ UNMOVED = Moved(0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class Gusts:
-    """Disturbances that are known, and who flies in them.
+    """Disturbances that are known, and the model that flies in them. All flights meet the same draws.
 
     Args:
         model: that is flown.
         noise: with the disturbances.
         quality: that is measured.
-        unit: of which the draws are a part: the same for all flights.
+        unit: of which the draws are a part.
         limits: where a run counts as diverged.
         workers: how the work is carried out.
     """
@@ -84,31 +79,43 @@ class Gusts:
         Args:
             test: to be flown.
         """
-        drawn = self.noise.disturbance(DRAWS // 2, test.steps, self.unit.stream("repeats"))
+        parts = test.genes, test.initial_state, test.target_state, test.excitation
+        flight = (test.steps, *(None if part is None else part.tobytes() for part in parts))
+        if flight not in self._flown:
+            self._flown[flight] = self._moved(test)
+        return self._flown[flight]
+
+    @cached_property
+    def _flown(self) -> dict[tuple[object, ...], Moved]:
+        """What they do to the flights that it was asked of so far."""
+        return {}
+
+    @cached_property
+    def _drawn(self) -> dict[int, Floats]:
+        """Draws (`DRAWS`, n, n_x), by the number of steps."""
+        return {}
+
+    def _moved(self, test: Test) -> Moved:
+        if test.steps not in self._drawn:
+            half = self.noise.disturbance(DRAWS // 2, test.steps, self.unit.stream("repeats"))
+            self._drawn[test.steps] = np.concatenate([half, -half])
+        drawn = self._drawn[test.steps]
         if not drawn.any():
             return UNMOVED
         still = np.zeros((1, *drawn.shape[1:]))
-        disturbance = np.concatenate([still, drawn, -drawn])
-        runs = drawn_runs(self.model, test, self.limits, disturbance=disturbance, workers=self.workers)
+        runs = drawn_runs(
+            self.model, test, self.limits, disturbance=np.concatenate([still, drawn]), workers=self.workers
+        )
         lasts = runs.lasted == test.steps
         if not lasts[0]:
             return UNMOVED
-        kept = [
-            not outside(_usages(test.signals, states)).any()
-            for states, whole in zip(runs.states[1:], lasts[1:], strict=True)
-            if whole
-        ]
+        lasting = runs.states[1:][lasts[1:]]
+        usages = usages_of(test.signals, lasting.reshape(-1, lasting.shape[2])).reshape(lasting.shape[:2])
+        left = DRAWS - len(lasting) + int(outside(usages).any(axis=1).sum())
         t = test.signals.dt * np.arange(test.steps + 1, dtype=np.float64)
         values = [
             self.quality.flown(Trajectory(t, states, commands), test.target_state)
-            for states, commands, whole in zip(runs.measured, runs.commands, lasts, strict=True)
-            if whole
+            for states, commands in zip(runs.measured[lasts], runs.commands[lasts], strict=True)
         ]
         added = np.array(values[1:] or values) - values[0]
-        return Moved(float(added.mean()), float(added.std()), DRAWS - sum(kept))
-
-
-def _usages(signals: Signals, states: Floats) -> Floats:
-    """Of the envelope, at each of some states (n + 1, n_x)."""
-    with engine_input():
-        return _core.usages(signals.engine, [state.envelope for state in signals.states], states)
+        return Moved(float(added.mean()), float(added.std()), left)

@@ -16,6 +16,7 @@ from twinloop._ground.streams import Unit
 from twinloop.controllers import Family
 from twinloop.flights import candidates, qualities
 from twinloop.planning.gusts import UNMOVED, Gusts, Moved
+from twinloop.planning.leaving import risk_of
 from twinloop.planning.quality import Quality
 from twinloop.test import Test
 
@@ -109,7 +110,7 @@ def risk(usages: Floats) -> float:
     Args:
         usages: of the envelope, any shape.
     """
-    return (float(outside(usages).sum()) + 0.5) / (usages.size + 1.0)
+    return risk_of(int(outside(usages).sum()), usages.size)
 
 
 def expected(qualities: Floats) -> tuple[float, float]:

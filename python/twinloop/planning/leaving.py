@@ -1,6 +1,23 @@
-"""Leaving: the risk of leaving the envelope in words, which never claim more than the predicted flights show."""
+"""Leaving: the risk of leaving the envelope, in numbers and in words that never claim more than the flights show."""
 
 from __future__ import annotations
+
+
+def risk_of(left: int, flights: int) -> float:
+    """Probability that the next flight leaves the envelope, as some have left it.
+
+    Half a flight is added on either side: few flights are no certainty.
+
+    Args:
+        left: how many left it, or did not end.
+        flights: how many there were.
+    """
+    return (left + 0.5) / (flights + 1.0)
+
+
+def least_risk(left: int, flights: int) -> float:
+    """The same as a lower bound beside what else is known: 0 where all have kept the envelope."""
+    return risk_of(left, flights) if left else 0.0
 
 
 def none_leaves(risk: float, flights: int | None) -> bool:

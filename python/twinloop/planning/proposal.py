@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from twinloop._ground.arrays import Floats
+from twinloop.planning.leaving import least_risk
 from twinloop.planning.seen import Seen
 
 
@@ -26,11 +27,8 @@ class Fared:
 
     @property
     def risk(self) -> float:
-        """Least probability that the next one does not keep the envelope: 0 where all have kept it.
-
-        Half a flight is added on either side: few flights are no certainty.
-        """
-        return (self.left + 0.5) / (self.flights + 1.0) if self.left else 0.0
+        """Least probability that the next one does not keep the envelope: 0 where all have kept it."""
+        return least_risk(self.left, self.flights)
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,11 +101,6 @@ class Choice:
     # Inside
 
     @cached_property
-    def _known_moves(self) -> dict[bytes, Moved]:
-        """What disturbances do to flights of gains, without excitation, that it was asked of so far."""
-        return {}
-
-    @cached_property
     def _worth(self) -> float:
         """Share of a quality by which tuned gains must be better: by more than predictions have missed of late."""
         least = missed(self.book.experiments) if self.planner.options.track_record else 0.0
@@ -136,8 +131,8 @@ class Choice:
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
             return "a model predicts that those preferred by the twin leave the envelope"
-        borne = 0 if flown is None else self._moved(flown).left
-        if self._moved(self.book.of_task(tuned, len(self.book.tests))).left > borne:
+        borne = 0 if flown is None else self._moved(flown.genes).left
+        if self._moved(tuned).left > borne:
             return "in disturbances as the flights felt them, those preferred by the twin leave the envelope"
         return ""
 
@@ -227,7 +222,9 @@ class Choice:
         predicted, spread = self._expected(test, recorded[:, :, pick])
         usages = judged.usages[:, :, pick]
         own = self._fared(test)
-        least = max(own.risk, self._moved(test).risk, unproven_risk(self.book.experiments, own, test.signals))
+        least = max(
+            own.risk, self._moved(test.genes).risk, unproven_risk(self.book.experiments, own, test.signals)
+        )
         return replace(test, predicted=predicted, measured=measured).explained(
             spread, max(risk(usages), least), reason
         )
@@ -238,16 +235,12 @@ class Choice:
 
     def _expected(self, test: Test, recorded: Floats) -> tuple[float, float]:
         """The quality to be measured of a flight, and its calibrated spread, disturbances included."""
-        predicted, spread = self._moved(test).added_to(*expected(recorded))
+        predicted, spread = self._moved(test.genes).added_to(*expected(recorded))
         return predicted, calibrated(spread, predicted, self.book.experiments)
 
-    def _moved(self, test: Test) -> Moved:
-        """What known disturbances do to the task's flight with the gains of a test, without excitation."""
-        genes = test.genes.tobytes()
-        if genes not in self._known_moves:
-            task = self.book.of_task(test.genes, test.number or 0)
-            self._known_moves[genes] = self.committee.moved_by_gusts(task)
-        return self._known_moves[genes]
+    def _moved(self, genes: Floats) -> Moved:
+        """What known disturbances do to the task's flight with some gains (size,), without excitation."""
+        return self.committee.moved_by_gusts(self.book.of_task(genes, len(self.book.tests)))
 
     def _judge(
         self, members: Sequence[_core.Model], genes: Floats, measured: bool = False, off: Floats | None = None
