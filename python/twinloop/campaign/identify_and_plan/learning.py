@@ -98,7 +98,8 @@ class Learner:
         """
         told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
         needed = () if asked is None else knowledge.needed_factors(asked)
-        identify = self._identification(book)
+        selected = learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
+        identify = self._identification(selected)
         answered = partial(
             Answer.of, flights=book.experiments, setup=self.setup, options=self.options, workers=self.workers
         )
@@ -112,7 +113,7 @@ class Learner:
         if not answer.explained and self.options.plain != self.options:
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + told), ROUGH)
             answer, two = self._of_two(answer, answered(rough, number=2), two, answered, book.experiments)
-        identified, lesson = answer.identified, self._lesson(answer, book)
+        identified, lesson = answer.identified, self._lesson(answer, book, selected)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
         )
@@ -145,9 +146,8 @@ class Learner:
         foretold = better_foretold(now.laws, flights, self.setup.limits, self.workers)
         return better_of(answer, rough, foretold), now
 
-    def _identification(self, book: Logbook) -> partial[Identified]:
-        """Identification of the flights that are learnt from; what it lacks are options and a number."""
-        selected = self._selected(book)
+    def _identification(self, selected: Sequence[Selected]) -> partial[Identified]:
+        """Identification of what is learnt from; what it lacks are options and a number."""
         return partial(
             identify_runs,
             [Run.of(states, commands) for one in selected for states, commands in one.recorded()],
@@ -159,15 +159,12 @@ class Learner:
             watch=self.watch,
         )
 
-    def _selected(self, book: Logbook) -> list[Selected]:
-        return learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
-
     def _axes(self) -> list[Direction]:
         """Directions in which the controller's axes move alike commands, as its mixer says."""
         mixer = self.setup.mixer
         return [] if mixer is None else of_mixer(mixer.matrix, self.setup.signals)
 
-    def _lesson(self, answer: Answer, book: Logbook) -> Lesson:
+    def _lesson(self, answer: Answer, book: Logbook, selected: Sequence[Selected]) -> Lesson:
         identified, follows = answer.identified, answer.follows
         noise = identified.noise(self.setup.signals)
         free = free_errors(identified.members[0], book, self.workers, noise)
@@ -200,7 +197,7 @@ class Learner:
             follows=follows,
             remarks=(
                 *identified.remarks,
-                *shortened(self._selected(book), signals.dt),
+                *shortened(selected, signals.dt),
                 *stand_ins(actuation, signals, explained),
                 *diagnostics_of(
                     book.experiments,
