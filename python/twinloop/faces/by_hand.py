@@ -257,9 +257,8 @@ def _campaign(store: str, threads: int | None = None) -> Campaign:
     file = file_beside(store)
     if file is not None and file.exists():
         begun = file.with_suffix(".db")
-        if (
-            begun.exists() and not Path(store).exists()
-        ):  # a name that was mistyped must not begin a second campaign
+        # A name that was mistyped must not begin a second campaign.
+        if begun.exists() and not Path(store).exists():
             raise InvalidInput(
                 f"Store {store}: expected {begun}, which has the campaign of {file}, found another name; for another"
                 " campaign, copy the file."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -63,10 +64,9 @@ def chosen(campaign: Campaign, which: str) -> int | Experiment:
     """
     if which.isdecimal():
         return int(which)
-    attached = [run for run in campaign.experiments if run.attached]
-    place = ATTACHED.fullmatch(which)
-    if place is not None and 0 < int(place[1]) <= len(attached):
-        return attached[int(place[1]) - 1]
+    attached, place = _attached(campaign), ATTACHED.fullmatch(which)
+    if place is not None and (found := attached.get(_attached_name(int(place[1])))):
+        return found
     if place is None and Path(which).is_file():
         run = load(Path(which), campaign.signals)
         equal = [each for each in campaign.experiments if equal_runs(run, each.trajectory)]
@@ -98,10 +98,9 @@ def recorded(campaign: Campaign) -> dict[str, str]:
         for test in campaign.tests
         if (status := campaign.status(test)) in ("flown", "aborted", "failed")
     }
-    attached = (run for run in campaign.experiments if run.attached)
     flights = {
-        f"attached-{i}": f"attached flight {i} ({run.replayed.steps} steps)"
-        for i, run in enumerate(attached, start=1)
+        name: f"{name.replace('-', ' flight ')} ({run.replayed.steps} steps)"
+        for name, run in _attached(campaign).items()
     }
     return dict(reversed({**flights, **tests}.items()))
 
@@ -130,8 +129,17 @@ def given_up_words(campaign: Campaign) -> list[str]:
     ]
 
 
-def _names(attached: list[Experiment]) -> str:
+def _attached(campaign: Campaign) -> dict[str, Experiment]:
+    """Attached flights, attached-1 first."""
+    runs = [run for run in campaign.experiments if run.attached]
+    return {_attached_name(place): run for place, run in enumerate(runs, start=1)}
+
+
+def _attached_name(place: int) -> str:
+    return f"attached-{place}"
+
+
+def _names(attached: Mapping[str, Experiment]) -> str:
     if not attached:
         return "attached-N for an attached flight (there is none)"
-    runs = (f"attached-{i} ({run.replayed.steps} steps)" for i, run in enumerate(attached, start=1))
-    return ", ".join(runs)
+    return ", ".join(f"{name} ({run.replayed.steps} steps)" for name, run in attached.items())
