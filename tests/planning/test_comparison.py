@@ -265,7 +265,7 @@ def test_a_task_that_leads_far_may_be_reached_and_is_no_reason_to_go_further():
     np.testing.assert_allclose(bounds, [[-0.8, -2.5], [3.8, 2.5]])
 
 
-def test_a_candidate_that_known_disturbances_drive_out_oftener_than_the_flown_gains_gives_way_to_the_next():
+def test_a_candidate_that_known_disturbances_drive_out_more_often_than_the_flown_gains_gives_way_to_the_next():
     chosen = compared(goal="both").proposal()
 
     def blown(left_of_chosen, left_of_flown):

@@ -206,7 +206,7 @@ class Comparison:
         return None
 
     def _bears_gusts(self, candidate: int) -> bool:
-        """Whether known disturbances drive a candidate out of the envelope no oftener than the best gains flown."""
+        """Whether known disturbances drive a candidate out of the envelope no more often than the best gains flown."""
         drafts = self.drafts
         start, target = (states[candidate] for states in drafts.ends)
         test = self.judge.test(drafts.genes[candidate], start, target, drafts.excitation[candidate])
