@@ -209,6 +209,13 @@ fn near(found: f64, expected: f64, scale: f64) -> bool {
     (found - expected).abs() <= 1e-7 * (scale + expected.abs())
 }
 
+/// Whether no feature is nearly a sum of the others.
+fn independent(gram: &Gram) -> bool {
+    let row = |i: usize| (0..FEATURES).map(|j| gram.product(i, j)).collect::<Vec<_>>();
+    let (_, determinant) = solved(&(0..FEATURES).map(row).collect::<Vec<_>>(), &vec![vec![]; FEATURES]);
+    determinant.abs() > 1e-6 * (0..FEATURES).map(|i| gram.product(i, i)).product::<f64>()
+}
+
 proptest! {
     #[test]
     fn inner_products_are_those_of_one_big_normal_distribution(case in case()) {
@@ -250,9 +257,9 @@ proptest! {
             all.iter().map(|&i| (all.iter().map(|&j| gram.product(i, j)).collect::<Vec<_>>(), right(i))).unzip()
         };
         let (matrix, right) = rows(&|i| vec![gram.product(i, FEATURES)]);
-        let (expected, determinant) = solved(&matrix, &right);
+        let (expected, _) = solved(&matrix, &right);
         // Where features are collinear, both lose the digits.
-        prop_assume!(determinant.abs() > 1e-6 * (0..FEATURES).map(|i| matrix[i][i]).product::<f64>());
+        prop_assume!(independent(&gram));
         let identity = |i: usize| (0..FEATURES).map(|j| f64::from(u8::from(i == j))).collect();
         let (inverse, _) = solved(&matrix, &rows(&identity).1);
         for i in 0..FEATURES {
@@ -269,6 +276,8 @@ proptest! {
     #[test]
     fn annealing_finds_the_best_of_all_subsets(case in case(), price in 0.1..20.0_f64, seed in any::<u64>()) {
         let gram = Gram::new(&case.chain, &[case.record()], FEATURES, &case.noise, &one_worker());
+        // What is nearly collinear annealing does not enter, and what least squares make of it is rounding.
+        prop_assume!(independent(&gram));
         let choices = Choices::new(&gram, &[price, 0.5 * price, 2.0 * price]);
         let annealing = Annealing { moves: 400, largest: FEATURES, coldest: 2.0 }.validated().unwrap();
         let mut stream = Stream::new(seed, Purpose::Subsets, 0, 0, 0);
