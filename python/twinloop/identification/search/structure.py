@@ -148,33 +148,60 @@ def search(
         A sum for each chain.
     """
     usable = problem.usable(list(dict.fromkeys([*terms, *(t for s in known if s for t in s.weights)])))
-    costs = [
-        prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere, out)
-        for chain, elsewhere, out in zip(
-            chains, favoured or [{}] * len(chains), forbidden or [set()] * len(chains), strict=True
+    columns = problem.values(usable)
+    searched = [
+        _Searched(
+            chain,
+            problem.regression(chain, columns),
+            before,
+            prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere, out),
+            precisions(problem, chain, usable),
+        )
+        for chain, before, elsewhere, out in zip(
+            chains, known, favoured or [{}] * len(chains), forbidden or [set()] * len(chains), strict=True
         )
     ]
-    columns = problem.values(usable)
-    regressions = [problem.regression(chain, columns) for chain in chains]
-    priors = [precisions(problem, chain, usable) for chain in chains]
-    current = list(chains)
+    unsettled = searched
     for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
-        grams = [
-            r.gram(c.sensors, c.motion, problem.workers).with_prior(prior)
-            for r, c, prior in zip(regressions, current, priors, strict=True)
-        ]
-        subsets = _chosen(problem, usable, chains, known, grams, costs, _walk_of(walks, round_, problem))
-        coefficients = [judged[0].spread(len(usable)) for judged in subsets]
+        found = _chosen(problem, usable, unsettled, _walk_of(walks, round_, problem))
+        for one, subsets in zip(unsettled, found, strict=True):
+            one.subsets = subsets
         if fixed_noise:
             break
-        before, used = current, [len(judged[0].features) for judged in subsets]
-        current = _noisy(problem, regressions, coefficients, before, used)
-        if not any(_differ(*pair, problem) for pair in zip(current, before, strict=True)):
+        noisy = _noisy(problem, unsettled, len(usable))
+        moved = [_differ(chain, one.chain, problem) for one, chain in zip(unsettled, noisy, strict=True)]
+        for one, chain in zip(unsettled, noisy, strict=True):
+            one.chain = chain
+        # Chains share nothing but their features: one whose noise has settled waits for no other.
+        unsettled = [one for one, again in zip(unsettled, moved, strict=True) if again]
+        if not unsettled:
             break
-    return [
-        _sum(problem, usable, *of_chain)
-        for of_chain in zip(subsets, current, regressions, costs, priors, strict=True)
-    ]
+    return [_sum(problem, usable, one) for one in searched]
+
+
+@dataclass(eq=False)
+class _Searched:
+    """What is searched for one chain, and what has been found.
+
+    Args:
+        chain: with the noise that the last round has left.
+        regression: of all terms.
+        known: a sum to do no worse than, or None.
+        costs: of the terms, in units of χ².
+        prior: precisions of their coefficients.
+        subsets: of the last round, the best first.
+    """
+
+    chain: Chain
+    regression: _core.Regression
+    known: Sum | None
+    costs: Floats
+    prior: Floats
+    subsets: list[Judged] = field(default_factory=list)
+
+    def gram(self, workers: _core.Workers) -> _core.Gram:
+        """Inner products under its noise."""
+        return self.regression.gram(self.chain.sensors, self.chain.motion, workers).with_prior(self.prior)
 
 
 def _walk_of(walks: Walks, round_: int, problem: Problem) -> Walk:
@@ -188,38 +215,24 @@ def _walk_of(walks: Walks, round_: int, problem: Problem) -> Walk:
     return walk
 
 
-def _sum(
-    problem: Problem,
-    usable: Sequence[int],
-    judged: Sequence[Judged],
-    chain: Chain,
-    regression: _core.Regression,
-    costs: Floats,
-    prior: Floats,
-) -> Sum:
-    """The best of some subsets as a sum under a chain's noise, with the others beside it."""
-    best = judged[0]
+def _sum(problem: Problem, usable: Sequence[int], searched: _Searched) -> Sum:
+    """The best subset of a chain as a sum under its noise, with the others beside it."""
+    best, *behind = searched.subsets
     others = [
         Other(tuple(usable[j] for j in other.features), max(0.0, other.length - best.length))
-        for other in judged[1:OTHERS]
+        for other in behind[: OTHERS - 1]
     ]
-    coefficients = best.spread(len(usable))
-    score = regression.likelihood(coefficients, chain.sensors, chain.motion)
-    score += float((prior * np.square(coefficients)).sum())
+    chain, coefficients = searched.chain, best.spread(len(usable))
+    score = searched.regression.likelihood(coefficients, chain.sensors, chain.motion)
+    score += float((searched.prior * np.square(coefficients)).sum())
     rung = RUNG * problem.pool.rung(usable[j] for j in best.features)
-    length = rung + score + float(costs[list(best.features)].sum())
+    length = rung + score + float(searched.costs[list(best.features)].sum())
     weights = {usable[j]: float(w) for j, w in zip(best.features, best.weights, strict=True)}
     return Sum(weights, length, chain, others)
 
 
 def _chosen(
-    problem: Problem,
-    usable: Sequence[int],
-    chains: Sequence[Chain],
-    known: Sequence[Sum | None],
-    grams: Sequence[_core.Gram],
-    costs: Sequence[Floats],
-    walk: Walk,
+    problem: Problem, usable: Sequence[int], searched: Sequence[_Searched], walk: Walk
 ) -> list[list[Judged]]:
     """For each chain what walks find and what was known, the best first; none that predicts a reading by its own noise.
 
@@ -230,43 +243,45 @@ def _chosen(
     """
     place = {term: i for i, term in enumerate(usable)}
 
-    def best(i: int, gram: _core.Gram, walked: Subsets) -> list[Judged]:
+    def best(one: _Searched, gram: _core.Gram, walked: Subsets) -> list[Judged]:
         """What the walks of a chain have found, and what was known of it, the best first."""
-        subsets, before = [tuple(subset) for subset, _ in walked], known[i]
-        if before is not None and all(term in place for term in before.weights):
-            subsets.append(tuple(sorted(place[term] for term in before.weights)))
+        subsets = [tuple(subset) for subset, _ in walked]
+        if one.known is not None and all(term in place for term in one.known.weights):
+            subsets.append(tuple(sorted(place[term] for term in one.known.weights)))
         return sorted(
-            all_judged(gram, subsets, costs[i], problem.limits(chains[i], usable)),
+            all_judged(gram, subsets, one.costs, problem.limits(one.chain, usable)),
             key=lambda found: (
                 found.length + RUNG * problem.pool.rung(usable[j] for j in found.features),
                 found.features,
             ),
         )
 
-    walks = walk(grams, costs, 0)
-    subsets = [best(i, gram, walked) for i, (gram, walked) in enumerate(zip(grams, walks, strict=True))]
-    for i, (chain, gram) in enumerate(zip(chains, grams, strict=True)):
+    grams = [one.gram(problem.workers) for one in searched]
+    walks = walk(grams, [one.costs for one in searched], 0)
+    chosen = [best(*of_chain) for of_chain in zip(searched, grams, walks, strict=True)]
+    for i, (one, gram) in enumerate(zip(searched, grams, strict=True)):
+        chain = one.chain
         if (
             chain.form != "acceleration"
-            or _feedthrough(problem, chain, usable, subsets[i][0]) <= MOST_FEEDTHROUGH
+            or _feedthrough(problem, chain, usable, chosen[i][0]) <= MOST_FEEDTHROUGH
         ):
             continue
         rows = problem.feedthrough(chain, usable)
         for attempt, price in enumerate(FEEDTHROUGH_PRICES):
             with engine_input():
                 dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
-            (walked,) = walk([dear], [costs[i]], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
+            (walked,) = walk([dear], [one.costs], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
             # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
             found = [
                 law
                 for of in (gram, dear)
-                for law in best(i, of, walked)
+                for law in best(one, of, walked)
                 if _feedthrough(problem, chain, usable, law) <= MOST_FEEDTHROUGH
             ]
             if found:
-                subsets[i] = found
+                chosen[i] = found
                 break
-    return subsets
+    return chosen
 
 
 def _feedthrough(problem: Problem, chain: Chain, usable: Sequence[int], judged: Judged) -> float:
@@ -277,30 +292,24 @@ def _feedthrough(problem: Problem, chain: Chain, usable: Sequence[int], judged: 
     return float((shares * judged.weights).sum())
 
 
-def _noisy(
-    problem: Problem,
-    regressions: Sequence[_core.Regression],
-    coefficients: Sequence[Floats],
-    chains: Sequence[Chain],
-    used: Sequence[int],
-) -> list[Chain]:
+def _noisy(problem: Problem, searched: Sequence[_Searched], terms: int) -> list[Chain]:
     """The chains with the noise under which residuals are most likely, corrected for the degrees of freedom used."""
     posed = [
         (
-            regression,
-            found,
-            chain.sensors,
-            chain.motion,
-            *floor_of(chain, problem.dt, problem.integration(chain)),
+            one.regression,
+            one.subsets[0].spread(terms),
+            one.chain.sensors,
+            one.chain.motion,
+            *floor_of(one.chain, problem.dt, problem.integration(one.chain)),
         )
-        for regression, found, chain in zip(regressions, coefficients, chains, strict=True)
+        for one in searched
     ]
     with engine_input():
         noises = _core.most_likely_noises(posed, problem.workers)
     noisy = []
-    for chain, terms, (sensors, motion, _) in zip(chains, used, noises, strict=True):
-        readings = problem.readings(chain)
-        noisy.append(chain.with_noise(sensors * readings / max(1.0, readings - terms), motion))
+    for one, (sensors, motion, _) in zip(searched, noises, strict=True):
+        readings, used = problem.readings(one.chain), len(one.subsets[0].features)
+        noisy.append(one.chain.with_noise(sensors * readings / max(1.0, readings - used), motion))
     return noisy
 
 
