@@ -46,8 +46,11 @@ fn squares<const D: usize>(chain: &Chain, whitening: &Whitening, residual: &[f64
 const STEPS: [f64; 5] = [100.0, 10.0, 3.0, 1.5, 1.15];
 /// What a move must gain: where a variance makes no difference, what rounding takes depends on the readings' units.
 const GAIN: f64 = 1e-6;
-/// Times that all of them are gone through: where one variance began far too large, the others are small after the first.
+/// Times at most that all of them are gone through: where one variance began far too large, the others are small after
+/// the first.
 const LADDERS: usize = 3;
+/// Factors from which on a move is so long that the others are gone through once more.
+const LEAP: f64 = 10.0;
 
 /// Periods between which a disturbance is said to be correlated: shorter than this it is white.
 const BRIEFEST_MEMORY: f64 = 3.0;
@@ -72,7 +75,7 @@ pub fn most_likely_noise(
     best.correlation_time = best.correlation_time.min(longest);
     let mut score = likelihood(chain, records, residuals, &best);
     for _ in 0..LADDERS {
-        let before = score;
+        let mut leapt = false;
         for step in STEPS {
             for _ in 0..8 {
                 let mut moved = false;
@@ -97,15 +100,17 @@ pub fn most_likely_noise(
                         let found = likelihood(chain, records, residuals, &tried);
                         if found < score - GAIN {
                             (best, score, moved) = (tried, found, true);
+                            break;
                         }
                     }
                 }
                 if !moved {
                     break;
                 }
+                leapt |= step >= LEAP;
             }
         }
-        if before - score < 0.1 {
+        if !leapt {
             break;
         }
     }
