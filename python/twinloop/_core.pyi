@@ -71,6 +71,7 @@ __all__ = [
     "ideal_point",
     "instability",
     "k_step",
+    "linearised",
     "log",
     "most_likely_noises",
     "open_loop",
@@ -693,6 +694,19 @@ def tune(
     Returns it with χ² (infinite where it diverges), readings that counted, the covariance of what was free, each
     value being known to its own size beforehand, and members drawn from that as far as the records bear them.
     """
+
+def linearised(
+    model: Model,
+    limits: Limits,
+    chains: Sequence[_Chain],
+    records: Sequence[_Record],
+    *,
+    free: Sequence[int],
+    lags: Sequence[Sequence[int]],
+    workers: Workers | None = None,
+) -> Gram | None:
+    """Inner products of the slopes of whitened prediction errors by what is free, as `tune` has it, and of minus the
+    errors: a regression on them is a step of Gauss and Newton. None where the model diverges."""
 
 def predictions(
     model: Model,

@@ -335,6 +335,7 @@ def calls(world):
                 "unit": (0, "subsets", [0]),
             },
         ),
+        "linearised": (_core.linearised, {**recorded, "free": [w.n_x - 1], "lags": [[w.n_u - 1]]}),
         "predictions": (_core.predictions, recorded),
         "ranks": (_core.ranks, {"objectives": w.objectives}),
         "crowding_distances": (
@@ -611,6 +612,7 @@ ALONE = {
     ("Model", "signals"),
     ("Flights", "setting"),
     ("tune", "model"),
+    ("linearised", "model"),
     ("predictions", "model"),
     ("ModelSearch.start", "selected"),
     ("ModelSearch.restored", "signals"),

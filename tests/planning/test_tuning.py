@@ -394,6 +394,23 @@ def test_predictions_are_those_of_a_plain_loop_and_a_reading_that_does_not_count
     assert left == pytest.approx((errors**2).sum(), rel=1e-9) and counted == 120
 
 
+def test_errors_to_the_first_order_are_those_of_plain_differences():
+    records, values = [flown(1), flown(2)], (-1.2, 1.9, 0.1)
+    gram = _core.linearised(lagging(*values), LIMITS, CHAIN, records, free=[0, 1], lags=[[0]])
+    left = residuals(values, records)
+    slopes = [
+        (residuals(np.array(values) + step, records) - left) / step.sum() for step in np.diag([1e-6] * 3)
+    ]
+    for columns in ([], [1], [0, 2], [0, 1, 2]):
+        chosen = np.array([slopes[j] for j in columns]).reshape(-1, len(left)).T
+        expected, *_ = np.linalg.lstsq(chosen, -left, rcond=None)
+        step, _, chi_squared = gram.solve(columns)
+        np.testing.assert_allclose(step, expected, rtol=1e-3)
+        assert chi_squared == pytest.approx(np.square(left + chosen @ expected).sum(), rel=1e-5)
+    assert gram.features == 3 and gram.readings == 242
+    assert _core.linearised(lagging(40.0, 2.0, 0.1), LIMITS, CHAIN, records, free=[0], lags=[]) is None
+
+
 def test_a_gust_that_is_predicted_is_that_of_a_kalman_filter():
     """speed' = u + g under a gust g that lasts: state and gust are filtered together."""
     signals = _core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None])

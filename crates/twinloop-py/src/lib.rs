@@ -67,7 +67,7 @@ mod _core {
     #[pymodule_export]
     use crate::setting::{PyLimits, PySetting};
     #[pymodule_export]
-    use crate::tuning::{predictions, tune};
+    use crate::tuning::{linearised, predictions, tune};
     #[pymodule_export]
     use crate::workers::{PyWorkers, vector_widths};
     #[pymodule_export]

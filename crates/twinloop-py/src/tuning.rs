@@ -1,5 +1,7 @@
 //! Tuning of a model's constants on recorded runs.
 
+use std::sync::Arc;
+
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use twinloop_core::{Chain, Learnt, Noise, Observed, Predictions, Recorded, Signals, Tuning};
@@ -7,6 +9,7 @@ use twinloop_core::{Chain, Learnt, Noise, Observed, Predictions, Recorded, Signa
 use crate::arrays::{Matrix, finite, rows, to_matrix};
 use crate::error::{Result, misuse};
 use crate::model::PyModel;
+use crate::regression::PyGram;
 use crate::rng::Name;
 use crate::setting::PyLimits;
 use crate::workers::{PyWorkers, or_default};
@@ -104,6 +107,38 @@ pub fn tune<'py>(
     let finished = PyModel(model.0.varied(&tuned.constants, &tuned.lags)?);
     let covariance = to_matrix(py, free.len() + lags.len(), tuned.covariance);
     Ok((finished, tuned.chi_squared, tuned.readings, covariance, members))
+}
+
+/// A regression on the slopes of prediction errors by free constants and lags; none where the model diverges.
+#[pyfunction]
+#[pyo3(signature = (model, limits, chains, records, *, free, lags, workers = None))]
+#[expect(clippy::too_many_arguments, reason = "what tuning needs, named by keyword in Python")]
+pub fn linearised<'py>(
+    py: Python<'py>,
+    model: &PyModel,
+    limits: &PyLimits,
+    chains: Chains,
+    records: Records<'py>,
+    free: Vec<usize>,
+    lags: Vec<Vec<usize>>,
+    workers: Option<&PyWorkers>,
+) -> Result<Option<PyGram>> {
+    let workers = or_default(workers)?;
+    let signals = fitting(model, limits)?;
+    let observer = observer(chains, signals.dt)?;
+    let records = recorded(&records, signals.states(), signals.commands())?;
+    let core = model.0.view();
+    let tuning = Tuning {
+        code: core.code,
+        frame: core.frame,
+        observer: &observer,
+        records: &records,
+        limits: &limits.0,
+        free: &free,
+        lags: &lags,
+    };
+    tuning.check()?;
+    Ok(py.detach(|| tuning.linearised(&workers)).map(|gram| PyGram(Arc::new(gram))))
 }
 
 /// Whitened prediction errors (n + 1, n_x), and states (n + 1, n_x) and correlated disturbances (n + 1, chains) once each

@@ -125,6 +125,22 @@ pub struct Solution {
 const BLOCK: usize = 8;
 
 impl Gram {
+    /// Of columns whose inner products are known: with each other (features × features), with what they are to explain,
+    /// and of that with itself.
+    pub(crate) fn of(products: &[f64], targets: &[f64], total: f64, readings: usize) -> Self {
+        let features = targets.len();
+        let rows = targets.iter().enumerate();
+        let mut all: Vec<f64> = rows
+            .flat_map(|(j, target)| {
+                products[j * features..][..features].iter().chain(std::iter::once(target))
+            })
+            .copied()
+            .collect();
+        all.extend_from_slice(targets);
+        all.push(total);
+        Self { features, products: all, readings }
+    }
+
     /// Of all records.
     pub fn new(chain: &Chain, records: &[Record], features: usize, noise: &Noise, workers: &Workers) -> Self {
         let whitenings = Record::whitenings(chain, records, noise);

@@ -44,8 +44,12 @@ impl Tuning<'_> {
         {
             open = covariance(&curvature, &self.values(&best)).unwrap_or_default();
         }
-        let readings =
-            self.records.iter().map(|record| record.weights.iter().filter(|&&w| w > 0.0).count()).sum();
-        Tuned { constants: best.constants, lags: best.lags, chi_squared, readings, covariance: open }
+        Tuned {
+            constants: best.constants,
+            lags: best.lags,
+            chi_squared,
+            readings: self.readings(),
+            covariance: open,
+        }
     }
 }

@@ -76,6 +76,11 @@ pub struct Tuned {
 }
 
 impl Tuning<'_> {
+    /// Readings that count.
+    fn readings(&self) -> usize {
+        self.records.iter().map(|record| record.weights.iter().filter(|&&w| w > 0.0).count()).sum()
+    }
+
     /// Refuses parts that do not fit each other.
     pub fn check(&self) -> Result<()> {
         let states = self.limits.signals().states();

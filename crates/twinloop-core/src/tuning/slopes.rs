@@ -4,14 +4,25 @@ use super::Tuning;
 use super::observer::{LANES, Part};
 use super::variant::Variant;
 use crate::lanes::dispatch;
-use crate::regression::Whitening;
+use crate::regression::{Gram, Whitening};
 use crate::workers::Workers;
 
 /// Relative step of a finite difference.
 const STEP: f64 = 1e-6;
 
 impl Tuning<'_> {
+    /// Prediction errors to the first order of what is free: a regression on their slopes of what these have to make up
+    /// for. None if a variant diverges.
+    pub fn linearised(&self, workers: &Workers) -> Option<Gram> {
+        let (whitenings, at) = (self.whitenings(), self.start());
+        let total = self.costs(&whitenings, std::slice::from_ref(&at), workers)[0];
+        let (gradient, curvature) = self.normal(&whitenings, &at, workers)?;
+        let missing: Vec<f64> = gradient.iter().map(|slope| -slope).collect();
+        Some(Gram::of(&curvature, &missing, total, self.readings()))
+    }
+
     /// Gradient and curvature (Gauss and Newton) of half of χ²; none if a variant diverges.
+    #[inline(never)]
     pub(super) fn normal(
         &self,
         whitenings: &[Vec<Whitening>],

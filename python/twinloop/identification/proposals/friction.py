@@ -6,7 +6,7 @@ finds such a term: it is added to what is known, tuned on predictions, and judge
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.identification.context import Context
@@ -15,13 +15,13 @@ from twinloop.identification.fit.alternation import by_innovations
 from twinloop.identification.fit.fitting import fitted, with_fit
 from twinloop.identification.fit.models import model_of
 from twinloop.identification.fit.predictions import smoothed
-from twinloop.identification.fit.tuning import tune
+from twinloop.identification.fit.tuning import promises, tune
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.second_look import looked_again
 from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import posed
-from twinloop.identification.search.structure import Sum, priced
+from twinloop.identification.search.structure import Sum, priced, prices
 from twinloop.identification.sensors.noise import RIDGE, calm
 from twinloop.identification.terms.friction import entered, frictions, frictions_in
 
@@ -29,10 +29,10 @@ WORTH = 20.0
 """What friction must gain, in units of χ², beside its price: as much as a rung of the ladder."""
 ROUNDS = 4
 """Times that each equation may get one more term."""
-FEW_STEPS = 2
-"""Of the tuning, by which it is seen which terms may pay: the first steps gain most."""
 FINALISTS = 3
-"""Terms of each equation, the best ones after these, that are tuned to the end."""
+"""Terms of each equation, those that promise most, that are tuned."""
+PROMISE = 0.5
+"""Share of its price that a term has to promise: small weights of what is steep tell less than large ones."""
 
 
 def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -42,13 +42,16 @@ def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         return
     problem = posed(context, hypothesis)
     # Friction would evade the bounds of the speed that it is made of.
-    if problem.priors.bounds or hypothesis.form == "absolute" or _still(problem, hypothesis):
+    if problem.priors.bounds or hypothesis.form == "absolute":
+        return
+    bases = [] if _still(problem, hypothesis) else [hypothesis]
+    terms = [term for found in hypothesis.sums for term in found.weights]
+    # Terms of higher rungs and evolved ones may stand in for friction: it is looked for beside few terms, too.
+    beside_few = bool(hypothesis.from_above) and hypothesis.pool.rung(terms) > 0
+    if not bases and not beside_few:
         return
     context.watch("terms")
-    bases = [hypothesis]
-    terms = [term for found in hypothesis.sums for term in found.weights]
-    if hypothesis.from_above and hypothesis.pool.rung(terms) > 0:
-        # Terms of higher rungs and evolved ones may stand in for friction: it is looked for beside few terms, too.
+    if beside_few:
         few = fitted(context, replace(hypothesis, sums=hypothesis.from_above, fit=None))
         bases += [few] if few.evidence.stable else []
     found = [other for other in (_with_friction(context, base) for base in bases) if _rubs(other)]
@@ -104,13 +107,19 @@ def _with_one_more(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         grown = replace(best, candidates=best.candidates.growing())
         problem = posed(context, grown)
         if calm(problem, known.chain) is not known.chain:
-            nodes = _offered(context, problem, known)
-            screened = [(_tuned(context, problem, grown, i, node, FEW_STEPS), node) for node in nodes]
-            screened.sort(key=lambda found: _described(found[0]))
-            full = context.options.tuning_steps
-            finalists = [_tuned(context, problem, grown, i, node, full) for _, node in screened[:FINALISTS]]
-            best = shortest([best, *finalists], _described)
+            nodes = _promising(context, grown, i, _offered(context, problem, known))
+            tuned = [_tuned(context, problem, grown, i, node) for node in nodes]
+            best = shortest([best, *tuned], _described)
     return best
+
+
+def _promising(context: Context, hypothesis: Hypothesis, i: int, nodes: Sequence[int]) -> list[int]:
+    """Those of some terms that promise most for a sum, the best first."""
+    assert hypothesis.fit is not None
+    lacking = PROMISE * prices(hypothesis.pool, nodes, hypothesis.fit.readings, len(hypothesis.runs))
+    lacking -= promises(context, hypothesis, i, nodes)
+    order = sorted(range(len(nodes)), key=lambda place: (lacking[place], place))
+    return [nodes[place] for place in order[:FINALISTS] if lacking[place] < 0.0]
 
 
 def _offered(context: Context, problem: Problem, known: Sum) -> list[int]:
@@ -133,9 +142,7 @@ def _described(hypothesis: Hypothesis) -> float:
     )
 
 
-def _tuned(
-    context: Context, problem: Problem, hypothesis: Hypothesis, i: int, node: int, steps: int
-) -> Hypothesis:
+def _tuned(context: Context, problem: Problem, hypothesis: Hypothesis, i: int, node: int) -> Hypothesis:
     """The hypothesis with one more term in a sum, tuned with the noise that it had; itself where that is singular."""
     assert hypothesis.fit is not None
     known, sums = hypothesis.sums[i], list(hypothesis.sums)
@@ -148,5 +155,7 @@ def _tuned(
     sums[i] = replace(known, weights=dict(zip(terms, map(float, solved[0]), strict=True)), others=[])
     candidates = hypothesis.candidates.with_terms([node])
     more = replace(hypothesis, candidates=candidates, sums=tuple(sums), fit=None)
-    fit, _ = tune(context, more, model_of(context, more), hypothesis.fit.observer, steps)
+    fit, _ = tune(
+        context, more, model_of(context, more), hypothesis.fit.observer, context.options.tuning_steps
+    )
     return with_fit(more, fit)
