@@ -149,6 +149,8 @@ def _with_all_terms(context: Context, screen: _Screen, found: Hypothesis) -> Hyp
 class _Screen:
     """Tries hidden states by short searches among few terms: those that there are, and each hidden state alone.
 
+    The noise stays what it is without them, so which one explains most of what is left is told by χ² alone.
+
     Args:
         context: of the identification.
         hypothesis: with the hidden states' nodes in its pool.
@@ -195,7 +197,8 @@ class _Screen:
             self.unit.part(next(self.numbers)), context.options.moves // 25, purpose="hidden_subsets"
         )
         driven = [found.chain for found in bare.sums]
-        sums = search(posed(context, tried, inputs), driven, terms, list(bare.sums), walks)
+        problem = posed(context, tried, inputs)
+        sums = search(problem, driven, terms, list(bare.sums), walks, fixed_noise=True)
         return replace(tried, sums=tuple(sums))
 
 
