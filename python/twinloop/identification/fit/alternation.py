@@ -24,13 +24,11 @@ def by_innovations(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     Returns:
         The same terms, with the constants inside them that tuning has found, and without those that are nothing then.
     """
-    best = latest = hypothesis
-    for turn in range(TURNS):
-        if turn and not latest.evidence.length < best.evidence.length - GAIN:
+    best, latest = hypothesis, described(context, hypothesis).of(hypothesis)
+    for _ in range(TURNS):
+        # Fitting estimates the noise behind what it has tuned.
+        latest = fitted(context, settled(latest))
+        if not (latest.evidence.stable and latest.evidence.length < best.evidence.length - GAIN):
             break
         best = latest
-        found = described(context, latest)
-        latest = fitted(context, settled(found.of(latest)))
-        if not latest.evidence.stable:
-            break
     return best

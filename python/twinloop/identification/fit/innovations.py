@@ -7,7 +7,7 @@ compare where those are the same. An observer sees the law through what it belie
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -109,6 +109,11 @@ class _Likelihood:
         """Weights of the chain's readings, of each run."""
         return [run.weights[:, self.states] for run in self.hypothesis.runs]
 
+    @cached_property
+    def longest(self) -> float:
+        """Time, s, for which a disturbance may last."""
+        return self.context.signals.dt * max(len(weights) for weights in self.counted) / FORGOTTEN
+
     @property
     def readings(self) -> int:
         """That count."""
@@ -147,26 +152,31 @@ class _Likelihood:
             moved = True
             while moved:
                 moved = False
-                for variant in self._beside(best, step):
-                    other = self(variant)
-                    if other < length - MOVE:
-                        best, length, moved = variant, other, True
+                for number in range(len(self.states) + (3 if chain.motion.correlated else 1)):
+                    for factor in (1.0 / step, step):
+                        before = length
+                        while (variant := self._with(best, number, factor)) is not None:
+                            other = self(variant)
+                            if not other < length - MOVE:
+                                break
+                            best, length, moved = variant, other, True
+                        if length < before:
+                            break
         return best, length
 
-    def _beside(self, chain: Chain, step: float) -> Iterator[Chain]:
-        """The chain with one number of its noise changed by a factor; never below what is believed."""
-        dt = self.context.signals.dt
-        longest = dt * max(len(weights) for weights in self.counted) / FORGOTTEN
-        least, slow = floor_of(chain, dt, self.integration)
-        numbers = 3 if chain.motion.correlated else 1
-        for factor in (1.0 / step, step):
-            for k, sensor in enumerate((chain.sensors * factor).tolist()):
-                if sensor >= least[k]:
-                    sensors = chain.sensors.copy()
-                    sensors[k] = sensor
-                    yield chain.with_noise(sensors, chain.motion)
-            for k in range(numbers):
-                motion = list(chain.motion)
-                motion[k] *= factor
-                if motion[k] >= slow[k] and (k < 2 or motion[k] <= longest):
-                    yield chain.with_noise(chain.sensors, (motion[0], motion[1], motion[2]))
+    def _with(self, chain: Chain, number: int, factor: float) -> Chain | None:
+        """The chain with one number of its noise, first of its sensors, changed by a factor.
+
+        None where that would go below what is believed, or make a disturbance last longer than records show.
+        """
+        least, slow = floor_of(chain, self.context.signals.dt, self.integration)
+        if number < len(self.states):
+            sensors = chain.sensors.copy()
+            sensors[number] *= factor
+            return chain.with_noise(sensors, chain.motion) if sensors[number] >= least[number] else None
+        k = number - len(self.states)
+        motion = list(chain.motion)
+        motion[k] *= factor
+        if motion[k] < slow[k] or (k == 2 and motion[k] > self.longest):
+            return None
+        return chain.with_noise(chain.sensors, (motion[0], motion[1], motion[2]))
