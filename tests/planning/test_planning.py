@@ -198,6 +198,22 @@ def test_gains_are_tuned_to_the_bottom_of_a_bowl_and_never_worse_than_the_start(
     assert same_bits(genes, start)
 
 
+@pytest.mark.parametrize("height", [1.0, 1e-200])
+def test_a_search_of_gains_ends_once_more_of_it_would_change_no_score(height):
+    family, judged = family_of(signals()), []
+
+    def bowl(genes):
+        judged.extend(((family.to_unit(genes) - 0.4) ** 2).sum(axis=1).tolist())
+        return np.stack([np.zeros(len(genes)), height * (1.0 + np.array(judged[-len(genes) :]))], axis=1)
+
+    starts = [family.from_unit([0.9, 0.1, 0.9]), family.from_unit([0.1, 0.1, 0.1])]
+    genes = tune_gains(
+        family, bowl, starts, evaluations=20_000, spread=0.2, unit=Unit(1).part(0), purpose="gains"
+    )
+    assert ((family.to_unit(genes) - 0.4) ** 2).sum() == min(judged) < 1e-4
+    assert 2 * 13 * 32 < len(judged) < 2500
+
+
 def test_what_lies_outside_the_box_is_dearer_the_further_out_whatever_the_scores_are():
     places = np.array([[0.5], [1.0], [1.5], [2.0], [-1.0], [-2.0]])
     for score in (0.0, 1e-200, 3.0, 1e200, -2.0):

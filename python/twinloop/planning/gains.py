@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -19,6 +20,8 @@ NEAR = 0.02
 """Shares of the box by which each gain may differ before a controller is taken for another one."""
 INSIDE = 0.02
 """Share of the box by which a search begins inside it: from an edge, half of its first places would be outside."""
+LEVEL, LATEST = 1e-3, 12
+"""Share by which the best scores of so many generations, and the latest median, differ once a search is done."""
 LEAST = 1e-300
 """What a place outside the box costs where its score is zero: less than any score."""
 
@@ -79,6 +82,7 @@ def tune_gains(
     for number, start in enumerate(starts):
         mean = np.clip(family.to_unit(start), INSIDE, 1.0 - INSIDE)
         search = _core.CmaEs(mean, spread, OFFSPRING, unit.part(number).named(purpose))
+        latest: deque[float] = deque(maxlen=LATEST)
         for _ in range(max(1, evaluations // (len(starts) * OFFSPRING))):
             places = search.ask()
             genes = family.from_unit(places)
@@ -88,9 +92,15 @@ def tune_gains(
                 best_genes, best = genes[i], (lost[i], scores[i])
             search = search.tell(places, _ordered(lost, _dearer_outside(scores, places)))
             watch()
-            if search.stopped:
+            latest.append(float(scores[i]))
+            if search.stopped or (not lost.any() and _level([*latest, float(np.median(scores))])):
                 break
     return best_genes
+
+
+def _level(scores: Sequence[float]) -> bool:
+    """Whether enough generations' scores hardly differ: going on would change no more than what no flight can tell."""
+    return len(scores) > LATEST and max(scores) - min(scores) <= LEVEL * abs(min(scores))
 
 
 def _dearer_outside(scores: Floats, places: Floats) -> Floats:
