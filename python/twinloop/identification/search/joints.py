@@ -48,6 +48,8 @@ SLACK = 30.0
 """By how much, in units of χ², an equation with a shared mass may be longer at first than what is known."""
 STARTS = 3
 """Walks among the terms of each equation."""
+SHORTER = 3
+"""By what share walks are shorter that try one more term of a joint's own mass: there are many such terms."""
 STEPS = 12
 """Steps of Gauss and Newton, joint by joint."""
 LEAST = 100
@@ -239,7 +241,8 @@ class _Joints:
             for term in offered:
                 allowed = [terms if term is None else (*terms, term) for terms in before]
                 limited = [self._restricted(i, costs[i], posed.pairs[i], allowed[i]) for i in joints]
-                walked = several.part(part).among(posed.grams, limited, self.problem.workers)
+                tried = several if term is None else several.with_moves(several.moves // SHORTER)
+                walked = tried.part(part).among(posed.grams, limited, self.problem.workers)
                 part += 1
                 for i, subsets in enumerate(walked):
                     found = _thinned(posed.grams[i], list(subsets[0][0]), costs[i])
