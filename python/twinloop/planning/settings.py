@@ -45,7 +45,7 @@ class PlanningOptions:
             that of the first flight.
         reach_seen: how far beyond the states seen so far and those of the task a proposal may lead, in units of how far
             flights have moved them, until a prediction has come true; 0: anywhere.
-        evaluations: number of flights on which gains are tuned, for each member and draw.
+        evaluations: number of flights on which gains are tuned at most, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
         delay_margin: whether gains are tuned on, and must tolerate, one more period of delay, and half of that for each
