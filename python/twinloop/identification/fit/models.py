@@ -37,18 +37,8 @@ def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:
 
     Constants inside nodes come first, then, output after output, a 1 for each known node and the weights.
     """
-    pool, absolute = hypothesis.pool, hypothesis.form == "absolute"
-    known = [node for nodes in hypothesis.candidates.priors.fixed.values() for node in nodes]
-    used = [term for found in hypothesis.sums for term in found.weights if term != pool.one]
-    held = pool.held([*used, *known])
-    kept = {pool.one, *pool.needed(known)}
-    # The scale of a share says what the same expression times a weight says: to tune both would be one too many.
-    free = [
-        place
-        for place, node in enumerate(held)
-        if node not in kept and pool[node].operation != SHARE and not _at_zero(pool, node)
-    ]
-    place, weights = len(held), []
+    absolute, weights = hypothesis.form == "absolute", []
+    place, free = len(_held(hypothesis)), list(inner(hypothesis))
     for output, found in enumerate(hypothesis.sums):
         place += len(_fixed(hypothesis, found))
         weights.append(range(place, place + len(found.weights)))
@@ -57,6 +47,30 @@ def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:
         # The state itself, where the output is the next one.
         place += absolute and output not in found.weights
     return free, weights
+
+
+def inner(hypothesis: Hypothesis) -> dict[int, int]:
+    """Places of those constants inside nodes that may move, each with its node."""
+    pool = hypothesis.pool
+    kept = {pool.one, *pool.needed(_known(hypothesis))}
+    # The scale of a share says what the same expression times a weight says: to tune both would be one too many.
+    return {
+        place: node
+        for place, node in enumerate(_held(hypothesis))
+        if node not in kept and pool[node].operation != SHARE and not _at_zero(pool, node)
+    }
+
+
+def _held(hypothesis: Hypothesis) -> list[int]:
+    """For each constant inside nodes, the node in whose instruction it stands."""
+    pool = hypothesis.pool
+    used = [term for found in hypothesis.sums for term in found.weights if term != pool.one]
+    return pool.held([*used, *_known(hypothesis)])
+
+
+def _known(hypothesis: Hypothesis) -> list[int]:
+    """Nodes that are known to drive something."""
+    return [node for nodes in hypothesis.candidates.priors.fixed.values() for node in nodes]
 
 
 def limits_of(hypothesis: Hypothesis) -> dict[int, Bounds]:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from twinloop import _core
 from twinloop.errors import engine_input
 from twinloop.identification.context import Context
-from twinloop.identification.fit.models import layout, limits_of, model_of
-from twinloop.identification.fit.settling import settled
+from twinloop.identification.fit.models import layout, limits_of
 from twinloop.identification.hypothesis import Fit, Hypothesis
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.sensors.noise import RIDGE
 from twinloop.identification.terms.bounds import bounded_model
 from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
@@ -49,7 +46,7 @@ def tune(
     """
     signals, tuning = context.signals, context.options.tuning
     free = list(range(len(model.constants))) if hypothesis.form == "absolute" else layout(hypothesis)[0]
-    actuation, lags = Actuation.of(model, signals), _groups(model, hypothesis, signals)
+    actuation, lags = Actuation.of(model, signals), moving_together(model, hypothesis, signals)
     limits = limits_of(hypothesis) if tuning else {}
     # Nothing moves in no steps: what is at its bound stays there, and draws of the rest know it.
     start = model.constants.tolist()
@@ -84,51 +81,8 @@ def tune(
     return fit, [bounded_model(one, limits)[0] for one in drawn]
 
 
-def promises(context: Context, hypothesis: Hypothesis, i: int, nodes: Sequence[int]) -> list[float]:
-    """What more terms promise a sum, each by itself: by how much χ² falls in a step of tuning to which it is added.
-
-    All stand in one model with weights of 0, and what each gains beside all that is tuned is read off the slopes of
-    that model's errors: the test of Lagrange multipliers (Rao 1948).
-
-    Args:
-        context: of the identification.
-        hypothesis: with a fit.
-        i: number of the sum.
-        nodes: of the terms, none of them in the sum.
-
-    Returns:
-        A gain in χ² for each; 0 where the model diverges or a term says nothing new.
-    """
-    placed = settled(hypothesis)
-    known, sums, fit = placed.sums[i], list(placed.sums), hypothesis.fit
-    assert fit is not None
-    sums[i] = replace(known, weights={**known.weights, **dict.fromkeys(nodes, 0.0)})
-    beside = replace(placed, candidates=placed.candidates.with_terms(nodes), sums=tuple(sums))
-    model, (free, places) = model_of(context, beside), layout(beside)
-    added = list(places[i][len(known.weights) :])
-    # Constants inside the new terms come behind those of the others; where a weight is 0 they change nothing.
-    inside = len(layout(placed)[0]) - sum(len(found.weights) for found in placed.sums)
-    tuned = [*free[:inside], *(place for at in places for place in at if place not in added)]
-    lags = _groups(model, beside, context.signals)
-    with engine_input():
-        gram = _core.linearised(
-            model,
-            context.limits.engine,
-            [chain.engine for chain in fit.observer],
-            [(run.states, run.weights, run.commands) for run in hypothesis.runs],
-            free=[*added, *tuned],
-            lags=lags,
-            workers=context.workers,
-        )
-    if gram is None:
-        return [0.0] * len(nodes)
-    others = list(range(len(added), len(added) + len(tuned) + len(lags)))
-    before, *after = (gram.solve([*one, *others], RIDGE) for one in ([], *([j] for j in range(len(added)))))
-    return [0.0 if before is None or found is None else before[2] - found[2] for found in after]
-
-
-def _groups(model: _core.Model, hypothesis: Hypothesis, signals: Signals) -> list[list[int]]:
-    """Groups of lags, and of times of hidden states, each of which is one number."""
+def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals) -> list[list[int]]:
+    """Groups of lags, and of times of hidden states, each of which is one number: commands, then hidden states."""
     actuation = Actuation.of(model, signals)
     lags = [list(group) for group in hypothesis.alike if actuation.actuators[group[0]].lag > 0.0]
     # Hidden states that begin with one time keep one.

@@ -15,7 +15,8 @@ from twinloop.identification.fit.alternation import by_innovations
 from twinloop.identification.fit.fitting import fitted, with_fit
 from twinloop.identification.fit.models import model_of
 from twinloop.identification.fit.predictions import smoothed
-from twinloop.identification.fit.tuning import promises, tune
+from twinloop.identification.fit.promises import promises
+from twinloop.identification.fit.tuning import tune
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.second_look import looked_again
 from twinloop.identification.search.description import shorter, shortest

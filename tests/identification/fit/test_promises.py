@@ -12,7 +12,8 @@ from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import with_fit
 from twinloop.identification.fit.models import model_of
-from twinloop.identification.fit.tuning import promises, tune
+from twinloop.identification.fit.promises import promises
+from twinloop.identification.fit.tuning import tune
 from twinloop.identification.starts import starts
 
 ANGLE, RATE, TORQUE = range(3)
