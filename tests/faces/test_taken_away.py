@@ -133,6 +133,13 @@ def test_the_controller_compared_on_its_flights(flown, kind, tmp_path):
     assert campaign.export_controller(tmp_path / f"loop{SUFFIXES[kind]}")
 
 
+def test_no_controller_is_written_in_a_kind_that_only_a_twin_has(flown, tmp_path):
+    file = tmp_path / "loop.py"
+    done = invoke("export", str(flown[1]), "controller", "--to", "sympy", "-o", str(file))
+    assert done.exit_code == 2 and "of a controller 'sympy': expected one of python, c" in done.stderr
+    assert not file.exists()
+
+
 @pytest.mark.parametrize("kind", ["python", "c"])
 def test_a_controller_that_follows_a_reference_is_compared_along_it(kind, tmp_path):
     campaign = tl.Campaign(

@@ -553,6 +553,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         to: str | Path,
         parameters: Mapping[str, float] | ArrayLike | None = None,
         *,
+        kind: str | None = None,
         precision: str = "double",
         force: bool = False,
     ) -> str | tuple[Path, ...]:
@@ -564,6 +565,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         Args:
             to: "python" or "c", or the path of a file that ends in ".py" or ".c".
             parameters: gains, by name or in order; None: those of `best_test`.
+            kind: of the file, if its suffix is not enough.
             precision: of C, "double" or "float".
             force: exports without the comparison.
 
@@ -574,7 +576,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
             InvalidInput: unknown gains, no such kind, or a path that cannot be written.
             NotAvailable: a family in Python, or an export that could not be checked.
         """
-        return taken_controller(self, to, parameters, precision, force)
+        return taken_controller(self, to, kind, parameters, precision, force)
 
     @property
     def committee(self) -> tuple[_core.Model, ...]:

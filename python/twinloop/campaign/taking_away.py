@@ -34,12 +34,13 @@ def taken_twin(
 def taken_controller(
     campaign: Campaign,
     to: str | Path,
+    kind: str | None,
     parameters: Mapping[str, float] | ArrayLike | None,
     precision: str,
     force: bool,
 ) -> str | tuple[Path, ...]:
     """A controller as `Campaign.export_controller` describes it, compared on the flights of the campaign."""
-    kind, path = asked(to, None)
+    kind, path = asked(to, kind)
     genes = campaign.best_test.genes if parameters is None else campaign.family.genes(parameters)
     name = "controller" if path is None else path.stem
     flights = [] if force else [run.trajectory for run in campaign.experiments]

@@ -56,8 +56,8 @@ def export(
             f"Export: expected a store or a twin as JSON, found no file {source!r}; check its name."
         )
     to: str | Path = output if output is not None else str(kind)
+    of_file = kind if output is not None else None
     if what == "twin":
-        of_file = kind if output is not None else None
         if file is not None and file.suffix == ".json":
             made = load_twin(file).export(to, kind=of_file, precision=precision, force=force)
         else:
@@ -68,11 +68,8 @@ def export(
             raise InvalidInput(
                 "Export: expected a store with a campaign, found JSON, which holds a twin alone."
             )
-        if output is not None and kind is not None and SUFFIXES.get(kind) != output.suffix:
-            raise InvalidInput(
-                f"Export: expected {str(output)!r} to end in {SUFFIXES.get(kind)!r}; change one of them."
-            )
-        made = _campaign(source, name).export_controller(to, precision=precision, force=force)
+        held = _campaign(source, name)
+        made = held.export_controller(to, kind=of_file, precision=precision, force=force)
     if isinstance(made, str):
         answer({"kind": kind, "text": made}, made.removesuffix("\n"), as_json)
     else:
