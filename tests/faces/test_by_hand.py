@@ -480,6 +480,7 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
     [
         ("", "column"),
         ("t,angle,rate,torqe\n0,0,0,0\n", "did you mean 'torqe'"),
+        ("t,angle,rate,torque,rate\n0,0,0,0,0\n0.05,0,0,0,9\n", "one column called rate, found 2; rename"),
         ("t,angle,rate,torque\n0,0,x,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found 'x'"),
         ("t,angle,rate,torque\n0,0,0,0\n0.05,0\n", "line 3"),
         (

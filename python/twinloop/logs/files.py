@@ -195,6 +195,12 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
     rows = [row for row in lines if any(cell.strip() for cell in row)]
     names = [name.strip() for name in rows[0]] if rows else []
     wanted = (TIME, *signals.state_names, *signals.command_names)
+    twice = next((name for name in wanted if names.count(name) > 1), None)
+    if twice is not None:
+        raise InvalidInput(
+            f"Log {called}: expected one column called {twice}, found {names.count(twice)}; rename or remove"
+            " the others."
+        )
     missing = [name for name in wanted if name not in names]
     if missing:
         there = ", ".join(names[:20]) or "none"
