@@ -482,7 +482,11 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
         ("t,angle,rate,torqe\n0,0,0,0\n", "did you mean 'torqe'"),
         ("t,angle,rate,torque,rate\n0,0,0,0,0\n0.05,0,0,0,9\n", "one column called rate, found 2; rename"),
         ("t,angle,rate,torque\n0,0,x,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found 'x'"),
-        ("t,angle,rate,torque\n0,0,0,0\n0.05,0\n", "line 3"),
+        (
+            "t,angle,rate,torque\n0,0,0,0\n0.05,0\n",
+            "line 3: expected a number for rate, found a row of 2 cells that ends before it; complete",
+        ),
+        ("\nt,angle,rate,torque\n\n0,0,0,0\n\n0.05,0,x,0\n", "line 6: expected a number for rate, found 'x'"),
         (
             "t,angle,rate,torque\n0,0,1,0,0\n0,05,0,0,0,0\n",
             "line 2: expected 4 cells, .*found 5; write decimals",

@@ -192,8 +192,8 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         raise InvalidInput(
             f"Log {called}: expected columns of numbers, found: {reason}; save it as CSV."
         ) from reason
-    rows = [row for row in lines if any(cell.strip() for cell in row)]
-    names = [name.strip() for name in rows[0]] if rows else []
+    rows = [(line, row) for line, row in enumerate(lines, 1) if any(cell.strip() for cell in row)]
+    names = [name.strip() for name in rows[0][1]] if rows else []
     wanted = (TIME, *signals.state_names, *signals.command_names)
     twice = next((name for name in wanted if names.count(name) > 1), None)
     if twice is not None:
@@ -219,7 +219,7 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
 
     def column(name: str, count: int) -> list[float]:
         place = names.index(name)
-        return [_number(row, place, name, i + 2, called) for i, row in enumerate(body[:count])]
+        return [_number(row, place, name, line, called) for line, row in body[:count]]
 
     def matrix(wanted: Sequence[str], count: int) -> Floats:
         return np.array([column(name, count) for name in wanted]).reshape(len(wanted), -1).T
@@ -228,21 +228,26 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
     return np.array(column(TIME, n)), matrix(signals.state_names, n), matrix(signals.command_names, n - 1)
 
 
-def _refuse_longer(body: Sequence[Sequence[str]], columns: int, called: str) -> None:
+def _refuse_longer(body: Sequence[tuple[int, Sequence[str]]], columns: int, called: str) -> None:
     """Refuses rows of more cells than there are columns: decimal commas between commas move every number after them."""
-    for i, row in enumerate(body):
+    for line, row in body:
         if any(cell.strip() for cell in row[columns:]):
             raise InvalidInput(
-                f"Log {called}, line {i + 2}: expected {columns} cells, one for each column, found {len(row)}; write"
+                f"Log {called}, line {line}: expected {columns} cells, one for each column, found {len(row)}; write"
                 " decimals with a point, and one number in a cell."
             )
 
 
 def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -> float:
     """The number of a cell; NaN where it is empty, as a historian leaves a reading that it does not have."""
-    text = row[place].strip() if place < len(row) else ""
+    if place >= len(row):
+        raise InvalidInput(
+            f"Log {called}, line {line}: expected a number for {name}, found a row of {len(row)}"
+            f" cell{'s' * (len(row) > 1)} that ends before it; complete the row, or cut the log before it."
+        )
+    text = row[place].strip()
     try:
-        return float(text) if text or place >= len(row) else np.nan
+        return float(text) if text else np.nan
     except ValueError as reason:
         raise InvalidInput(
             f"Log {called}, line {line}: expected a number for {name}, found {text!r}; {_advice(text, name)}."
