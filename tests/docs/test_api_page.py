@@ -9,6 +9,7 @@ import pytest
 
 import twinloop as tl
 from twinloop.campaign.presets import CHOICES, PRESETS, RANGES, options_of
+from twinloop.records import Recorded
 
 ROOT = Path(__file__).parents[2]
 
@@ -54,6 +55,15 @@ def test_every_public_name_has_an_entry():
         if not inspect.ismodule(getattr(room, name)) and id(getattr(room, name)) not in shown
     ]
     assert missing == ["twinloop.__version__"]
+
+
+def test_the_page_on_campaigns_names_every_argument_and_every_member():
+    text = page("concepts/campaign.md")
+    parameters = inspect.signature(tl.Campaign).parameters.values()
+    arguments = [each.name for each in parameters if each.kind is not inspect.Parameter.VAR_KEYWORD]
+    own = set(dir(tl.Campaign)) - set(dir(Recorded))
+    names = [*arguments, *(name for name in own if name.islower() and not name.startswith("_"))]
+    assert [name for name in names if not re.search(rf"`(Campaign\.)?{name}[`(]", text)] == []
 
 
 def test_the_first_lines_name_all_that_the_package_names():
