@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import pytest
 
@@ -41,6 +42,21 @@ def test_the_answer_is_exactly_one_json_object(answer):
     assert result["seed"] == 0 and result["system"]["name"] == "quadrotor"
     assert len(result["controller"]["gains"]) == 9
     assert result["run_info"]["versions"]["twinloop"] == twinloop.__version__
+
+
+def test_the_page_names_every_key_of_the_answer(answer):
+    text = (Path(__file__).parents[2] / "docs" / "command-line.md").read_text(encoding="utf-8")
+    section = text.partition("## The result as JSON")[2].partition("\n## ")[0]
+
+    def keys(value):
+        """Those of a value and of what it holds; options, gains and packages are named elsewhere."""
+        inside = value.items() if isinstance(value, dict) else [("", each) for each in value]
+        for key, held in inside:
+            yield key
+            if isinstance(held, dict | list) and key not in ("options", "gains", "versions"):
+                yield from keys(held)
+
+    assert {key for key in keys(json.loads(answer)) if key and f"`{key}`" not in section} == set()
 
 
 def test_the_program_in_the_answer_is_the_twin(answer):
