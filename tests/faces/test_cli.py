@@ -444,4 +444,5 @@ def test_a_test_that_is_too_risky_is_not_flown_and_the_command_fails(monkeypatch
         "lags=false",
     ]
     answer = invoke("run", "quadrotor", "--max-risk", "0.1", "--threads", "1", *small)
-    assert answer.exit_code == 1 and "expected at most 0.1, found 0.4" in answer.stderr
+    assert answer.exit_code == 1
+    assert "twinloop: Campaign.run: expected at most 0.1, found 0.4" in answer.stderr

@@ -118,7 +118,7 @@ def work(
             try:
                 campaign.run(rig, experiments, timeout=timeout, max_risk=max_risk)
             except (TooRisky, NoAnswer) as reason:
-                click.echo(str(reason), err=True)
+                click.echo(f"twinloop: {reason}", err=True)
                 stopped = True
             controller_to_fly(campaign)  # learns the last flight
         if (campaign.interrupted or stopped) and campaign.store is not None:
