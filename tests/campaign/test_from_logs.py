@@ -46,7 +46,7 @@ def test_a_run_that_is_learnt_is_not_held_out():
         learnt_from_logs([run], SIGNALS, [by_hand(40)])
 
 
-@pytest.mark.parametrize("runs", [[], [np.zeros((3, 2))], "flight.csv"])
+@pytest.mark.parametrize("runs", [[], [np.zeros((3, 2))], "flight.csv", by_hand(40)])
 def test_what_is_no_list_of_runs_is_refused(runs):
     with pytest.raises(tl.InvalidInput, match="at least one Trajectory"):
         tl.identify(runs, SIGNALS)

@@ -67,7 +67,8 @@ def learnt_from_logs(
     Raises:
         InvalidInput: no runs, a run that cannot be learnt, or one that is both learnt and held out.
     """
-    found, apart = list(runs), list(held_out)
+    no_list = isinstance(runs, Trajectory) or isinstance(held_out, Trajectory)
+    found, apart = ([], []) if no_list else (list(runs), list(held_out))
     if not found or not all(isinstance(run, Trajectory) for run in [*found, *apart]):
         raise InvalidInput(
             "identify: expected at least one Trajectory, such as twinloop.load gives, found something else; pass a"
