@@ -220,6 +220,21 @@ def test_a_run_that_was_cut_has_not_kept_the_envelope_and_is_not_known_to_fly():
     assert not same_bits(campaign.best_test.genes, first.genes)
 
 
+def test_where_all_planned_flights_were_cut_the_twin_is_not_taken_at_its_word_once_more():
+    campaign = made(options={"candidates": 64})
+    first = campaign.test(GAINS)
+    campaign.tell(first, cut(PLANT.run(first), 12, "diverged", "tumbled"))
+    assert "no gains have completed a flight yet" in campaign.best_test.reason
+    test = campaign.ask()
+    campaign.tell(test, cut(PLANT.run(test), 12, "diverged", "tumbled"))
+    with pytest.raises(tl.NotAvailable, match=r"No controller to fly: .* each of them was cut"):
+        _ = campaign.best_test
+    # One that comes to its end is worth more than any promise.
+    again = campaign.ask()
+    campaign.tell(again, PLANT.run(again))
+    assert campaign.best_test.genes.size == first.genes.size
+
+
 def test_where_all_flights_diverged_there_is_no_controller_to_fly():
     """Commands logged with the wrong sign, and every flight runs away: nothing is known, and it is said."""
     campaign = made()

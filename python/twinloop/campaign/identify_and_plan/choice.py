@@ -14,7 +14,13 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
 from twinloop.campaign.identify_and_plan.alone import share_of
 from twinloop.campaign.identify_and_plan.calibration import calibrated, missed
-from twinloop.campaign.identify_and_plan.track_record import SURE, confirmed, over_promised, unproven_risk
+from twinloop.campaign.identify_and_plan.track_record import (
+    SURE,
+    confirmed,
+    over_promised,
+    promised_in_vain,
+    unproven_risk,
+)
 from twinloop.campaign.logbook import Logbook
 from twinloop.errors import NotAvailable
 from twinloop.planning.gains import nearby
@@ -123,6 +129,8 @@ class Choice:
         """Why tuned gains cannot be answered for; nothing if they can."""
         if not self.committee.trusted:
             return "the twin does not follow the runs that it was learnt from"
+        if flown is None and promised_in_vain(self.book.experiments):
+            return "the twin predicted flights to their end, and each of them was cut"
         if nearby(self.planner.family, tuned[np.newaxis], standing.unfit(self.book))[0]:
             return "a flight with gains close to those that the twin prefers failed or was cut"
         if self._no_gains_count(members, judged):

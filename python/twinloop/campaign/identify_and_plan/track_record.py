@@ -68,6 +68,16 @@ def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
     return count
 
 
+def promised_in_vain(experiments: Sequence[Experiment]) -> bool:
+    """Whether flights were predicted to be completed, and none of them was.
+
+    Args:
+        experiments: in the order of `tell`.
+    """
+    promised = [run for run, predicted in _predicted(experiments) if np.isfinite(predicted)]
+    return bool(promised) and not any(run.complete for run in promised)
+
+
 def _predicted(experiments: Sequence[Experiment]) -> list[tuple[Experiment, float]]:
     """Flights that something was predicted of, each with that."""
     asked = [(run, run.test.predicted) for run in experiments if run.test is not None]
