@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 import twinloop as tl
-from twinloop.identification.outliers import suspects
+from twinloop.identification.outliers import Suspect, ignoring, suspects
 from twinloop.identification.records import Run
 
 NOISE = 0.02
@@ -40,6 +40,38 @@ def test_a_reading_that_is_wrong_stands_out(row, size):
     states[row] += size * NOISE
 
     assert suspected(states[:, np.newaxis]) == [(row, 0)]
+
+
+@pytest.mark.parametrize("row", [0, 1, 29, 30])
+@pytest.mark.parametrize("size", [-60.0, 40.0])
+def test_so_does_one_at_an_end_of_a_run_if_nothing_else_is_nearly_as_rough(row, size):
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(31)
+    states = np.sin(0.1 * np.arange(31.0)) + noise
+    states[row] += size * 1e-3 * (4.0 if row in (0, 30) else 1.0)
+
+    assert suspected(states[:, np.newaxis]) == [(row, 0)]
+    # In a run that jumps anywhere a jump at its end may be one, too.
+    states[15:] += 0.1
+    assert (row, 0) not in suspected(states[:, np.newaxis])
+
+
+@pytest.mark.parametrize("row", [0, 1, 12, 29, 30])
+def test_a_reading_that_is_ignored_stands_where_it_would_have_been(row):
+    signals = tl.Signals(
+        [tl.State("angle", "rad", 1.0), tl.State("rate", "rad/s", 1.0, derivative_of="angle")],
+        [tl.Command("torque", "N m", (-1.0, 1.0))],
+        0.1,
+    )
+    time = 0.1 * np.arange(31.0)
+    states = np.stack([np.sin(time), np.cos(time)], axis=1)
+    wrong = states.copy()
+    wrong[row] += 0.7
+    run = Run.of(wrong, np.zeros((30, 1)))
+    for state in (1, 0):
+        run = ignoring(run, Suspect(0, row, state, 1.0), signals)
+
+    np.testing.assert_allclose(run.states, states, atol=2e-3)
+    assert (run.weights == 0.0).sum() == 2 and (run.weights[row] == 0.0).all()
 
 
 @pytest.mark.parametrize("size", [-1.0, 3.0, 100.0])

@@ -7,7 +7,7 @@ and the description of the readings decides.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.search.description import shorter
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.starts import begun
+from twinloop.signals import Signals
 
 STANDS_OUT = 5.0
 """Standard deviations of the sensor's noise from which a reading is suspected."""
@@ -29,6 +30,8 @@ IGNORING = 12.0
 """What ignoring a reading must gain, in units of χ², beside what it costs to state that reading by itself."""
 FEWEST = 9
 """Readings of a run below which none is suspected."""
+AT_AN_END = 10.0
+"""Times larger than any other in the run that a fourth difference at an end of it is where a reading is suspected."""
 CLEANING = 200
 """Number of the first trial, by which what it draws is told from what starts draw."""
 
@@ -62,7 +65,7 @@ def suspects(runs: Sequence[Run], scales: Floats) -> list[Suspect]:
     """Readings that look more like an error of their own than like a corner or a jump of the motion.
 
     One at a corner is none, either: what the motion does there is not known yet. The first two and the last two of a
-    run are none, and those beside them seldom: they have too few neighbours.
+    run have too few neighbours to tell: they are suspected where nothing else in the run is nearly as rough.
 
     Args:
         runs: recorded.
@@ -85,6 +88,11 @@ def suspects(runs: Sequence[Run], scales: Floats) -> list[Suspect]:
             Suspect(number, row + 2, state, float(abs(sizes[row, state])))
             for row, state in zip(rows.tolist(), states.tolist(), strict=True)
         ]
+        last = len(run.states) - 1
+        found += [Suspect(number, row, state, size) for row, state, size in _at_the_start(fourth)]
+        found += [
+            Suspect(number, last - row, state, size) for row, state, size in _at_the_start(fourth[::-1])
+        ]
     return sorted(found, key=lambda suspect: (-suspect.size, suspect.run, suspect.row, suspect.state))
 
 
@@ -92,6 +100,16 @@ def _windows(fourth: Floats) -> Floats:
     """The five fourth differences that a reading is in (n - 3, n_x, 5); 0 for those that the ends cut off."""
     padded = np.pad(fourth, ((2, 2), (0, 0)))
     return np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0)
+
+
+def _at_the_start(fourth: Floats) -> Iterator[tuple[int, int, float]]:
+    """Row, state and size of what is wrong with the first or the second reading, by the fourth differences of a run."""
+    sizes = np.abs(fourth)
+    rest = np.maximum(STANDS_OUT, AT_AN_END * sizes[2:].max(axis=0))
+    for state in np.flatnonzero(sizes[0] > rest).tolist():
+        # Of the second reading there is a part in the second difference, too, of the other sign and a fourth as large.
+        second = 8.0 * sizes[1, state] > sizes[0, state]
+        yield int(second), state, float(sizes[0, state]) / (4.0 if second else 1.0)
 
 
 def _explained(around: Floats, pattern: Floats) -> tuple[Floats, Floats]:
@@ -113,7 +131,7 @@ def cleaned(context: Context) -> Context:
     runs, length = list(context.runs), _length(context, context.runs, CLEANING)
     for number, suspect in enumerate(trials, 1):
         tried = [*runs]
-        tried[suspect.run] = _ignoring(tried[suspect.run], suspect)
+        tried[suspect.run] = ignoring(tried[suspect.run], suspect, context.signals)
         alone = _length(context, tried, CLEANING + number) + IGNORING + _stated(runs, suspect)
         if shorter(alone, length):
             runs, length = tried, alone
@@ -126,13 +144,42 @@ def _length(context: Context, runs: Sequence[Run], start: int) -> float:
     return from_both_sides(brief, begun(brief, form, brief.first_pool(), start)).length
 
 
-def _ignoring(run: Run, suspect: Suspect) -> Run:
+def ignoring(run: Run, suspect: Suspect, signals: Signals) -> Run:
+    """The run without a reading: it stands where its neighbours foretell it, and weighs nothing.
+
+    Args:
+        run: that it is a reading of.
+        suspect: the reading.
+        signals: of the system.
+    """
     row, state = suspect.row, suspect.state
     states, weights = run.states.copy(), run.weights.copy()
-    before, after = states[row - 2 : row, state], states[row + 1 : row + 3, state]
-    states[row, state] = (4.0 * (before[1] + after[0]) - before[0] - after[1]) / 6.0
+    rates = [i for i, other in enumerate(signals.states) if other.derivative_of == signals.states[state].name]
+    slopes = signals.dt * states[:, rates[0]] if rates else None
+    states[row, state] = _foretold(states[:, state], slopes, row)
     weights[row, state] = 0.0
     return replace(run, states=states, weights=weights, smooth=states)
+
+
+def _foretold(readings: Floats, slopes: Floats | None, row: int) -> float:
+    """A reading by those beside it; at the end of a run by those on one side of it, and by slopes where they are read.
+
+    Args:
+        readings: of one state (n,).
+        slopes: of it, a period (n,); None: nothing reads them.
+        row: of the reading.
+    """
+    if row >= len(readings) - 2:
+        turned = None if slopes is None else -slopes[::-1]
+        return _foretold(readings[::-1], turned, len(readings) - 1 - row)
+    if row == 0 and slopes is not None:
+        return float(readings[1] - 0.5 * (slopes[0] + slopes[1]))
+    if row == 0:
+        return float(3.0 * (readings[1] - readings[2]) + readings[3])
+    if row == 1:
+        return float((readings[0] + 3.0 * readings[2] - readings[3]) / 3.0)
+    before, after = readings[row - 2 : row], readings[row + 1 : row + 3]
+    return float((4.0 * (before[1] + after[0]) - before[0] - after[1]) / 6.0)
 
 
 def _stated(runs: Sequence[Run], suspect: Suspect) -> float:

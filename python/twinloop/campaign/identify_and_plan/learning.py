@@ -20,6 +20,7 @@ from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from,
 from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
 from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
+from twinloop.campaign.identify_and_plan.wrong_readings import without_wrong_readings
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.replaying import free_errors
@@ -100,8 +101,9 @@ class Learner:
         needed = () if asked is None else knowledge.needed_factors(asked)
         selected = learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
         identify = self._identification(selected)
+        flights = without_wrong_readings(book.experiments, self.setup.signals)
         answered = partial(
-            Answer.of, flights=book.experiments, setup=self.setup, options=self.options, workers=self.workers
+            Answer.of, flights=flights, setup=self.setup, options=self.options, workers=self.workers
         )
         earlier = None if asked is None else asked.identified
         answer = answered(
@@ -112,8 +114,8 @@ class Learner:
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if not answer.explained and self.options.plain != self.options:
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + told), ROUGH)
-            answer, two = self._of_two(answer, answered(rough, number=2), two, answered, book.experiments)
-        identified, lesson = answer.identified, self._lesson(answer, book, selected)
+            answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
+        identified, lesson = answer.identified, self._lesson(answer, book, flights, selected)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
         )
@@ -164,7 +166,9 @@ class Learner:
         mixer = self.setup.mixer
         return [] if mixer is None else of_mixer(mixer.matrix, self.setup.signals)
 
-    def _lesson(self, answer: Answer, book: Logbook, selected: Sequence[Selected]) -> Lesson:
+    def _lesson(
+        self, answer: Answer, book: Logbook, flights: Sequence[Experiment], selected: Sequence[Selected]
+    ) -> Lesson:
         identified, follows = answer.identified, answer.follows
         noise = identified.noise(self.setup.signals)
         free = free_errors(identified.members[0], book, self.workers, noise)
@@ -175,7 +179,7 @@ class Learner:
         )
         lost = [book.experiments[place] for place in answer.lost]
         blown = () if answer.missed else [names[gust.states[0]] for gust in noise.correlated]
-        misses = answer.misses(book.experiments, self.setup, self.workers)
+        misses = answer.misses(flights, self.setup, self.workers)
         explained = follows and not misses and not is_rough(identified)
         actuation, signals = identified.actuation, self.setup.signals
         actuators = claimed(actuation, signals, explained)
