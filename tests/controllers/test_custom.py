@@ -148,8 +148,9 @@ class Faulty(PlainPid):
         (ZeroDivisionError("no rate"), ZeroDivisionError, "no rate"),
         (KeyboardInterrupt(), KeyboardInterrupt, None),
         ([0.0, 1.0], tl.InvalidInput, "1 finite numbers"),
+        (None, tl.InvalidInput, "1 finite numbers, found None"),
+        ("left", tl.InvalidInput, "1 finite numbers, found 'left'"),
         ([np.nan], tl.InvalidInput, "finite numbers"),
-        (None, TypeError, None),
     ],
 )
 def test_what_a_law_raises_comes_out_of_whatever_flew_it(pendulum_signals, pendulum, answer, error, sentence):

@@ -68,14 +68,14 @@ impl ForeignController for PythonController {
         let Some(controller) = &self.0 else { return };
         let found = call(|py| {
             let arguments = (to_vector(py, state.to_vec()), to_vector(py, target.to_vec()));
-            let found: Vector<'_> =
-                controller.call_method1(py, "command", arguments)?.into_bound(py).extract()?;
-            let found = vector(&found);
+            let answer = controller.call_method1(py, "command", arguments)?.into_bound(py);
+            let found = answer.extract::<Vector<'_>>().map(|found| vector(&found)).unwrap_or_default();
             if found.len() != command.len() || !found.iter().all(|x| x.is_finite()) {
-                let expected = command.len();
                 return Err(misuse(format!(
-                    "controller in Python: expected a command of {expected} finite numbers, found {found:?}; mend its \
-                     command(state, target)"
+                    "controller in Python: expected a command of {} finite numbers, found {}; mend its command(state, \
+                     target)",
+                    command.len(),
+                    answer.repr()?
                 ))
                 .into());
             }

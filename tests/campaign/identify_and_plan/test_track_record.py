@@ -11,6 +11,7 @@ from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign.identify_and_plan.track_record import (
     UNPROVEN,
+    WEIGHT,
     confirmed,
     nearly_confirmed_in_a_row,
     over_promised,
@@ -24,9 +25,9 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
     return SimpleNamespace(test=test, quality=quality)
 
 
-def flight(predicted, spread, quality, gain):
+def flight(predicted, spread, quality, gain, kept=True):
     test = SimpleNamespace(predicted=predicted, spread=spread, genes=np.array([gain]))
-    return SimpleNamespace(test=test, quality=quality)
+    return SimpleNamespace(test=test, quality=quality, kept_envelope=kept)
 
 
 @pytest.mark.parametrize(
@@ -108,6 +109,19 @@ def test_gains_that_have_not_flown_are_a_risk_until_a_prediction_has_come_true()
     assert unproven_risk([true], NEW, BOUNDED) == unproven_risk([missed, true], NEW, BOUNDED) == 0.0
     # Gains that flew show it themselves, and without an envelope none is left.
     assert unproven_risk([], KEPT, BOUNDED) == unproven_risk([], NEW, FREE) == 0.0
+
+
+def test_flights_that_left_against_what_was_predicted_are_a_risk_of_the_next_one():
+    true, left = flight(1.0, 0.1, 1.0, 1.0), flight(1.0, 0.1, None, 2.0, kept=False)
+    risks = [unproven_risk([true] + n * [left], NEW, BOUNDED) for n in (1, 2, 4, 100)]
+    assert risks == sorted(risks) and 0.1 < risks[0] < 0.3 and 0.9 < risks[-1] < 1.0
+    assert risks[1] == pytest.approx((WEIGHT * UNPROVEN + 2) / (WEIGHT + 2))
+    assert unproven_risk([left, left, true], NEW, BOUNDED) == 0.0
+    # One that misses what was predicted inside the envelope refutes nothing of this.
+    missed = flight(1.0, 0.1, 2.0, 3.0)
+    assert (
+        UNPROVEN == unproven_risk(20 * [missed], NEW, BOUNDED) < unproven_risk([left, missed], NEW, BOUNDED)
+    )
 
 
 def test_a_campaign_says_so_of_its_first_prediction():
