@@ -25,9 +25,15 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
     return SimpleNamespace(test=test, quality=quality)
 
 
-def flight(predicted, spread, quality, gain, kept=True):
+def flight(predicted, spread, quality, gain, ended="completed"):
     test = SimpleNamespace(predicted=predicted, spread=spread, genes=np.array([gain]))
-    return SimpleNamespace(test=test, quality=quality, kept_envelope=kept)
+    return SimpleNamespace(
+        test=test,
+        quality=quality,
+        trajectory=SimpleNamespace(ended=ended),
+        left_envelope=False,
+        kept_envelope=ended == "completed",
+    )
 
 
 @pytest.mark.parametrize(
@@ -112,7 +118,7 @@ def test_gains_that_have_not_flown_are_a_risk_until_a_prediction_has_come_true()
 
 
 def test_flights_that_left_against_what_was_predicted_are_a_risk_of_the_next_one():
-    true, left = flight(1.0, 0.1, 1.0, 1.0), flight(1.0, 0.1, None, 2.0, kept=False)
+    true, left = flight(1.0, 0.1, 1.0, 1.0), flight(1.0, 0.1, None, 2.0, ended="diverged")
     risks = [unproven_risk([true] + n * [left], NEW, BOUNDED) for n in (1, 2, 4, 100)]
     assert risks == sorted(risks) and 0.1 < risks[0] < 0.3 and 0.9 < risks[-1] < 1.0
     assert risks[1] == pytest.approx((WEIGHT * UNPROVEN + 2) / (WEIGHT + 2))

@@ -105,7 +105,8 @@ def unproven_risk(experiments: Sequence[Experiment], fared: Fared, signals: Sign
     """Least risk of a flight while nothing shows that the twin can foretell one; 0 of gains that have flown.
 
     A law from one gentle flight may be wrong elsewhere in a way that no member of a committee shows. Where flights have
-    left the envelope, or were cut, against what was predicted, it is.
+    left the envelope or diverged against what was predicted, it is. One that was stopped inside may have been stopped
+    for any reason; two of them have hardly.
 
     Args:
         experiments: in the order of `tell`.
@@ -117,5 +118,7 @@ def unproven_risk(experiments: Sequence[Experiment], fared: Fared, signals: Sign
         return 0.0
     predicted = [run for run, _ in reversed(_predicted(experiments))]
     untrue = list(takewhile(lambda run: not _came_true(run, NEARLY), predicted))
-    left = sum(not run.kept_envelope for run in untrue)
-    return max(UNPROVEN, (UNPROVEN * WEIGHT + left) / (WEIGHT + len(untrue)))
+    stopped = [run for run in untrue if run.trajectory.ended == "aborted" and not run.left_envelope]
+    counted = [run for run in untrue if len(stopped) > 1 or run not in stopped]
+    left = sum(not run.kept_envelope for run in counted)
+    return max(UNPROVEN, (UNPROVEN * WEIGHT + left) / (WEIGHT + len(counted)))
