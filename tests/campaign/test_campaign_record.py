@@ -117,6 +117,41 @@ def test_a_campaign_that_never_was_is_refused(path, value, word):
         tl.Campaign.from_record(damaged(record, path, value))
 
 
+HIDDEN = {"commands": [0], "squared": False, "rest": None, "time": 1.0, "states": [], "settled": False}
+
+
+@pytest.fixture(scope="module")
+def remembered():
+    return lived(new("default"), LIFE[:3]).to_record()
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "place"),
+    [
+        (["actuation", "actuators", 0, "lag"], -1.0, "actuation.actuators[0].lag"),
+        (["actuation", "actuators", 0, "lag"], "inf", "actuation.actuators[0].lag"),
+        (["actuation", "actuators", 0, "delay"], -1, "actuation.actuators[0].delay"),
+        (["actuation", "actuators", 0, "delay"], 1001, "actuation.actuators[0].delay"),
+        (["actuation", "actuators", 0, "rest"], "inf", "actuation.actuators[0].rest"),
+        (["actuation", "hidden"], [HIDDEN | {"time": 0.0}], "actuation.hidden[0].time"),
+        (["actuation", "hidden"], [HIDDEN | {"rest": "nan"}], "actuation.hidden[0].rest"),
+        (["actuation", "hidden"], [HIDDEN | {"settled": True}], "actuation.hidden[0]"),
+        (["actuation", "hidden"], [HIDDEN | {"commands": [1]}], ""),
+        (["sums", 0, "weights", 0, 0], -1, ""),
+        (["sums", 0, "chain", "states", 0], -1, ""),
+        (["sums", 0, "chain", "form"], "x", "sums[0].chain"),
+        (["sums", 0, "chain", "motion", "white"], -1.0, "sums[0].chain.motion"),
+        (["chains", 0, "sensors", 0], "inf", "chains[0].sensors"),
+    ],
+)
+def test_what_cannot_have_been_learnt_is_refused_by_its_place(remembered, path, value, place):
+    identified = ["memory", "latest", "identified"]
+    with pytest.raises(tl.InvalidInput) as refusal:
+        tl.Campaign.from_record(damaged(remembered, [*identified, *path], value))
+    whole = ".".join(["memory_of_default.latest.identified", *([place] if place else [])])
+    assert f"ecord {whole}" in str(refusal.value)
+
+
 def test_what_was_learnt_from_more_runs_than_there_are_is_refused():
     record = through_json(lived(new("default"), LIFE[:3]).to_record())
     record["logbook"]["experiments"].pop()

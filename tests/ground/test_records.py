@@ -22,7 +22,7 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.search.structure import Other, Sum
-from twinloop.identification.sensors.chains import Chain, Motion
+from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 from twinloop.records import KINDS, Recorded, from_text, plain, to_text
@@ -186,9 +186,7 @@ def test_a_pool_comes_back_as_it_was(pool):
 
 @given(ANY_NUMBER, st.lists(ANY_NUMBER, max_size=4))
 def test_numbers_come_back_to_the_bit_those_that_json_cannot_write_too(number, several):
-    chain = Chain(
-        (0,), None, "acceleration", np.array(several), np.array([number, 1.0]), Motion(number, 0.0, 1.0)
-    )
+    chain = Chain((0,), None, "acceleration", np.ones(1), np.array(several), moved=number)
     assert same(again(chain), chain)
 
 

@@ -12,13 +12,15 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
 from twinloop.identification.evidence import CORRELATED, Evidence, price
+from twinloop.identification.places import check_places
 from twinloop.identification.records import Run
 from twinloop.identification.search.structure import Sum, total
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
-from twinloop.records import Recorded
+from twinloop.records import Recorded, beside
+from twinloop.signals import Signals
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +87,14 @@ class Hypothesis(Recorded, kind="hypothesis"):
     smoothed: bool = False
     of_part: bool = False
     searches: int = 0
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Hypothesis:
+        found = super()._read(record, where, given)
+        signals = beside(Signals, given, f"{where}.signals")
+        sums, chains = (*found.sums, *found.from_above), (*found.driven, *found.given)
+        check_places(where, signals, found.pool, sums, chains, found.actuation)
+        return found
 
     @property
     def pool(self) -> Pool:

@@ -11,13 +11,14 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput
+from twinloop.identification.places import check_places
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import KINEMATIC, exact
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import Actuation
 from twinloop.law.noise import CorrelatedDisturbance, Noise
-from twinloop.records import Recorded
+from twinloop.records import Recorded, beside
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
 
@@ -64,36 +65,13 @@ class Identified(Recorded, kind="identified"):
     }
 
     @classmethod
-    def from_record(cls, record: object, *given: object) -> Identified:
-        """What a record was written of.
-
-        Args:
-            record: such as `to_record` gives, or JSON gives back.
-            given: the signals of the system.
-
-        Returns:
-            The same, to the bit.
-
-        Raises:
-            InvalidInput: another kind, a newer version, an unknown or missing key, or values that do not fit together.
-        """
-        found = super().from_record(record, *given)
-        signals = next(value for value in given if isinstance(value, Signals))
-        states = {
-            state for chain in (*found.chains, *(sum_.chain for sum_ in found.sums)) for state in chain.states
-        }
-        subsets = [subset.terms for sum_ in found.sums for subset in sum_.subsets]
-        fits = (
-            all(0 <= state < signals.n_x for state in states)
-            and all(0 <= node < len(found.pool) for subset in subsets for node in subset)
-            and found.offsets.shape == (signals.n_x,)
-            and len(found.actuation.actuators) == signals.n_u
-            and found.pool.inputs == signals.n_x + signals.n_u
-            and len(found.members) > 0
-        )
-        if not fits:
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Identified:
+        found = super()._read(record, where, given)
+        signals = beside(Signals, given, f"{where}.signals")
+        check_places(where, signals, found.pool, found.sums, found.chains, found.actuation)
+        if found.offsets.shape != (signals.n_x,) or not found.members:
             raise InvalidInput(
-                "Record identified: expected states, commands and nodes that there are, found others; it belongs to"
+                f"Record {where}: expected offsets of {signals.n_x} states and a committee, found others; it belongs to"
                 " other signals, or is damaged."
             )
         return found

@@ -9,9 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats
+from twinloop._ground.arrays import Floats, at_least_zero, number, whole
+from twinloop.errors import InvalidInput
 from twinloop.records import Record, Recorded
 from twinloop.signals import Signals
+
+LONGEST_DELAY = 1000
+"""Periods; the engine refuses more."""
 
 
 class Actuator(NamedTuple):
@@ -103,6 +107,15 @@ class Actuation(Recorded, kind="actuation"):
         return tuple(state for state in self.hidden if state.states)
 
     @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Actuation:
+        found = super()._read(record, where, given)
+        for i, actuator in enumerate(found.actuators):
+            _check_actuator(actuator, f"Record {where}.actuators[{i}]")
+        for i, state in enumerate(found.hidden):
+            _check_hidden(state, f"Record {where}.hidden[{i}]")
+        return found
+
+    @classmethod
     def renewed(cls, record: Record) -> Record:
         """A record of an earlier version, in which commands alone filled hidden states."""
         found = super().renewed(record)
@@ -151,3 +164,26 @@ def delayed(model: _core.Model, signals: Signals, periods: float = 1.0) -> _core
         for actuator in actuation.actuators
     ]
     return _core.Model(model.program, model.form, signals.engine, late, list(actuation.hidden), model.offsets)
+
+
+def _check_actuator(actuator: Actuator, where: str) -> None:
+    """Refuses numbers that no actuator has."""
+    at_least_zero(f"{where}.lag", actuator.lag)
+    if whole(f"{where}.delay", actuator.delay) > LONGEST_DELAY:
+        raise InvalidInput(
+            f"{where}.delay: expected at most {LONGEST_DELAY} periods, found {actuator.delay}; change it."
+        )
+    if actuator.rest is not None:
+        number(f"{where}.rest", actuator.rest)
+
+
+def _check_hidden(state: HiddenState, where: str) -> None:
+    """Refuses what no hidden state is."""
+    number(f"{where}.time", state.time, above=0.0)
+    if state.rest is not None:
+        number(f"{where}.rest", state.rest)
+    driven = bool(state.commands) != bool(state.states)
+    if not driven or (state.commands and state.settled) or (state.states and state.rest is None):
+        raise InvalidInput(
+            f"{where}: expected commands that drive it and that it is not settled, or states and a rest, found others."
+        )

@@ -99,7 +99,7 @@ class Recorded:
         optional = [name for name in names if not _required(fields[name])]
         found = checked_record(record, cls, names, where, optional=optional)
         values = {name: read(hints[name], found[name], f"{where}.{name}", given) for name in found}
-        values |= {name: _given(hints[name], given, f"{where}.{name}") for name in cls.GIVEN}
+        values |= {name: beside(hints[name], given, f"{where}.{name}") for name in cls.GIVEN}
         return cls(**values)
 
 
@@ -257,6 +257,26 @@ def read(hint: Any, value: object, where: str, given: tuple[object, ...] = ()) -
     return _read_protocol(hint, value, where, given)
 
 
+def beside(hint: Any, given: tuple[object, ...], where: str) -> Any:
+    """What a record does not repeat.
+
+    Args:
+        hint: its type.
+        given: beside the record.
+        where: how to call it in an error.
+
+    Raises:
+        InvalidInput: it was not given.
+    """
+    for value in given:
+        if isinstance(value, hint):
+            return value
+    wanted = getattr(hint, "__name__", hint)
+    raise InvalidInput(
+        f"Record {where}: expected a {wanted} beside the record, found none; pass it to from_record."
+    )
+
+
 def to_text(record: Mapping[str, object]) -> str:
     """A record as one line of JSON; numbers have all their digits."""
     return json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
@@ -271,16 +291,6 @@ def _hints(cls: type) -> dict[str, Any]:
 
 def _required(field: dataclasses.Field[Any]) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-
-
-def _given(hint: Any, given: tuple[object, ...], where: str) -> object:
-    for value in given:
-        if isinstance(value, hint):
-            return value
-    wanted = getattr(hint, "__name__", hint)
-    raise InvalidInput(
-        f"Record {where}: expected a {wanted} beside the record, found none; pass it to from_record."
-    )
 
 
 def _read_union(choices: tuple[Any, ...], value: object, where: str, given: tuple[object, ...]) -> Any:

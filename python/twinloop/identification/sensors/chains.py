@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from twinloop._ground.arrays import Floats
-from twinloop.law.forms import DERIVATIVES
+from twinloop._ground.arrays import Floats, at_least_zero
+from twinloop.errors import unknown
+from twinloop.law.forms import DERIVATIVES, FORMS
 from twinloop.law.noise import renewed_form
 from twinloop.records import Record, Recorded
 from twinloop.signals import Signals
@@ -59,6 +60,16 @@ class Chain(Recorded, kind="chain"):
     moved: float = math.inf
 
     VERSION = 3
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Chain:
+        found = super()._read(record, where, given)
+        if found.form not in FORMS:
+            raise unknown(f"form in the record {where}", found.form[:60], FORMS)
+        for name in ("sensors", "motion"):
+            for size in getattr(found, name):
+                at_least_zero(f"Record {where}.{name}", size)
+        return found
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
