@@ -15,6 +15,7 @@ from law_twins import TWINS, twin_of
 from oracles import EXACT, evaluate, registers_of, same_bits
 from strategies import exact_programs, program_text, programs, rows
 from twinloop import _core
+from twinloop.identification.terms.pool import Pool
 from twinloop.law.equations import equations
 from twinloop.law.forms import FORMS
 from twinloop.law.law import Law
@@ -84,6 +85,20 @@ def each_line_is_read_by_sympy(text):
         bare = line.split("#")[0].strip()
         if bare:
             sympy.sympify(bare.split(" = ", 1)[-1])
+
+
+def test_names_that_sympy_has_meanings_for_are_read_with_locals_as_the_docs_say():
+    states = (tl.State("I", "A", 1.0), tl.State("beta", "rad", 1.0))
+    signals = replace(SIGNALS, states=states, commands=(tl.Command("N", "V", (-1.0, 1.0)),))
+    pool = Pool(3)
+    program = pool.program_of_sums([{pool.product(0, 1): 2.0, 2: 1.0}, {pool.product(0, 1): 3.0, 2: 1.0}])
+    law = Law.of(_core.Model(program, "absolute", signals.engine), signals)
+    symbols = {name: sympy.Symbol(name) for name in ("I", "beta", "N")}
+    for _, right in written(equations(law)):
+        assert sympy.sympify(right, locals=symbols).free_symbols == set(symbols.values())
+        with pytest.raises(TypeError):
+            sympy.sympify(right)
+    assert "`locals`" in tl.Twin.equations.__doc__
 
 
 def tame(program, inputs, size=1e3):

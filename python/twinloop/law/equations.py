@@ -39,7 +39,7 @@ class _Piece:
 
 
 def equations(law: Law, members: Sequence[Law] = (), digits: int = 6, flown: Sequence[Span] = ()) -> str:
-    """A law as text that SymPy reads, too.
+    """A law as text that SymPy reads, too, with symbols for the names as its `locals`.
 
     Sums are multiplied out and like terms collected, unless every bit is asked for. A line that goes on begins with the
     sign of its first term.

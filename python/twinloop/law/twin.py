@@ -210,7 +210,10 @@ class Twin(Shown, Recorded, kind="twin"):
         return Twin(self.model, self.signals, limits=self._limits, noise=self.noise)
 
     def equations(self, digits: int = 6) -> str:
-        """The twin as text, which SymPy reads as well.
+        """The twin as text, which SymPy reads as well if its `locals` have a symbol for each name.
+
+        Without them `sympify` takes names such as I, E, S, N or beta for something of SymPy's own. The export `sympy`
+        is a script that makes its symbols itself.
 
         Args:
             digits: significant digits of constants; 17 give every bit.
