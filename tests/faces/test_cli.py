@@ -333,7 +333,10 @@ def test_an_output_that_cannot_print_every_letter_shows_the_result(encoding):
     done = twinloop_command(*TINY, env={**os.environ, "PYTHONIOENCODING": encoding}, errors="replace")
     assert done.returncode == 0 and "Traceback" not in done.stderr
     assert "BEST CONTROLLER FLOWN" in done.stdout and "measured" in done.stdout
+    # An output in ASCII gets UTF-8 all the same, others hyphens for what they cannot print.
+    assert ("─" in done.stdout) == encoding.startswith("ascii")
     answer = twinloop_command(*TINY, "--json", env={**os.environ, "PYTHONIOENCODING": encoding})
+    assert answer.stdout.isascii()
     assert json.loads(answer.stdout)["experiments"][0]["test"] == 0
 
 

@@ -15,7 +15,10 @@ from contextlib import contextmanager
 from twinloop.errors import RemarkWarning
 
 DASHES = "─–—−"
-"""What a stream that cannot print them shows as hyphens; of all else that it cannot print it shows a question mark."""
+"""What a stream that cannot print them shows as hyphens; of all else that it cannot print it shows a question mark.
+
+A stream in ASCII never comes to it: click writes UTF-8 there.
+"""
 NEAREST = "twinloop.nearest"
 """Name of that rule, for `codecs`."""
 
