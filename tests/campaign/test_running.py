@@ -69,7 +69,10 @@ def test_what_is_riskier_than_allowed_waits_and_is_not_flown(pendulum):
             "draws": 2,
         },
     )
-    with pytest.raises(tl.TooRisky, match=r"at most 0, found 0\.\d+ for test 1; the test was not flown"):
+    with pytest.raises(
+        tl.TooRisky, match=r"at most 0, found 0\.\d+ for test 1; the test was not flown: raise"
+    ) as refusal:
         campaign.run(pendulum, 2, max_risk=0.0)
+    assert "still waits" not in str(refusal.value)  # nothing holds it after the process
     assert [test.number for test in campaign.waiting] == [1] and len(campaign.experiments) == 1
     assert len(campaign.run(pendulum, 2, max_risk=0.9).experiments) == 2

@@ -150,6 +150,7 @@ def test_the_risk_that_is_allowed_holds_for_a_file_too(folder):
     written(folder, PENDULUM, section("rig:rig"))
     stopped = run("run", "rig.toml", "--experiments", "2", "--threads", "1", "--max-risk", "0")
     assert stopped.exit_code == 1 and "risk" in stopped.stderr and len(flights("rig.db")) == 1
+    assert "was not flown and still waits" in stopped.stderr
 
 
 def test_a_built_in_system_needs_no_other_section(folder):

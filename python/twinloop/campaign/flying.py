@@ -78,10 +78,15 @@ def fly(
         test = _next(campaign, system, last=campaign.runs + 1 == budget)
         check_signals(test, system.signals)
         if test.risk is not None and test.risk > allowed:
+            # Without a store it waits as long as this process lasts, and a command ends with this sentence.
+            kept = (
+                " and still waits: fly it by hand, abandon it, or raise max_risk."
+                if campaign.store is not None
+                else ": raise max_risk, or keep the campaign in a store, where a test waits to be flown by hand."
+            )
             raise TooRisky(
                 f"Campaign.run: expected a test that leaves the envelope with a probability of at most"
-                f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; the test was not flown"
-                " and still waits: fly it by hand, abandon it, or raise max_risk."
+                f" {allowed:.3g}, found {test.risk:.3g} for test {test.number}; the test was not flown{kept}"
             )
         announce()
         failed = _flown(campaign, system, test, timeout, failed)
