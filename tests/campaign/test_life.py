@@ -205,6 +205,19 @@ def test_an_untold_test_never_switches_off_exploiting():
     assert campaign.status(waiting) == "asked"
 
 
+def test_while_the_last_test_waits_another_one_is_planned_as_without_last():
+    campaign, plain = begun(), begun()
+    for each in (campaign, plain):
+        each.run(PLANT, 2)
+        last = each.ask(last=True)
+        assert last.excitation is None and last.reason.startswith("The best gains found on the twin")
+    again = campaign.ask(last=True)
+    assert same_bits(again.genes, plain.ask().genes) and again.excitation is not None
+    campaign.abandon(last := campaign.tests[last.number])
+    anew = campaign.ask(last=True)
+    assert anew.same_as(replace(last, number=anew.number))
+
+
 # Runs that were cut
 
 

@@ -175,7 +175,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
         Args:
             last: whether this is the last test. The preset "default" then flies its best gains without excitation,
-                unless its option `exploit_last` is off or its option `tests` uses no committee. The preset "paper"
+                unless its option `exploit_last` is off or its option `tests` uses no committee. While such a test
+                waits for its run, that one is the last, and another is planned as without `last`. The preset "paper"
                 ignores it.
 
         Returns:

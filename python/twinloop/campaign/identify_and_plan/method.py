@@ -158,14 +158,16 @@ class IdentifyAndPlan:
                 " neither; fly a controller that you trust: campaign.test(gains), then campaign.tell."
             )
         tuned = self._gains(book)
+        waits = _waits(book, tuned)
+        final = last and self.options.exploit_last and not waits
         found = self.planner.propose(
             committee,
             tuned,
             self._flown(book, best, tuned),
             self.setup.goal,
             len(book.tests),
-            self._exploits(book, tuned, last),
-            last and self.options.exploit_last,
+            final or (self.setup.goal == "control" and len(book.flown) > 1 and not waits),
+            final,
         )
         gusts = committee.moved_by_gusts(self._as_test(book, found))
         predicted, spread = gusts.added_to(found.predicted, found.spread)
@@ -329,15 +331,6 @@ class IdentifyAndPlan:
         unit = Unit(setup.seed).part(told, 3)
         return Gusts(latest.identified.model, noise, setup.quality, unit, setup.limits, self.workers)
 
-    def _exploits(self, book: Logbook, tuned: Floats, last: bool) -> bool:
-        """Whether the tuned gains are flown as they are, unless that is what a test that is waiting does."""
-        wanted = (last and self.options.exploit_last) or (
-            self.setup.goal == "control" and len(book.flown) > 1
-        )
-        return wanted and not any(
-            test.genes.tobytes() == tuned.tobytes() and test.excitation is None for test in book.waiting()
-        )
-
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
         told = len(book.experiments)
@@ -381,6 +374,11 @@ class IdentifyAndPlan:
                 evaluations=0,
             )
         )
+
+
+def _waits(book: Logbook, tuned: Floats) -> bool:
+    """Whether a test that is waiting flies the tuned gains as they are: then that one is the last."""
+    return any(test.genes.tobytes() == tuned.tobytes() and test.excitation is None for test in book.waiting())
 
 
 def _planned(test: Test, found: Proposal) -> Planned:
