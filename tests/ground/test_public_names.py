@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import pytest
 
 import twinloop as tl
+from lives import begun
+from twinloop.faces.figures.plots import Plots
 
 HANDLES = {"engine", "setting", "task", "dynamics"}
 """Members that give the engine what it reads itself; nobody annotates with these."""
@@ -38,8 +40,8 @@ def classes_in(hint):
 
 
 def hints_of(thing, owner=None):
-    """Type hints by name; `Self` is imported for type checkers alone."""
-    return typing.get_type_hints(thing, localns={"Self": owner})
+    """Type hints by name; `Self` and `Plots`, a face, are imported for type checkers alone."""
+    return typing.get_type_hints(thing, localns={"Self": owner, "Plots": object})
 
 
 def meant(member):
@@ -107,6 +109,11 @@ def test_every_public_room_says_which_of_its_names_are_meant(room):
 
 def test_every_type_that_a_public_member_gives_back_has_a_public_name():
     assert nameless(public()) == []
+
+
+def test_what_draws_a_campaign_has_its_type():
+    assert tl.Campaign.plot.fget.__annotations__["return"] == "Plots"
+    assert type(begun().plot) is Plots
 
 
 def test_a_type_without_a_name_is_found_wherever_it_hides(monkeypatch):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -52,6 +52,9 @@ from twinloop.signals import Signals
 from twinloop.systems import System
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from twinloop.faces.figures.plots import Plots
 
 GENTLE = "gentle"
 """The excitation of a first test where nothing else is asked for: the preset's own."""
@@ -648,7 +651,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return cost(self._book)
 
     @property
-    def plot(self) -> Any:
+    def plot(self) -> Plots:
         """Figures by name, such as `campaign.plot.unseen()`; `campaign.plot(path)` draws all flights, .svg or .png."""
         return plots(self)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from twinloop.campaign.campaign import Campaign
+    from twinloop.faces.figures.plots import Plots
 
 
 def reported(campaign: Campaign, to: str | Path | None, name: str) -> str:
@@ -22,9 +23,10 @@ def reported(campaign: Campaign, to: str | Path | None, name: str) -> str:
     return page
 
 
-def plots(campaign: Campaign) -> Any:
+def plots(campaign: Campaign) -> Plots:
     """Figures by name, as `Campaign.plot` describes them."""
-    return _face("figures.plots").Plots(campaign)
+    found: Plots = _face("figures.plots").Plots(campaign)
+    return found
 
 
 def _face(name: str) -> Any:
