@@ -24,18 +24,16 @@ def runs(row=None, size=0.5):
     return found
 
 
-@pytest.mark.parametrize("row", [0, 1, 40, -2, -1])
+@pytest.mark.parametrize("row", [0, 40, -1])
 def test_one_wrong_reading_changes_no_verdict(row):
-    clean, wrong = (tl.identify(found, SIGNALS, seed=0) for found in (runs(), runs(row)))
+    twin = tl.identify(runs(row), SIGNALS, seed=0)
 
-    assert any(remark.code == "outliers" for remark in wrong.remarks)
-    assert not [remark for remark in wrong.remarks if remark.severity == "serious"]
-    assert not wrong.law.actuation.hidden
-    state, command = np.array([0.3, 0.1]), np.array([0.2])
-    for twin in (clean, wrong):
-        linear = twin.linearise(at=state, command=command)
-        np.testing.assert_allclose(linear.A[1], [-9.0 * math.cos(0.3), -0.4], rtol=0.02)
-        np.testing.assert_allclose(linear.B[1], [5.0], rtol=0.02)
+    assert any(remark.code == "outliers" for remark in twin.remarks)
+    assert not [remark for remark in twin.remarks if remark.severity == "serious"]
+    assert not twin.law.actuation.hidden
+    linear = twin.linearise(at=np.array([0.3, 0.1]), command=np.array([0.2]))
+    np.testing.assert_allclose(linear.A[1], [-9.0 * math.cos(0.3), -0.4], rtol=0.02)
+    np.testing.assert_allclose(linear.B[1], [5.0], rtol=0.02)
 
 
 def test_of_a_flight_the_wrong_reading_alone_is_moved_and_the_record_stays():
