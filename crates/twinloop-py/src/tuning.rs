@@ -55,6 +55,37 @@ fn recorded(records: &Records<'_>, n_x: usize, n_u: usize) -> Result<Vec<Recorde
         .collect()
 }
 
+/// A model beside records, which an observer of its states reads.
+struct Posed<'a> {
+    model: &'a PyModel,
+    limits: &'a PyLimits,
+    observer: Vec<Observed>,
+    records: Vec<Recorded>,
+}
+
+impl<'a> Posed<'a> {
+    fn new(model: &'a PyModel, limits: &'a PyLimits, chains: Chains, records: &Records<'_>) -> Result<Self> {
+        let signals = fitting(model, limits)?;
+        let observer = observer(chains, signals.dt)?;
+        let records = recorded(records, signals.states(), signals.commands())?;
+        Ok(Self { model, limits, observer, records })
+    }
+
+    /// With what is free of a program that is the model's, or has the same constants.
+    fn tuning<'b>(
+        &'b self,
+        program: &'b Learnt,
+        free: &'b [usize],
+        lags: &'b [Vec<usize>],
+    ) -> Result<Tuning<'b>> {
+        let Self { model, limits, observer, records } = self;
+        let (code, frame, limits) = (&program.code, model.0.frame(), &limits.0);
+        let tuning = Tuning { code, frame, observer, records, limits, free, lags };
+        tuning.check()?;
+        Ok(tuning)
+    }
+}
+
 /// The model with the constants and lags of the smallest χ²; that χ², readings, covariance of the free values, and
 /// members drawn from it.
 #[pyfunction]
@@ -77,20 +108,9 @@ pub fn tune<'py>(
     workers: Option<&PyWorkers>,
 ) -> Result<(PyModel, f64, usize, Bound<'py, PyArray2<f64>>, Vec<PyModel>)> {
     let workers = or_default(workers)?;
-    let signals = fitting(model, limits)?;
+    let posed = Posed::new(model, limits, chains, &records)?;
     let effective = Learnt::new(model.0.learnt().program.effective());
-    let observer = observer(chains, signals.dt)?;
-    let records = recorded(&records, signals.states(), signals.commands())?;
-    let tuning = Tuning {
-        code: &effective.code,
-        frame: model.0.frame(),
-        observer: &observer,
-        records: &records,
-        limits: &limits.0,
-        free: &free,
-        lags: &lags,
-    };
-    tuning.check()?;
+    let tuning = posed.tuning(&effective, &free, &lags)?;
     let tuned = py.detach(|| tuning.tune(iterations, &workers));
     let drawn = match unit {
         None if draws == 0 => vec![],
@@ -124,20 +144,8 @@ pub fn linearised<'py>(
     workers: Option<&PyWorkers>,
 ) -> Result<Option<PyGram>> {
     let workers = or_default(workers)?;
-    let signals = fitting(model, limits)?;
-    let observer = observer(chains, signals.dt)?;
-    let records = recorded(&records, signals.states(), signals.commands())?;
-    let core = model.0.view();
-    let tuning = Tuning {
-        code: core.code,
-        frame: core.frame,
-        observer: &observer,
-        records: &records,
-        limits: &limits.0,
-        free: &free,
-        lags: &lags,
-    };
-    tuning.check()?;
+    let posed = Posed::new(model, limits, chains, &records)?;
+    let tuning = posed.tuning(model.0.learnt(), &free, &lags)?;
     Ok(py.detach(|| tuning.linearised(&workers)).map(|gram| PyGram(Arc::new(gram))))
 }
 
@@ -154,27 +162,15 @@ pub fn predictions<'py>(
     workers: Option<&PyWorkers>,
 ) -> Result<Option<Vec<OfRun<'py>>>> {
     let workers = or_default(workers)?;
-    let signals = fitting(model, limits)?;
-    let observer = observer(chains, signals.dt)?;
-    let n_x = signals.states();
-    let records = recorded(&records, n_x, signals.commands())?;
-    let core = model.0.view();
-    let tuning = Tuning {
-        code: core.code,
-        frame: core.frame,
-        observer: &observer,
-        records: &records,
-        limits: &limits.0,
-        free: &[],
-        lags: &[],
-    };
-    tuning.check()?;
+    let posed = Posed::new(model, limits, chains, &records)?;
+    let tuning = posed.tuning(model.0.learnt(), &[], &[])?;
+    let n_x = limits.0.signals().states();
     let runs = py.detach(|| tuning.predictions(&workers));
     let of_run = |run: Predictions| {
         (
             to_matrix(py, n_x, run.errors),
             to_matrix(py, n_x, run.states),
-            to_matrix(py, observer.len(), run.gusts),
+            to_matrix(py, posed.observer.len(), run.gusts),
         )
     };
     Ok(runs.map(|runs| runs.into_iter().map(of_run).collect()))

@@ -58,7 +58,6 @@ impl Tuning<'_> {
     }
 
     /// The filters of each record, one a chain.
-    #[inline(never)]
     pub(super) fn whitenings(&self) -> Vec<Vec<Whitening>> {
         let states = self.limits.signals().states();
         let of_chain = |record: &Recorded, observed: &Observed| {
@@ -77,7 +76,6 @@ impl Tuning<'_> {
     }
 
     /// χ² of each variant.
-    #[inline(never)]
     pub(super) fn costs(
         &self,
         whitenings: &[Vec<Whitening>],

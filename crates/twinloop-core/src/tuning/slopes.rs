@@ -22,7 +22,6 @@ impl Tuning<'_> {
     }
 
     /// Gradient and curvature (Gauss and Newton) of half of χ²; none if a variant diverges.
-    #[inline(never)]
     pub(super) fn normal(
         &self,
         whitenings: &[Vec<Whitening>],
