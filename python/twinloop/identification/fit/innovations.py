@@ -23,7 +23,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.description import shortest
 from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import priced
-from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.identification.sensors.noise import floor_of
 
 STEPS = (30.0, 5.0, 1.5)
@@ -110,6 +110,11 @@ class _Likelihood:
         return [run.weights[:, self.states] for run in self.hypothesis.runs]
 
     @cached_property
+    def floor(self) -> tuple[Floats, Motion]:
+        """Variances of the chain's noise below which none is believed."""
+        return floor_of(self.hypothesis.sums[self.i].chain, self.context.signals.dt, self.integration)
+
+    @cached_property
     def longest(self) -> float:
         """Time, s, for which a disturbance may last."""
         return self.context.signals.dt * max(len(weights) for weights in self.counted) / FORGOTTEN
@@ -148,28 +153,35 @@ class _Likelihood:
     def climbed(self, chain: Chain) -> tuple[Chain, float]:
         """The most likely noise that is reached from a chain's by changing one number at a time."""
         best, length = chain, self(chain)
+        numbers = range(len(self.states) + (3 if chain.motion.correlated else 1))
         for step in STEPS:
-            moved = True
-            while moved:
-                moved = False
-                for number in range(len(self.states) + (3 if chain.motion.correlated else 1)):
-                    for factor in (1.0 / step, step):
-                        before = length
-                        while (variant := self._with(best, number, factor)) is not None:
-                            other = self(variant)
-                            if not other < length - MOVE:
-                                break
-                            best, length, moved = variant, other, True
-                        if length < before:
-                            break
+            while True:
+                before = length
+                for number in numbers:
+                    best, length = self._along(best, length, number, step)
+                if not length < before:
+                    break
         return best, length
+
+    def _along(self, chain: Chain, length: float, number: int, step: float) -> tuple[Chain, float]:
+        """A chain with one number of its noise changed by a factor for as long as that gains, and its length."""
+        for factor in (1.0 / step, step):
+            best, least = chain, length
+            while (variant := self._with(best, number, factor)) is not None:
+                other = self(variant)
+                if not other < least - MOVE:
+                    break
+                best, least = variant, other
+            if least < length:
+                return best, least
+        return chain, length
 
     def _with(self, chain: Chain, number: int, factor: float) -> Chain | None:
         """The chain with one number of its noise, first of its sensors, changed by a factor.
 
         None where that would go below what is believed, or make a disturbance last longer than records show.
         """
-        least, slow = floor_of(chain, self.context.signals.dt, self.integration)
+        least, slow = self.floor
         if number < len(self.states):
             sensors = chain.sensors.copy()
             sensors[number] *= factor
