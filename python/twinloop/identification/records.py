@@ -44,6 +44,11 @@ class Run(Recorded, kind="run"):
         """A run of which every reading counts."""
         return Run(states, commands, np.ones_like(states), states)
 
+    @property
+    def engine(self) -> tuple[Floats, Floats, Floats]:
+        """Readings, weights and commands, as the engine takes them."""
+        return self.states, self.weights, self.commands
+
     def continued(self, signals: Signals) -> Run:
         """The run with periodic states that go on from reading to reading by the short way."""
         states = signals.continued(self.states, self.states[0])

@@ -21,7 +21,7 @@ NEAR = 0.02
 INSIDE = 0.02
 """Share of the box by which a search begins inside it: from an edge, half of its first places would be outside."""
 LEVEL, LATEST = 1e-3, 12
-"""Share by which the best scores of so many generations, and the latest median, differ once a search is done."""
+"""Share by which the best scores of so many generations, and the latest median, differ at most where a search ends."""
 LEAST = 1e-300
 """What a place outside the box costs where its score is zero: less than any score."""
 

@@ -92,7 +92,7 @@ def observed(
             identified.model,
             limits.engine,
             [chain.engine for chain in identified.chains],
-            [(run.states, run.weights, run.commands) for run in runs],
+            [run.engine for run in runs],
             workers=workers,
         )
 

@@ -18,7 +18,6 @@ NEARLY = 0.1
 UNPROVEN = 0.028
 """Least risk of gains that have not flown, as long as no prediction has come true since the last one that did not: of
 88 second flights of the zoo and of machines outside it 2 left their envelopes, (2 + 1/2) / (88 + 1)."""
-
 WEIGHT = 4.0
 """Flights that those 88 count as, beside the campaign's own predictions that have not come true."""
 
@@ -118,7 +117,7 @@ def unproven_risk(experiments: Sequence[Experiment], fared: Fared, signals: Sign
         return 0.0
     predicted = [run for run, _ in reversed(_predicted(experiments))]
     untrue = list(takewhile(lambda run: not _came_true(run, NEARLY), predicted))
-    stopped = [run for run in untrue if run.trajectory.ended == "aborted" and not run.left_envelope]
-    counted = [run for run in untrue if len(stopped) > 1 or run not in stopped]
+    stopped = [run.trajectory.ended == "aborted" and not run.left_envelope for run in untrue]
+    counted = [run for run, by_hand in zip(untrue, stopped, strict=True) if sum(stopped) > 1 or not by_hand]
     left = sum(not run.kept_envelope for run in counted)
     return max(UNPROVEN, (UNPROVEN * WEIGHT + left) / (WEIGHT + len(counted)))

@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop.campaign.history import Experiment
+from twinloop.identification.fit.predictions import FEW
 from twinloop.identification.outliers import ignoring, suspects
 from twinloop.identification.records import Run
 from twinloop.signals import Signals
 
 FAR = 10.0
 """Standard deviations of the sensor's noise from which a reading stands out: it weighs as much as a hundred others."""
-FEW = 0.02
-"""Share of a flight's readings, one at least, up to which they are single: of more, the noise is of another kind."""
 
 
 def without_wrong_readings(experiments: Sequence[Experiment], signals: Signals) -> list[Experiment]:
@@ -36,6 +35,7 @@ def without_wrong_readings(experiments: Sequence[Experiment], signals: Signals) 
     found = list(experiments)
     for number, (experiment, run) in enumerate(zip(experiments, runs, strict=True)):
         own = [suspect for suspect in wrong if suspect.run == number]
+        # Where more than a few stand out the noise is of another kind.
         if 0 < len(own) <= max(1.0, FEW * run.states.size):
             for suspect in own:
                 run = ignoring(run, suspect, signals)

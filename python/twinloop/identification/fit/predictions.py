@@ -29,7 +29,7 @@ def predictions(context: Context, hypothesis: Hypothesis) -> Sequence[tuple[Floa
             fit.model,
             context.limits.engine,
             [chain.engine for chain in fit.observer],
-            [(run.states, run.weights, run.commands) for run in hypothesis.runs],
+            [run.engine for run in hypothesis.runs],
             workers=context.workers,
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -39,8 +40,8 @@ def promises(context: Context, hypothesis: Hypothesis, i: int, nodes: Sequence[i
     model, (_, places) = model_of(context, beside), layout(beside)
     added = list(places[i][len(known.weights) :])
     # Constants inside a term of weight 0 change nothing.
-    before = set(inner(placed).values())
-    tuned = [place for place, node in inner(beside).items() if node in before]
+    old = set(inner(placed).values())
+    tuned = [place for place, node in inner(beside).items() if node in old]
     tuned += [place for at in places for place in at if place not in added]
     lags = moving_together(model, beside, context.signals)
     with engine_input():
@@ -48,20 +49,20 @@ def promises(context: Context, hypothesis: Hypothesis, i: int, nodes: Sequence[i
             model,
             context.limits.engine,
             [chain.engine for chain in fit.observer],
-            [(run.states, run.weights, run.commands) for run in hypothesis.runs],
+            [run.engine for run in hypothesis.runs],
             free=[*added, *tuned],
             lags=lags,
             workers=context.workers,
         )
     if gram is None:
         return [0.0] * len(nodes)
-    others = list(range(len(added), gram.features))
-    alone, *beside_one = (
-        gram.solve([*one, *others], RIDGE) for one in ([], *([j] for j in range(len(added))))
-    )
-    gains = {
-        node: alone[2] - more[2]
-        for node, more in zip(new, beside_one, strict=True)
-        if alone is not None and more is not None
-    }
-    return [gains.get(node, 0.0) for node in nodes]
+    others = range(len(added), gram.features)
+
+    def left(*more: int) -> float:
+        """χ² after a step of what is tuned, and of more."""
+        solved = gram.solve([*more, *others], RIDGE)
+        return math.inf if solved is None else solved[2]
+
+    before = left()
+    gains = {node: before - left(j) for j, node in enumerate(new)}
+    return [gain if math.isfinite(gain := gains.get(node, 0.0)) else 0.0 for node in nodes]

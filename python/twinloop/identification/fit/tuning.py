@@ -58,7 +58,7 @@ def tune(
                 model,
                 context.limits.engine,
                 [chain.engine for chain in observer],
-                [(run.states, run.weights, run.commands) for run in hypothesis.runs],
+                [run.engine for run in hypothesis.runs],
                 free=[place for place in free if place not in held] if tuning else [],
                 lags=lags if tuning else [],
                 iterations=steps,

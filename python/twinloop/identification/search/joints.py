@@ -49,7 +49,7 @@ SLACK = 30.0
 STARTS = 3
 """Walks among the terms of each equation."""
 SHORTER = 3
-"""By what share walks are shorter that try one more term of a joint's own mass: there are many such terms."""
+"""How many times shorter walks are that try one more term of a joint's own mass: there are many such terms."""
 STEPS = 12
 """Steps of Gauss and Newton, joint by joint."""
 LEAST = 100

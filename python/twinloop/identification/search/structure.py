@@ -153,27 +153,27 @@ def search(
         _Searched(
             chain,
             problem.regression(chain, columns),
-            before,
+            other,
             prices(problem.pool, usable, problem.readings(chain), len(problem.runs), elsewhere, out),
             precisions(problem, chain, usable),
         )
-        for chain, before, elsewhere, out in zip(
+        for chain, other, elsewhere, out in zip(
             chains, known, favoured or [{}] * len(chains), forbidden or [set()] * len(chains), strict=True
         )
     ]
     unsettled = searched
-    for round_ in range(1 if fixed_noise else NOISE_ROUNDS):
+    for round_ in range(NOISE_ROUNDS):
         found = _chosen(problem, usable, unsettled, _walk_of(walks, round_, problem))
         for one, subsets in zip(unsettled, found, strict=True):
             one.subsets = subsets
         if fixed_noise:
             break
-        noisy = _noisy(problem, unsettled, len(usable))
-        moved = [_differ(chain, one.chain, problem) for one, chain in zip(unsettled, noisy, strict=True)]
-        for one, chain in zip(unsettled, noisy, strict=True):
+        before = [one.chain for one in unsettled]
+        for one, chain in zip(unsettled, _noisy(problem, unsettled, len(usable)), strict=True):
             one.chain = chain
         # Chains share nothing but their features: one whose noise has settled waits for no other.
-        unsettled = [one for one, again in zip(unsettled, moved, strict=True) if again]
+        pairs = zip(unsettled, before, strict=True)
+        unsettled = [one for one, chain in pairs if _differ(one.chain, chain, problem)]
         if not unsettled:
             break
     return [_sum(problem, usable, one) for one in searched]
