@@ -24,7 +24,7 @@ def by_innovations(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     Returns:
         The same terms, with the constants inside them that tuning has found, and without those that are nothing then.
     """
-    best, latest = hypothesis, described(context, hypothesis).of(hypothesis)
+    best, latest = hypothesis, described(context, hypothesis).under_noise
     for _ in range(TURNS):
         # Fitting estimates the noise behind what it has tuned.
         latest = fitted(context, settled(latest))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop.identification.context import Context
-from twinloop.identification.fit.innovations import Described, described
+from twinloop.identification.fit.innovations import described
 from twinloop.identification.fit.models import bounds_of, layout, model_of
 from twinloop.identification.fit.predictions import without_outliers
 from twinloop.identification.fit.support import supported
@@ -33,24 +33,16 @@ def fitted(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     The noise that its innovations say takes the place of the one that it had, for the model is tuned by noise and the
     noise estimated behind the model.
     """
-    best, found = _described(context, _pruned(context, hypothesis))
+    best = described(context, _pruned(context, hypothesis))
     for _ in range(TURNS):
-        if found is None or found.gained <= GAIN:
+        if best.gained <= GAIN:
             break
-        other, found = _described(context, _tuned(context, found.of(best))[0])
-        if not other.evidence.stable or best.evidence.length < other.evidence.length - GAIN:
+        other = described(context, _tuned(context, best.under_noise)[0])
+        evidence = other.hypothesis.evidence
+        if not evidence.stable or best.hypothesis.evidence.length < evidence.length - GAIN:
             break
         best = other
-    return best
-
-
-def _described(context: Context, hypothesis: Hypothesis) -> tuple[Hypothesis, Described | None]:
-    """The hypothesis with the description length of its fit, and how that was found; nothing where it diverges."""
-    fit = hypothesis.fit
-    if fit is None or not fit.stable:
-        return hypothesis, None
-    found = described(context, hypothesis)
-    return replace(hypothesis, fit=replace(fit, length=found.length)), found
+    return best.hypothesis
 
 
 def _pruned(context: Context, hypothesis: Hypothesis) -> Hypothesis:

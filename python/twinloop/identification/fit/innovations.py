@@ -23,7 +23,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.description import shortest
 from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import priced
-from twinloop.identification.sensors.chains import Chain, Motion
+from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
 
 STEPS = (30.0, 5.0, 1.5)
@@ -39,19 +39,20 @@ class Described:
     """What the innovations of a fitted hypothesis say for it.
 
     Args:
-        chains: those that outputs drive, each under its most likely noise.
-        length: of the description of all readings, with terms and correlated disturbances paid for.
-        gained: by how much that is shorter than under the noise that the hypothesis had.
+        hypothesis: with the length of its description: of all readings, with terms and correlated disturbances paid for.
+        chains: those that outputs drive, each under its most likely noise; none where the model diverges.
+        gained: by how much the description is shorter than under the noise that the hypothesis had.
     """
 
-    chains: tuple[Chain, ...]
-    length: float
-    gained: float
+    hypothesis: Hypothesis
+    chains: tuple[Chain, ...] = ()
+    gained: float = 0.0
 
-    def of(self, hypothesis: Hypothesis) -> Hypothesis:
-        """The hypothesis under this noise, its model to be tuned with it."""
-        sums = (replace(sum_, chain=chain) for sum_, chain in zip(hypothesis.sums, self.chains, strict=True))
-        return replace(hypothesis, sums=tuple(sums))
+    @property
+    def under_noise(self) -> Hypothesis:
+        """The hypothesis under the most likely noise, its model to be tuned with it."""
+        pairs = zip(self.hypothesis.sums, self.chains, strict=True)
+        return replace(self.hypothesis, sums=tuple(replace(sum_, chain=chain) for sum_, chain in pairs))
 
 
 def described(context: Context, hypothesis: Hypothesis) -> Described:
@@ -59,11 +60,14 @@ def described(context: Context, hypothesis: Hypothesis) -> Described:
 
     Args:
         context: of the identification.
-        hypothesis: with a stable fit.
+        hypothesis: with a fit; nothing is known of one that is not stable.
 
     Returns:
         Lengths of −2 log likelihood, up to what is the same for all hypotheses of the same readings.
     """
+    fit = hypothesis.fit
+    if fit is None or not fit.stable:
+        return Described(hypothesis)
     chains, length, before = [], 0.0, 0.0
     problem = posed(context, hypothesis)
     for i, found in enumerate(hypothesis.sums):
@@ -79,7 +83,7 @@ def described(context: Context, hypothesis: Hypothesis) -> Described:
             hypothesis.pool, list(found.weights), likelihood.readings, len(hypothesis.runs)
         )
         before += likelihood(chain) - least
-    return Described(tuple(chains), length, before)
+    return Described(replace(hypothesis, fit=replace(fit, length=length)), tuple(chains), before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,14 +114,13 @@ class _Likelihood:
         return [run.weights[:, self.states] for run in self.hypothesis.runs]
 
     @cached_property
-    def floor(self) -> tuple[Floats, Motion]:
-        """Variances of the chain's noise below which none is believed."""
-        return floor_of(self.hypothesis.sums[self.i].chain, self.context.signals.dt, self.integration)
-
-    @cached_property
-    def longest(self) -> float:
-        """Time, s, for which a disturbance may last."""
-        return self.context.signals.dt * max(len(weights) for weights in self.counted) / FORGOTTEN
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Least and greatest numbers of the chain's noise that are believed: its sensors', then what disturbs it."""
+        sensors, motion = floor_of(
+            self.hypothesis.sums[self.i].chain, self.context.signals.dt, self.integration
+        )
+        longest = self.context.signals.dt * max(len(weights) for weights in self.counted) / FORGOTTEN
+        return np.concatenate([sensors, motion]), np.array([*[np.inf] * (len(sensors) + 2), longest])
 
     @property
     def readings(self) -> int:
@@ -164,10 +167,22 @@ class _Likelihood:
         return best, length
 
     def _along(self, chain: Chain, length: float, number: int, step: float) -> tuple[Chain, float]:
-        """A chain with one number of its noise changed by a factor for as long as that gains, and its length."""
+        """A chain with one number of its noise, first of its sensors, changed by a factor for as long as that gains.
+
+        It stays above what is believed, and a disturbance lasts no longer than records show.
+
+        Returns:
+            The chain, and its length.
+        """
+        sensors, (low, high) = len(self.states), self.bounds
         for factor in (1.0 / step, step):
-            best, least = chain, length
-            while (variant := self._with(best, number, factor)) is not None:
+            best, least, numbers = chain, length, np.concatenate([chain.sensors, chain.motion])
+            while True:
+                numbers[number] *= factor
+                if not low[number] <= numbers[number] <= high[number]:
+                    break
+                white, correlated, time = numbers[sensors:].tolist()
+                variant = chain.with_noise(numbers[:sensors].copy(), (white, correlated, time))
                 other = self(variant)
                 if not other < least - MOVE:
                     break
@@ -175,20 +190,3 @@ class _Likelihood:
             if least < length:
                 return best, least
         return chain, length
-
-    def _with(self, chain: Chain, number: int, factor: float) -> Chain | None:
-        """The chain with one number of its noise, first of its sensors, changed by a factor.
-
-        None where that would go below what is believed, or make a disturbance last longer than records show.
-        """
-        least, slow = self.floor
-        if number < len(self.states):
-            sensors = chain.sensors.copy()
-            sensors[number] *= factor
-            return chain.with_noise(sensors, chain.motion) if sensors[number] >= least[number] else None
-        k = number - len(self.states)
-        motion = list(chain.motion)
-        motion[k] *= factor
-        if motion[k] < slow[k] or (k == 2 and motion[k] > self.longest):
-            return None
-        return chain.with_noise(chain.sensors, (motion[0], motion[1], motion[2]))
