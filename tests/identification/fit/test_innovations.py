@@ -125,6 +125,6 @@ def test_terms_are_paid_for():
     model = model_of(context, other := replace(grown, sums=(weighed,), fit=None))
     other = replace(other, fit=replace(hypothesis.fit, model=model))
     costs = [priced(grown.pool, list(sum_.weights), 202, 2) for sum_ in (found, weighed)]
-    lengths = [described(context, each).length for each in (hypothesis, other)]
+    lengths = [described(context, each).hypothesis.evidence.length for each in (hypothesis, other)]
     assert lengths[1] - lengths[0] == pytest.approx(costs[1] - costs[0], abs=1e-6)
     assert costs[1] > costs[0]

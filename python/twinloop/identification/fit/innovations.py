@@ -39,7 +39,7 @@ class Described:
     """What the innovations of a fitted hypothesis say for it.
 
     Args:
-        hypothesis: with the length of its description: of all readings, with terms and correlated disturbances paid for.
+        hypothesis: with its length, of all readings, with terms and correlated disturbances paid for.
         chains: those that outputs drive, each under its most likely noise; none where the model diverges.
         gained: by how much the description is shorter than under the noise that the hypothesis had.
     """
