@@ -281,6 +281,11 @@ class Model:
         """By how much later than others each state is read (n_x,), s; empty where all are read in time."""
     def with_offsets(self, offsets: Sequence[float]) -> Model:
         """The same model, read so much later (n_x,), s: only states that others give may be."""
+    @property
+    def levels(self) -> list[list[float]]:
+        """Of each command, rising; empty where all are sent as they are."""
+    def with_levels(self, levels: Sequence[Sequence[float]]) -> Model:
+        """The same model, to which controllers' commands are sent in levels (n_u); without any, as they are."""
     def states_of(self, readings: ArrayLike) -> _Floats:
         """The states (rows, n_x) whose readings these are, each at the start of a run."""
     def with_constants(self, constants: Sequence[float], lags: Sequence[float] | None) -> Model:

@@ -2,6 +2,7 @@
 
 use crate::dynamics::{Dynamics, step_apart};
 use crate::lanes::Vector;
+use crate::levels::Levels;
 use crate::model::Model;
 use crate::plants::Quadrotor;
 
@@ -67,6 +68,14 @@ impl<'a> Dynamics for AnyDynamics<'a> {
                 step_apart(*plant, workspace, state, command);
             }
             _ => unreachable!("a workspace belongs to the dynamics that made it"),
+        }
+    }
+
+    #[inline(always)]
+    fn levels(&self) -> Option<&Levels> {
+        match self {
+            Self::Model(model) => model.levels(),
+            Self::Quadrotor(plant) => plant.levels(),
         }
     }
 

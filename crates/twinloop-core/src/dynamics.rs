@@ -1,6 +1,7 @@
 //! Dynamics: what maps a state and a held command to the next state; a model and a plant are the same to a roll-out.
 
 use crate::lanes::{Apart, Scalar, Vector, scalars};
+use crate::levels::Levels;
 
 /// A discrete-time system, stepped on several lanes at once.
 pub trait Dynamics {
@@ -16,6 +17,12 @@ pub trait Dynamics {
 
     /// Replaces the state (n_x lanes) by the one a period later, under the command (n_u lanes) held for that period.
     fn step<V: Vector>(&self, workspace: &mut Self::Workspace<V>, state: &mut [V], command: &[V]);
+
+    /// The levels in which commands of controllers are sent; none where they are sent as they are.
+    #[inline(always)]
+    fn levels(&self) -> Option<&Levels> {
+        None
+    }
 
     /// Whether sensors read every state as it is.
     #[inline(always)]

@@ -5,6 +5,7 @@ use crate::controller::{Controllers, Family};
 use crate::dynamics::{Dynamics, read_apart};
 use crate::excitation::Excitation;
 use crate::lanes::{Apart, Vector, zeros};
+use crate::levels::Levels;
 use crate::task::target_at;
 
 /// What runs start from, one a lane.
@@ -170,6 +171,7 @@ fn looped<D: Dynamics, V: Vector>(
             commands,
             controllers: controllers.as_mut(),
             step,
+            levels: dynamics.levels(),
             reading: &reading,
             command: &mut command,
         });
@@ -208,6 +210,8 @@ struct Send<'a, V> {
     /// Of a law.
     controllers: Option<&'a mut Controllers<V>>,
     step: usize,
+    /// In which commands of a law are sent; a record is of what was sent.
+    levels: Option<&'a Levels>,
     reading: &'a [V],
     command: &'a mut [V],
 }
@@ -220,6 +224,9 @@ impl<V: Vector> Apart for Send<'_, V> {
                 let target = target_at(target, self.reading.len(), self.step);
                 family.command(controllers, self.reading, target, self.command);
                 excitation.add(family, self.step, self.reading, self.command);
+                if let Some(levels) = self.levels {
+                    levels.send(self.command);
+                }
             }
             (Commands::Records(rows), _) => {
                 let width = self.command.len();

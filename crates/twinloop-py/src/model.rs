@@ -83,6 +83,17 @@ impl PyModel {
         Ok(Self(self.0.with_offsets(&offsets)?))
     }
 
+    /// The same model, with controllers' commands sent in levels (n_u); none of a command that is sent as it is.
+    fn with_levels(&self, levels: Vec<Vec<f64>>) -> Result<Self> {
+        Ok(Self(self.0.with_levels(levels)?))
+    }
+
+    /// The levels of each command; empty where all are sent as they are.
+    #[getter]
+    fn levels(&self) -> Vec<Vec<f64>> {
+        self.0.frame().levels().each().to_vec()
+    }
+
     /// By how much later than others each state is read, s; empty where all are read in time.
     #[getter]
     fn offsets(&self) -> Vec<f64> {

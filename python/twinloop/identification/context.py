@@ -17,6 +17,7 @@ from twinloop.identification.search.walks import Walks
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.directions import Direction
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.levels import Levels
 from twinloop.signals import Signals
 
 SEARCHED_ANEW = 4
@@ -35,6 +36,7 @@ class Context:
         workers: how the work is carried out.
         rests: commands whose effect may be there at the start of a run (n_u,).
         axes: directions in which the controller moves alike commands.
+        levels: in which commands of controllers are sent (n_u,); none where all are sent as they are.
         earlier: what was learnt from fewer runs.
         watch: called with each step that begins.
         as_integrated: whether chains that step bear what integration leaves, too: where forms are compared, what a
@@ -48,6 +50,7 @@ class Context:
     workers: _core.Workers
     rests: Sequence[Floats] = ()
     axes: Sequence[Direction] = ()
+    levels: Levels = ()
     earlier: Identified | None = None
     watch: Watch = unwatched
     as_integrated: bool = False

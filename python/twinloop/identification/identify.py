@@ -39,6 +39,7 @@ from twinloop.identification.remarks import held_at_bounds, late_sensors, other_
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import starts
 from twinloop.identification.terms.directions import Direction
+from twinloop.law.levels import Levels
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -90,6 +91,7 @@ def identify_runs(
     *,
     rests: Sequence[Floats] = (),
     axes: Sequence[Direction] = (),
+    levels: Levels = (),
     seed: int = 0,
     iteration: int = 0,
     earlier: Identified | None = None,
@@ -106,6 +108,7 @@ def identify_runs(
         options: of the identification.
         rests: commands whose effect may be there at the start of a run (n_u,).
         axes: directions in which the controller moves alike commands.
+        levels: in which commands of controllers are sent (n_u,); none where all are sent as they are.
         seed: of the campaign.
         iteration: of the campaign, which tells its random numbers from those of others.
         earlier: what was learnt from fewer runs; its terms are candidates again.
@@ -126,6 +129,7 @@ def identify_runs(
         workers,
         rests=rests,
         axes=axes,
+        levels=levels,
         earlier=earlier,
         watch=watch,
     )

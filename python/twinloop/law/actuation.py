@@ -163,7 +163,10 @@ def delayed(model: _core.Model, signals: Signals, periods: float = 1.0) -> _core
         actuator._replace(delay=actuator.delay + whole, lag=actuator.lag + lag)
         for actuator in actuation.actuators
     ]
-    return _core.Model(model.program, model.form, signals.engine, late, list(actuation.hidden), model.offsets)
+    slower = _core.Model(
+        model.program, model.form, signals.engine, late, list(actuation.hidden), model.offsets
+    )
+    return slower.with_levels(model.levels) if model.levels else slower
 
 
 def _check_actuator(actuator: Actuator, where: str) -> None:

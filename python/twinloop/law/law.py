@@ -10,6 +10,7 @@ from twinloop import _core
 from twinloop.errors import engine_input
 from twinloop.law.actuation import Actuation
 from twinloop.law.expressions import UPRIGHT, Expressions, Node
+from twinloop.law.levels import Levels
 from twinloop.signals import RigidBody, Signals
 
 
@@ -31,6 +32,7 @@ class Law:
         outputs: nodes of the outputs, in the order of the states that they drive.
         actuation: actuators and hidden states.
         offsets: delay of each state's readings against those of the driven states (n_x,), s.
+        levels: in which commands of controllers are sent (n_u,); none where all are sent as they are.
     """
 
     signals: Signals
@@ -39,6 +41,7 @@ class Law:
     outputs: tuple[int, ...]
     actuation: Actuation
     offsets: tuple[float, ...]
+    levels: Levels = ()
 
     @staticmethod
     def of(model: _core.Model, signals: Signals) -> Law:
@@ -55,13 +58,14 @@ class Law:
         outputs = expressions.entered(model.program)
         actuation = Actuation.of(model, signals)
         offsets = tuple(model.offsets) or (0.0,) * signals.n_x
-        return Law(signals, model.form, expressions, outputs, actuation, offsets)
+        levels = tuple(map(tuple, model.levels))
+        return Law(signals, model.form, expressions, outputs, actuation, offsets, levels)
 
     def model(self) -> _core.Model:
         """The engine's model of this law, which roll-outs run."""
         program = self.expressions.program(self.outputs, self.inputs)
         with engine_input():
-            return _core.Model(
+            model = _core.Model(
                 program,
                 self.form,
                 self.signals.engine,
@@ -69,6 +73,7 @@ class Law:
                 self.actuation.hidden,
                 self.offsets,
             )
+            return model.with_levels(self.levels) if self.levels else model
 
     @property
     def inputs(self) -> int:

@@ -30,14 +30,18 @@ def read_program(value: object, where: str) -> _core.Program:
 
 
 def model_record(model: _core.Model) -> dict[str, Any]:
-    """A model without its signals: program, form, lags and delays of each command, hidden states, sensors' offsets."""
-    record = {
+    """A model without its signals: program, form, actuators, hidden states, sensors' offsets, levels of commands."""
+    record: dict[str, Any] = {
         "program": str(model.program),
         "form": model.form,
         "actuators": [dict(zip(ACTUATOR_KEYS, actuator, strict=True)) for actuator in model.actuators],
         "hidden": [_hidden_record(*hidden) for hidden in model.hidden],
     }
-    return record | {"offsets": model.offsets} if model.offsets else record
+    if model.offsets:
+        record["offsets"] = model.offsets
+    if model.levels:
+        record["levels"] = model.levels
+    return record
 
 
 def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Model:
@@ -48,7 +52,7 @@ def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Mo
         raise InvalidInput(
             f"Record {where}: expected the signals of the model beside the record, found none; pass them."
         )
-    found = keys(value, MODEL_KEYS, where, optional=("offsets",))
+    found = keys(value, MODEL_KEYS, where, optional=("offsets", "levels"))
     program = read_program(found["program"], f"{where}.program")
     actuators = [
         _actuator(item, f"{where}.actuators[{i}]")
@@ -62,9 +66,14 @@ def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Mo
         read_number(item, f"{where}.offsets[{i}]")
         for i, item in enumerate(read_list(found.get("offsets", []), f"{where}.offsets"))
     ]
+    levels = [
+        [read_number(value, f"{where}.levels[{i}]") for value in read_list(each, f"{where}.levels[{i}]")]
+        for i, each in enumerate(read_list(found.get("levels", []), f"{where}.levels"))
+    ]
     with engine_input():
         form = read_text(found["form"], f"{where}.form")
-        return _core.Model(program, form, signals, actuators or None, hidden, offsets)
+        model = _core.Model(program, form, signals, actuators or None, hidden, offsets)
+        return model.with_levels(levels) if levels else model
 
 
 def _actuator(value: object, where: str) -> tuple[float, int, float | None]:

@@ -4,6 +4,7 @@ use super::form::Form;
 use crate::actuators::Actuation;
 use crate::difference::Periods;
 use crate::error::Result;
+use crate::levels::Levels;
 use crate::sensors::Sensors;
 use crate::signals::{RigidBody, Signals};
 
@@ -85,6 +86,7 @@ pub struct Frame {
     pub(super) periods: Periods,
     pub(super) actuation: Actuation,
     pub(super) sensors: Sensors,
+    pub(super) levels: Levels,
 }
 
 impl Frame {
@@ -110,6 +112,7 @@ impl Frame {
             periods,
             actuation,
             sensors,
+            levels: Levels::default(),
         }
     }
 
@@ -125,6 +128,16 @@ impl Frame {
     /// The same, read by such sensors.
     pub fn with_sensors(self, sensors: Sensors) -> Self {
         Self { sensors, ..self }
+    }
+
+    /// The same, with commands that are sent in such levels.
+    pub fn with_levels(self, levels: Levels) -> Self {
+        Self { levels, ..self }
+    }
+
+    /// What is sent of commands.
+    pub fn levels(&self) -> &Levels {
+        &self.levels
     }
 
     /// What reads the states.

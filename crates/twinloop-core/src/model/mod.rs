@@ -20,6 +20,7 @@ use crate::error::{Result, invalid};
 use crate::hidden::Storage;
 use crate::integrator::{Stages, rk4};
 use crate::lanes::{Vector, numbers, vectors, zeros};
+use crate::levels::Levels;
 use crate::lgp::{Bank, Code, Program};
 use crate::sensors::Recent;
 use crate::signals::Signals;
@@ -209,6 +210,11 @@ impl Dynamics for Model<'_> {
     fn step<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &mut [V], command: &[V]) {
         self.remember(workspace, command);
         self.advance(workspace, state, command);
+    }
+
+    #[inline(always)]
+    fn levels(&self) -> Option<&Levels> {
+        Some(&self.frame.levels).filter(|levels| !levels.is_none())
     }
 
     #[inline(always)]

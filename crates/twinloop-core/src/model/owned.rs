@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{Form, Frame, Model};
 use crate::actuators::Actuation;
 use crate::error::{Result, invalid};
+use crate::levels::Levels;
 use crate::lgp::Learnt;
 use crate::sensors::Sensors;
 use crate::signals::Signals;
@@ -44,6 +45,12 @@ impl OwnedModel {
     pub fn with_offsets(&self, offsets: &[f64]) -> Result<Self> {
         let frame = (*self.frame).clone().with_sensors(Sensors::new(offsets, &self.signals)?);
         Ok(Self { frame: Arc::new(frame), ..self.clone() })
+    }
+
+    /// The same, with controllers' commands sent in levels, or none of a command that is sent as it is (n_u).
+    pub fn with_levels(&self, levels: Vec<Vec<f64>>) -> Result<Self> {
+        let levels = Levels::new(levels, self.signals.commands())?;
+        Ok(Self { frame: Arc::new((*self.frame).clone().with_levels(levels)), ..self.clone() })
     }
 
     /// The same without introns, with these constants, lags and times of hidden states.

@@ -14,6 +14,7 @@ from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
+from twinloop.campaign.identify_and_plan.levels import levels_of, levels_said
 from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
 from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from, shortened
@@ -156,6 +157,7 @@ class Learner:
             self.setup.signals,
             rests=resting_commands(self.setup, [one.experiment for one in selected]),
             axes=self._axes(),
+            levels=levels_of([one.experiment for one in selected], self.setup.signals),
             seed=self.setup.seed,
             workers=self.workers,
             watch=self.watch,
@@ -203,6 +205,7 @@ class Learner:
                 *identified.remarks,
                 *shortened(selected, signals.dt),
                 *stand_ins(actuation, signals, explained),
+                *levels_said(identified.model, signals),
                 *diagnostics_of(
                     book.experiments,
                     self.setup.signals,

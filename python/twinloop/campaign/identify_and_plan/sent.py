@@ -49,7 +49,7 @@ def exchanged(run: Experiment) -> tuple[int, int] | None:
     Args:
         run: of a test.
     """
-    return None if run.test is None else _exchanged(*_sent_and_asked(run.test, run.trajectory), run.test)
+    return None if run.test is None else _exchanged(*sent_and_asked(run.test, run.trajectory), run.test)
 
 
 def _exchanged(sent: Floats, asked: Floats, test: Test) -> tuple[int, int] | None:
@@ -70,7 +70,7 @@ def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
     for run in experiments:
         if run.test is None or run.test.number in found:
             continue
-        sent, asked = _sent_and_asked(run.test, run.trajectory)
+        sent, asked = sent_and_asked(run.test, run.trajectory)
         span = span_of(run.test)
         size = np.square((asked - asked.mean(axis=0)) / span).mean(axis=0)
         off = apart(sent, asked, run.test)
@@ -82,7 +82,7 @@ def _unlike(experiments: Sequence[Experiment]) -> dict[int, bool]:
     return found
 
 
-def _sent_and_asked(test: Test, run: Trajectory) -> tuple[Floats, Floats]:
+def sent_and_asked(test: Test, run: Trajectory) -> tuple[Floats, Floats]:
     """Commands on record (n, n_u), and those of the controller with its excitation as it was flown.
 
     An excitation that was left out, or not held back, is another fault, and is said by itself.

@@ -67,6 +67,8 @@ def committee(context: Context, hypothesis: Hypothesis, fit: Fit, rivals: Sequen
     if hypothesis.offsets.any():
         # What flies them from here on is read as the runs were.
         members = [member.with_offsets(hypothesis.offsets.tolist()) for member in members]
+    if context.levels:
+        members = [member.with_levels(context.levels) for member in members]
     return Seated(members, observer, bool(others))
 
 
