@@ -109,6 +109,28 @@ def test_play_is_found_between_two_states():
     assert free_run_error(twin, behind_play, (0.0,) * 4, pushed(0.4, 3), SHAFT) < 0.02
 
 
+def test_a_limited_power_is_found():
+    road = tl.Signals([tl.State("speed", "m/s", 10.0)], [tl.Command("throttle", "1", (0.0, 1.0))], DT)
+
+    def on_the_road(x, u):
+        return np.array([9.0 * min(u, 4.0 / x[0]) - 0.6 * x[0]])
+
+    def driven(seed):
+        return np.clip(0.5 + pushed(0.5, seed, steps=400, held=25), 0.2, 1.0)
+
+    runs = [flown(on_the_road, (6.0,), driven(seed), road, [1e-2], seed) for seed in (1, 2)]
+    limited = [run.commands[:, 0] * run.states[1:, 0] > 4.0 for run in runs]
+    assert all(0.1 < np.mean(each) < 0.9 for each in limited)
+
+    twin = tl.identify(runs, road, seed=0)
+    without = tl.identify(runs, road, seed=0, options={"contacts": False})
+
+    assert min(abs(10.0 * place - 4.0) for place in places(twin)) < 0.1
+    error = free_run_error(twin, on_the_road, (6.0,), driven(3), road)
+    assert error < 1e-4
+    assert error < 0.1 * free_run_error(without, on_the_road, (6.0,), driven(3), road)
+
+
 def test_a_linear_plant_has_no_hinge():
     def slope(x, u):
         return np.array([x[1], u - 0.8 * x[1] - 3.0 * x[0]])
@@ -139,9 +161,10 @@ def test_a_hinge_is_nothing_on_one_side_and_grows_on_the_other():
     np.testing.assert_array_equal(pool.values([of_force], mirrored), -pool.values([of_force], inputs))
 
 
+@pytest.mark.parametrize("least", [-1.0, 0.5])
 @pytest.mark.parametrize("factor", [2.0**20, 2.0**-7])
-def test_hinges_do_not_depend_on_units(factor):
-    inputs = np.random.default_rng(0).uniform(-1.0, 1.0, (200, 3))
+def test_hinges_do_not_depend_on_units(factor, least):
+    inputs = np.random.default_rng(0).uniform(least, 1.0, (200, 3))
     other = tl.Signals(
         [
             tl.State("position", "m", factor),
@@ -154,7 +177,8 @@ def test_hinges_do_not_depend_on_units(factor):
     for signals, scale in ((RAIL, 1.0), (other, factor)):
         pool, seen = Pool(3), inputs * [scale, scale, 1.0]
         terms = [entered(pool, hinge, 100) for hinge in hinges(signals, seen)]
-        rated = [1 in pool.leaves(term) for term in terms]
+        # Times a rate; a power is over the speed again.
+        rated = [1 in pool.leaves(term) and 2 not in pool.leaves(term) for term in terms]
         values.append(pool.values(terms, seen) / np.where(rated, scale, 1.0))
     np.testing.assert_array_equal(*values)
 

@@ -2,12 +2,12 @@
 
 A stop pushes once it is touched, a gear turns its load once the play is used up, a valve lets nothing through before it
 is a little open. No polynomial says so. A hinge max(0, z - c) does (Friedman 1991), and times the rate of z it is what
-a contact loses (Hunt and Crossley 1975).
+a contact loses (Hunt and Crossley 1975). At a speed v a motor of limited power gives u - max(0, u v - c) / v.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -23,6 +23,8 @@ PLACES = 16
 """Places that are tried between the least and the largest value of a coordinate, and as many among its readings."""
 MOST = 400
 """Hinges that are tried; where there would be more, fewer places are."""
+SLOW = 0.05
+"""Share of its largest value that a state is above where a command is limited by what it is times that state."""
 WORTH = 10.0
 """Nats that a hinge must gain beside its description: with a few of them anything can be drawn."""
 
@@ -37,6 +39,8 @@ class Hinge:
         rates: the inputs that are the derivatives of those; none where there are none, or the term is without them.
         side: 1 if it grows above the place, -1 below it, 0 on both sides of 0 alike.
         place: c, in units of the scale.
+        over: a state and its scale that z is the input times, and the term is over: what a limited power takes from the
+            input; None: there is none.
     """
 
     inputs: tuple[int, ...]
@@ -44,6 +48,7 @@ class Hinge:
     rates: tuple[int, ...]
     side: int
     place: float = 0.0
+    over: tuple[int, float] | None = None
 
 
 def hinges(signals: Signals, inputs: Floats) -> list[Hinge]:
@@ -56,14 +61,17 @@ def hinges(signals: Signals, inputs: Floats) -> list[Hinge]:
     Returns:
         Of states that are no rates and do not wrap, and of commands of one sign, to either side; of differences of two
         states of one unit, and of commands of two signs, to both sides alike. Those of states and of differences also
-        times their rate.
+        times their rate. Of commands times a state that keeps away from 0, over that state: what a limited power takes
+        from them.
     """
-    kinds = list(_kinds(signals))
+    kinds = list(_kinds(signals, [i for i in range(signals.n_x) if _keeps_away_from_zero(inputs[:, i])]))
     count = min(PLACES, MOST // (2 * max(1, len(kinds))))
     found = []
     for kind in kinds:
         first, *second = (inputs[:, i] for i in kind.inputs)
         values = (first - second[0] if second else first) / kind.scale
+        if kind.over is not None:
+            values = values * (inputs[:, kind.over[0]] / kind.over[1])
         places = _places(values if kind.side else np.abs(values), count)
         found += [replace(kind, place=place) for place in places]
     return found
@@ -79,6 +87,9 @@ def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
     """
     first, *second = hinge.inputs
     coordinate = pool.share(pool.add("-", first, second[0]) if second else first, hinge.scale)
+    speed = None if hinge.over is None else pool.share(*hinge.over)
+    if speed is not None:
+        coordinate = pool.product(coordinate, speed)
     above = pool.add("max", pool.add("-", coordinate, hinge.place), 0.0)
     place = hinge.place if hinge.side else -hinge.place
     below = pool.add("max", pool.add("-", pool.constant(place), coordinate), 0.0)
@@ -89,12 +100,24 @@ def entered(pool: Pool, hinge: Hinge, tried: int) -> int:
     if hinge.rates:
         first, *second = hinge.rates
         force = pool.product(depth, pool.add("-", first, second[0]) if second else first)
+    if speed is not None:
+        force = pool.add("/", force, speed)
     pool.found.setdefault(force, WORTH + float(log(tried)))
     return force
 
 
-def _kinds(signals: Signals) -> Iterator[Hinge]:
-    """Coordinates, sides and rates of hinges; their places are still to be found."""
+def _keeps_away_from_zero(values: Floats) -> bool:
+    """Whether all are above zero, the least by a good share of the largest."""
+    return float(values.min()) > SLOW * float(np.abs(values).max())
+
+
+def _kinds(signals: Signals, positive: Sequence[int]) -> Iterator[Hinge]:
+    """Coordinates, sides and rates of hinges; their places are still to be found.
+
+    Args:
+        signals: of the system.
+        positive: states that a command may be limited by its product with.
+    """
     states, moving = signals.states, rates(signals)
     of = {state.derivative_of: i for i, state in enumerate(states) if state.derivative_of is not None}
     resting = [i for i in range(signals.n_x) if i not in moving and i not in periodic(signals)]
@@ -109,6 +132,9 @@ def _kinds(signals: Signals) -> Iterator[Hinge]:
     for place, command in enumerate(signals.commands, signals.n_x):
         for side in (0,) if command.bounds[0] < 0.0 < command.bounds[1] else (1, -1):
             yield Hinge((place,), 1.0, (), side)
+        for state in positive:
+            for side in (1, -1) if state not in periodic(signals) else ():
+                yield Hinge((place,), 1.0, (), side, over=(state, states[state].scale))
 
 
 def _places(values: Floats, count: int) -> list[float]:
