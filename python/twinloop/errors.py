@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
@@ -96,6 +97,8 @@ def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:
 def engine_input() -> Iterator[None]:
     """Turns the engine's refusals into `InvalidInput`, with the engine's own sentence.
 
+    What a user's code raises while the engine calls it comes out as it is.
+
     Raises:
         InvalidInput: where the engine raised a ValueError, or an OverflowError for a count below 0.
     """
@@ -104,5 +107,16 @@ def engine_input() -> Iterator[None]:
     except TwinloopError:
         raise
     except (ValueError, OverflowError) as refusal:
+        if _raised_by_others(refusal):
+            raise
         sentence = str(refusal)
         raise InvalidInput(sentence if sentence.endswith((".", "?")) else f"{sentence}.") from refusal
+
+
+def _raised_by_others(error: BaseException) -> bool:
+    """Whether an error in a block of `engine_input` passed through frames of another package than the block's own.
+
+    The engine has no frames of Python: what it refuses itself is raised in the frame that called it.
+    """
+    _, *frames = traceback.walk_tb(error.__traceback__)  # the first one is that of `engine_input`
+    return len({str(frame.f_globals.get("__name__")).partition(".")[0] for frame, _ in frames}) > 1
