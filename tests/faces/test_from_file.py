@@ -122,7 +122,7 @@ def test_a_system_that_hangs_is_given_up_in_a_sentence_and_nothing_is_lost(folde
     words = ["run", "rig.toml", "--experiments", "2", "--threads", "1"]
     stopped = run(*words, *(["--timeout", "0.5"] if by == "option" else []))
     assert stopped.exit_code == 1
-    assert "did not answer test 1 within 0.5 s; the test still waits and nothing is lost" in stopped.stderr
+    assert "test 1 within 0.5 s; check it. The test still waits and nothing is lost" in stopped.stderr
     assert "Continue with: twinloop resume rig.db" in stopped.stderr
     assert "1 experiment" in stopped.stdout and len(flights("rig.db")) == 1
     (folder / "mended").touch()

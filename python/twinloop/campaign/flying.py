@@ -126,8 +126,14 @@ def _flown(campaign: Campaign, system: System, test: Test, timeout: float | None
     """One run, entered with its result: whether the system failed, which it may not do `again`."""
     try:
         trajectory = run_within(system, test, timeout)
-    except NoAnswer:
-        raise
+    except NoAnswer as failure:
+        # As for what is too risky: without a store nothing outlasts this process.
+        kept = (
+            "The test still waits and nothing is lost: continue, or abandon the test."
+            if campaign.store is not None
+            else "The test waits no longer than this process lasts; a campaign in a store can be continued in another."
+        )
+        raise NoAnswer(f"{failure} {kept}") from failure
     except SystemFailure as failure:
         campaign.tell_failed(test, str(failure))
         if again or not campaign.experiments:

@@ -82,7 +82,7 @@ class Folder(System):
             The logged run.
 
         Raises:
-            NoAnswer: no log in time, or one that cannot be read; the test still waits, and so does the log.
+            NoAnswer: no log in time, or one that cannot be read; another call goes on waiting for it.
             InvalidInput: the test is for other signals, or the folder holds tests of another campaign.
         """
         check_signals(test, self._signals)
@@ -133,7 +133,7 @@ class Folder(System):
             elif self.timeout is not None and now - begun > self.timeout:
                 raise NoAnswer(
                     f"Folder {self.path}: expected flight-{digits}.csv or .npz within {self.timeout:g} s, found none;"
-                    " the test still waits: check the rig, and continue once the log is there."
+                    " check the rig, and go on once the log is there."
                 )
             time.sleep(min(LOOK, self.settled))
 
@@ -146,7 +146,7 @@ class Folder(System):
         try:
             run = load(log, self._signals, ended=ended, reason=reason or "the rig stopped it")
         except TwinloopError as refusal:
-            raise NoAnswer(f"{refusal} The test still waits; correct {log.name}, and go on.") from refusal
+            raise NoAnswer(f"{refusal} Correct {log.name}, and go on.") from refusal
         if run.steps > test.steps or (ended == "completed" and run.steps < test.steps):
             advice = "cut it" if run.steps > test.steps else f"write why it was stopped into {why.name}"
             raise NoAnswer(

@@ -41,8 +41,8 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
     before = _hanging.get(id(system))
     if before is not None and before.is_alive():
         raise NoAnswer(
-            "The system has not come back from the test before, which it did not answer in time; correct it, and"
-            " continue in a new process."
+            "The system has not come back from the test before, which it did not answer in time; correct it, and take"
+            " a new process."
         )
     answer: list[Trajectory] = []
     failure: list[BaseException] = []
@@ -60,10 +60,7 @@ def run_within(system: System, test: Test, seconds: float | None) -> Trajectory:
         thread.join(min(LOOK, limit))
     if thread.is_alive():
         _hanging[id(system)] = thread
-        raise NoAnswer(
-            f"The system did not answer test {test.number} within {limit:g} s; the test still waits and nothing is"
-            " lost: check the system, then continue, or abandon the test."
-        )
+        raise NoAnswer(f"The system did not answer test {test.number} within {limit:g} s; check it.")
     if failure:
         raise failure[0]
     return answer[0]
