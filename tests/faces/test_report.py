@@ -19,12 +19,13 @@ from twinloop.faces.cli import main
 from twinloop.faces.figures.axis import axis
 from twinloop.faces.figures.catalogue import FIGURES
 from twinloop.faces.figures.figure import Band, Figure, Line, Panel
+from twinloop.faces.figures.flights import step
 from twinloop.faces.figures.svg import drawing, panel_svg
 from twinloop.faces.report.moot import moot
 from twinloop.faces.report.page import report_page
 from twinloop.faces.report.source import OWN
 from twinloop.faces.report.tables.controller import margins as margins_table
-from twinloop.faces.report.verdict import of_next
+from twinloop.faces.report.verdict import of_next, verdict
 from twinloop.faces.result import summary
 from twinloop.records import to_text
 
@@ -108,6 +109,16 @@ def test_a_controller_that_flew_has_one_prediction_the_one_before_its_flight():
     assert row[1:3] == [f"{before.predicted:.4g}", f"{before.spread:.2g}"]
     certified = facts(campaign, campaign.certificate(), "p.db", "p", None, {})["prediction"]
     assert (certified["quality"], certified["spread"]) == (before.predicted, before.spread)
+
+
+def test_gains_that_have_flown_only_with_an_excitation_are_not_said_never_to_have_flown(bad):
+    found = bad.examine()
+    assert found.best_flights and all(run.test.excitation is not None for run in found.best_flights)
+    assert step(found).title.endswith("predicted, flown only with an excitation")
+    result = summary(bad, {"name": "p"}, {})
+    result["controller"]["measured"] = None  # where a flight with an excitation does not measure them
+    _, of_controller, _ = verdict(found, bad.checks(), result)
+    assert "predicted, flown only with an excitation; the first gains" in of_controller.text
 
 
 def test_numbers_that_rest_on_a_twin_that_does_not_follow_give_way_to_the_reason(page, good, monkeypatch):

@@ -19,6 +19,7 @@ from twinloop.campaign.assessment import (
 )
 from twinloop.campaign.cost import Cost
 from twinloop.campaign.examination.beside import Beside
+from twinloop.campaign.examination.examination import Examination
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.controllers import Gain
 from twinloop.law.accuracy import TestErrors
@@ -86,7 +87,7 @@ def summary(campaign: Campaign, system: Mapping[str, object], run_info: Mapping[
         ],
         "withdrawn": [{"test": each.test, "reason": each.reason} for each in campaign.withdrawals],
         "cost": _cost(campaign.cost),
-        "controller": None if best is None else _controller(campaign, best, found.planned, identified),
+        "controller": None if best is None else _controller(campaign, best, found, identified),
         "no_controller": found.no_controller or None,
         "first_controller": _first_controller(campaign, twin, identified),
         "run_info": dict(run_info),
@@ -117,10 +118,11 @@ def _quality(quality: Quality) -> dict[str, object]:
 
 
 def _controller(
-    campaign: Campaign, best: Test, planned: Trajectory | None, identified: bool
+    campaign: Campaign, best: Test, examination: Examination, identified: bool
 ) -> dict[str, object]:
     bounds = campaign.family.at_bounds(best.genes)
     predicted, spread = predicted_quality(best, campaign.experiments)
+    planned = examination.planned
     found: dict[str, object] = {
         "test": best.number,
         "gains": [
@@ -141,7 +143,7 @@ def _controller(
         else {"t": planned.t, "commands": planned.commands, **_foretold(planned)},
     }
     if identified:
-        flown = any(run.number == best.number for run in campaign.experiments)
+        flown = bool(examination.best_flights)
         found |= {"spread": spread, "risk": best.risk, "why": best.reason, "flown": flown}
     return found
 

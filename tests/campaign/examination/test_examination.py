@@ -12,7 +12,7 @@ import lives
 import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
-from twinloop.campaign.examination.checking import _damping, _delay
+from twinloop.campaign.examination.checking import _damping, _delay, _of_controller
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
 from twinloop.campaign.examination.data import movements
 from twinloop.campaign.examination.use import strongest_commands
@@ -164,6 +164,20 @@ def test_a_twin_without_an_end_stop_that_the_system_has_does_not_pass():
     checks = lives.learnt(lives.with_end_stop, 3).checks()
     assert not checks.twin_passed
     assert {check.subject for check in checks.failed} >= {"twin"}
+
+
+def test_gains_have_flown_in_whichever_test_they_flew(good):
+    run = good.experiments[0]
+    stopped = dataclasses.replace(run, trajectory=lives.cut(run.trajectory, 9))
+    for runs, sentence in (
+        ((run,), "have completed a flight within"),
+        ((stopped,), "have not completed a flight within"),
+        (good.experiments[1:], "have not flown yet"),
+    ):
+        found = good.examine()
+        found.best, found.experiments = dataclasses.replace(run.test.quiet(), number=99), runs
+        (check,) = (check for check in _of_controller(found) if check.name == "flown")
+        assert sentence in check.sentence and check.passed == (runs == (run,))
 
 
 def test_the_least_movement_is_that_of_the_state_that_moved_least_in_its_best_flight(good):

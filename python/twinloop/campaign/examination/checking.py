@@ -183,8 +183,9 @@ def _of_controller(found: Examination) -> Iterator[Check]:
             f" {risk_words(best.risk, found.setup.predicted_flights)} according to the committee, to gusts as the"
             f" flights felt them and to flights of these gains; at most {100.0 * RISK:g} % is allowed.",
         )  # fmt: skip
-    flown = any(run.number == best.number and run.kept_envelope for run in found.experiments)
+    kept = any(run.kept_envelope for run in found.best_flights)
+    not_kept = "not completed a flight within the envelope" if found.best_flights else "not flown yet"
     yield Check(
-        "flown", "controller", None, None, flown, False,
-        "These gains have completed a flight within the envelope." if flown else "These gains have not flown yet.",
+        "flown", "controller", None, None, kept, False,
+        f"These gains have {'completed a flight within the envelope' if kept else not_kept}.",
     )  # fmt: skip

@@ -285,9 +285,20 @@ class Examination:
         return None if self.best is None else self.twin.simulate(self.best.quiet())
 
     @cached_property
+    def best_flights(self) -> tuple[Experiment, ...]:
+        """Flights of the gains of the controller to fly, with any excitation."""
+        if self.best is None:
+            return ()
+        genes = self.best.genes.tobytes()
+        return tuple(
+            run for run in self.experiments if run.test is not None and run.test.genes.tobytes() == genes
+        )
+
+    @cached_property
     def best_flown(self) -> Experiment | None:
         """The last flight of the controller to fly without excitation; None: there was none."""
-        return self._flown_by(self.best)
+        quiet = [run for run in self.best_flights if run.test is not None and run.test.excitation is None]
+        return quiet[-1] if quiet else None
 
     @cached_property
     def first_flown(self) -> Experiment | None:
@@ -300,19 +311,6 @@ class Examination:
         if self.first_flown is None or self.first_flown.test is None or self.best is None:
             return None
         return self.twin.simulate(replace(self.best.quiet(), genes=self.first_flown.test.genes))
-
-    def _flown_by(self, test: Test | None) -> Experiment | None:
-        if test is None:
-            return None
-        for run in reversed(self.experiments):
-            flown = run.test
-            if (
-                flown is not None
-                and flown.excitation is None
-                and flown.genes.tobytes() == test.genes.tobytes()
-            ):
-                return run
-        return None
 
     @cached_property
     def moved(self) -> tuple[int, ...]:

@@ -10,6 +10,7 @@ from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.figure import Band, Figure, Level, Line, Mark, Panel
 from twinloop.faces.figures.units import in_words, labelled, said, shown_unit, words
+from twinloop.faces.text.words import flown_words
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory, continued
 
@@ -97,10 +98,9 @@ def step(found: Examination) -> Figure | None:
             else [_line(found.signals, i, found.old, "old", "first gains, on the twin")]
         )
         panels.append(Panel(panel.title, (*old, *panel.marks), panel.x_label, panel.y_label))
-    flown = "flown and " if found.best_flown is not None else "not flown yet, "
     return Figure(
         "step",
-        f"The task under the controller to fly: {flown}predicted",
+        f"The task under the controller to fly: predicted, {flown_words(found)}",
         panels,
         "Without excitation, from the campaign's start to its target. The band holds nine of ten readings, by the"
         " committee and the sensors' noise.",

@@ -13,7 +13,7 @@ from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.units import in_words, words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
-from twinloop.faces.text import quality_words
+from twinloop.faces.text.words import flown_words, quality_words
 
 EVIDENCE = {
     "follows": "flights",
@@ -147,7 +147,9 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
     measure = result["quality"]
     quality = quality_words(measure["kind"], measure["unit"]).rstrip(")")
     worth = f"{quality}{'; ' if measure['unit'] else ' ('}lower is better): {_predicted(found, best)}"
-    worth += f", {shown_value(best['measured'])} flown" if best["measured"] is not None else ", not flown yet"
+    worth += (
+        f", {flown_words(found)}" if best["measured"] is None else f", {shown_value(best['measured'])} flown"
+    )
     if first is not None and first["measured"] is not None:
         worth += f"; the first gains had {shown_value(first['measured'])}"
     margins = _margins(found)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from twinloop.campaign.examination.examination import Examination
+
 
 def held_at(gain: Mapping[str, Any]) -> str:
     """Where a gain of a result stands at a bound, for a person.
@@ -52,6 +54,20 @@ def predicted_flights(result: Mapping[str, Any]) -> int | None:
     options = result.get("options", {})
     members, draws = options.get("committee_size"), options.get("draws")
     return None if members is None or draws is None else members * draws
+
+
+def flown_words(found: Examination) -> str:
+    """Whether the gains of the controller to fly have flown, for a person.
+
+    Args:
+        found: of a campaign with such a controller.
+
+    Returns:
+        "flown", "flown only with an excitation" or "not flown yet".
+    """
+    if found.best_flown is not None:
+        return "flown"
+    return "flown only with an excitation" if found.best_flights else "not flown yet"
 
 
 def counted(measure: Mapping[str, Any]) -> str:
