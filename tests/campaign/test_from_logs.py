@@ -46,7 +46,16 @@ def test_a_run_that_is_learnt_is_not_held_out():
         learnt_from_logs([run], SIGNALS, [by_hand(40)])
 
 
-@pytest.mark.parametrize("runs", [[], [np.zeros((3, 2))], "flight.csv", by_hand(40)])
-def test_what_is_no_list_of_runs_is_refused(runs):
-    with pytest.raises(tl.InvalidInput, match="at least one Trajectory"):
+@pytest.mark.parametrize(
+    ("runs", "found"),
+    [
+        ([], "an empty list"),
+        ([np.zeros((3, 2))], "ndarray in it; load"),
+        ("flight.csv", "str in it; load"),
+        (None, "NoneType; load"),
+        (by_hand(40), r"one without a list around it; write \[run\]"),
+    ],
+)
+def test_what_is_no_list_of_runs_is_refused(runs, found):
+    with pytest.raises(tl.InvalidInput, match=f"at least one Trajectory.*found {found}"):
         tl.identify(runs, SIGNALS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from twinloop.campaign.campaign import Campaign
 from twinloop.campaign.history import Progress
@@ -67,13 +67,9 @@ def learnt_from_logs(
     Raises:
         InvalidInput: no runs, a run that cannot be learnt, or one that is both learnt and held out.
     """
-    no_list = isinstance(runs, Trajectory) or isinstance(held_out, Trajectory)
-    found, apart = ([], []) if no_list else (list(runs), list(held_out))
-    if not found or not all(isinstance(run, Trajectory) for run in [*found, *apart]):
-        raise InvalidInput(
-            "identify: expected at least one Trajectory, such as twinloop.load gives, found something else; pass a"
-            " list."
-        )
+    found, apart = _listed(runs), _listed(held_out)
+    if not found:
+        raise _no_runs("an empty list; pass what is to be learnt")
     if any(equal_runs(run, other) for run in apart for other in found):
         raise InvalidInput(
             "identify: expected runs to hold out that are not learnt, found one that is, equal to the last digit; leave"
@@ -99,3 +95,22 @@ def learnt_from_logs(
         campaign.attach(run)
     campaign.interrupted = True  # what was learnt so far is enough
     return twin, campaign
+
+
+def _listed(runs: object) -> list[Trajectory]:
+    """Runs as a list, once they are."""
+    if isinstance(runs, Trajectory):
+        raise _no_runs("one without a list around it; write [run]")
+    if not isinstance(runs, Iterable):
+        raise _no_runs(f"{type(runs).__name__}; load the logs first")
+    listed = list(runs)
+    for each in listed:
+        if not isinstance(each, Trajectory):
+            raise _no_runs(f"{type(each).__name__} in it; load the logs first")
+    return listed
+
+
+def _no_runs(found: str) -> InvalidInput:
+    return InvalidInput(
+        f"identify: expected a list of at least one Trajectory, such as twinloop.load gives, found {found}."
+    )
