@@ -152,6 +152,27 @@ def test_what_cannot_have_been_learnt_is_refused_by_its_place(remembered, path, 
     assert f"ecord {whole}" in str(refusal.value)
 
 
+GUST = {"states": [1, 0], "form": "acceleration", "sd": 0.1, "correlation_time": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "place"),
+    [
+        (["noise", "sensors", 0], "inf", "noise.sensors"),
+        (["noise", "sensors", 0], -1.0, "noise.sensors"),
+        (["noise", "moves", 1], "nan", "noise.moves"),
+        (["noise", "correlated"], [GUST | {"sd": "inf"}], "noise.correlated[0].sd"),
+        (["noise", "correlated"], [GUST | {"correlation_time": 0.0}], "noise.correlated[0].correlation_time"),
+        (["noise", "dt"], "nan", "noise.dt"),
+        (["inflation"], "inf", "inflation"),
+    ],
+)
+def test_a_band_that_cannot_be_drawn_is_refused_by_its_place(remembered, path, value, place):
+    with pytest.raises(tl.InvalidInput) as refusal:
+        tl.Campaign.from_record(damaged(remembered, ["memory", "latest", "ensembles", 0, *path], value))
+    assert f"ecord memory_of_default.latest.ensembles[0].{place}: expected" in str(refusal.value)
+
+
 def test_what_was_learnt_from_more_runs_than_there_are_is_refused():
     record = through_json(lived(new("default"), LIFE[:3]).to_record())
     record["logbook"]["experiments"].pop()

@@ -105,6 +105,21 @@ def test_a_newer_record_is_refused_with_a_sentence(tmp_path):
         tl.load_twin(tmp_path / "twin.json")
 
 
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        (lambda record: record.update(inflation="inf"), "twin.inflation"),
+        (lambda record: record["noise"]["sensors"].__setitem__(0, "nan"), "twin.noise.sensors"),
+    ],
+)
+def test_a_band_that_cannot_be_drawn_is_refused_by_its_place(tmp_path, change, place):
+    record = json.loads(json.loads(SAVED[0].read_text(encoding="utf-8"))["twin"])
+    change(record)
+    (tmp_path / "twin.json").write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(tl.InvalidInput, match=rf"Record {place}: expected"):
+        tl.load_twin(tmp_path / "twin.json")
+
+
 @pytest.mark.parametrize("path", SAVED, ids=lambda path: path.stem)
 def test_a_record_has_the_factor_of_divergence_of_which_limits_are_made(path, tmp_path):
     record = json.loads(json.loads(path.read_text(encoding="utf-8"))["twin"])

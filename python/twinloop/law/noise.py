@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats
+from twinloop._ground.arrays import Floats, at_least_zero, number
 from twinloop._ground.elementary import exp
 from twinloop.records import Record, Recorded
 
@@ -49,6 +49,18 @@ class Noise(Recorded, kind="noise"):
 
     VERSION = 3
     RENAMED: ClassVar[Mapping[str, str]] = {"lasting": "correlated"}
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Noise:
+        found = super()._read(record, where, given)
+        for name in ("sensors", "moves"):
+            for size in getattr(found, name).ravel().tolist():
+                at_least_zero(f"Record {where}.{name}", size)
+        for i, each in enumerate(found.correlated):
+            at_least_zero(f"Record {where}.correlated[{i}].sd", each.sd)
+            number(f"Record {where}.correlated[{i}].correlation_time", each.correlation_time, above=0.0)
+        number(f"Record {where}.dt", found.dt, above=0.0)
+        return found
 
     @classmethod
     def renewed(cls, record: Record) -> Record:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
-from twinloop._ground.arrays import Floats, floats, number
+from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop._ground.showing import Shown
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
@@ -129,7 +129,7 @@ class Twin(Shown, Recorded, kind="twin"):
             models[1:],
             read(Noise | None, found["noise"], f"{where}.noise"),
             read(int, found["seed"], f"{where}.seed"),
-            read(float, found["inflation"], f"{where}.inflation"),
+            at_least_zero(f"Record {where}.inflation", found["inflation"]),
             read(tuple[Trajectory, ...], found["flights"], f"{where}.flights"),
         )
         widths = {(flight.states.shape[1], flight.commands.shape[1]) for flight in twin.flights}

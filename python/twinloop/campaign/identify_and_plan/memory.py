@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats
+from twinloop._ground.arrays import Floats, at_least_zero
 from twinloop.campaign.history import Lesson
 from twinloop.campaign.identify_and_plan.two_laws import TwoLaws
 from twinloop.identification.identified import Identified
@@ -30,6 +30,12 @@ class Ensemble(Recorded, kind="ensemble"):
     members: tuple[_core.Model, ...]
     noise: Noise
     inflation: float
+
+    @classmethod
+    def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Ensemble:
+        found = super()._read(record, where, given)
+        at_least_zero(f"Record {where}.inflation", found.inflation)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
