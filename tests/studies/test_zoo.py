@@ -50,8 +50,17 @@ def test_held_out_controllers_are_those_that_the_plant_survives(end_stop):
 
 
 def test_a_twin_that_never_moves_has_the_error_one_and_does_not_diverge(end_stop):
-    error, diverged = held_out(end_stop, 5).judged(still(end_stop))
-    assert error == pytest.approx(1.0) and diverged == 0
+    found = held_out(end_stop, 5).judged(still(end_stop))
+    assert found.error == pytest.approx(1.0) and found.diverged == 0
+
+
+def test_the_error_inside_the_envelope_is_of_the_controllers_that_keep_it(end_stop):
+    found, twin = held_out(end_stop, 5), still(end_stop)
+    for lost, inside in ((3, pytest.approx(1.0)), (5, None)):
+        # Elsewhere from the first state on, beyond the envelope, where a twin at rest at the start is far off.
+        states = [states + 2.0 if i < lost else states for i, states in enumerate(found.states)]
+        judged = dataclasses.replace(found, states=states).judged(twin)
+        assert judged.error > 2.0 and judged.error_inside == inside and judged.diverged == 0
 
 
 def test_an_equation_is_empty_where_its_state_moves(end_stop, flights):
@@ -163,6 +172,16 @@ def test_the_worst_campaigns_come_first():
     assert len(shown[0].rows) == len(bars.BARS) and shown[1].rows[0][0] == f"{NAME}, seed 3"
 
 
+def test_the_error_inside_the_envelope_is_shown_where_every_campaign_has_it():
+    later = campaign([])
+    for each in later["flights"]:
+        each["error_inside"] = 0.02
+    for campaigns, shown in (([later], True), ([later, campaign([], seed=1)], False)):
+        every = bars.tables("zoo", campaigns)[2]
+        assert ("inside the envelope" in every.head) is shown and len(every.rows[0]) == len(every.head)
+        assert ("0.02, 0.02" in every.rows[0]) is shown
+
+
 # The verb
 
 
@@ -176,6 +195,7 @@ def test_a_smoke_run_flies_and_shows_every_bar():
         assert one["failure"] is None and len(one["flights"]) == 2
         assert one["flights"][0]["flown"] == pytest.approx(optima.kept()[one["plant"]]["first"], rel=0.1)
         assert re.search(r"\[k\+1\]|'", one["equations"])
+        assert all(each["error_inside"] == each["error"] for each in one["flights"])  # none of the two leaves
 
 
 def test_what_is_kept_is_not_flown_again(tmp_path):

@@ -174,14 +174,13 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
     """What is measured of the twin and the controller to fly."""
     twin = campaign.twin
     lesson = [record for record in campaign.history if isinstance(record, Lesson)][-1]
-    error, diverged = judge.judged(twin)
+    accuracy = judge.judged(twin)
     best = controller_to_fly(campaign)[0]
     structures, felt = honesty.found(twin, lesson), disturbances(twin, lesson)
     return _plain(
         {
             "best_test": None if best is None else plant.true_quality(best.genes),
-            "error": error,
-            "diverged": diverged,
+            **accuracy._asdict(),
             "found": structures,
             "false": [name for name in structures if name not in plant.has],
             "lags": list(lesson.lags),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from twinloop._experiment.envelope import outside, usages_of
 from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
 from twinloop.law.flight import fly
@@ -18,6 +20,21 @@ COUNT = 40
 MOST = 400
 """Controllers that are tried, where few survive."""
 SEED = 20_261_122
+
+
+class Accuracy(NamedTuple):
+    """How far a twin is off under controllers that nobody has flown.
+
+    Args:
+        error: the median of the mean squared error in units of the states' scales over that of a model that never
+            moves; infinite where the twin diverges, None without controllers.
+        error_inside: the same over the controllers whose true flight stays inside the envelope.
+        diverged: controllers under which the twin diverges.
+    """
+
+    error: float | None
+    error_inside: float | None
+    diverged: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +51,11 @@ class HeldOut:
     states: Sequence[Floats]
     tried: int
 
-    def judged(self, twin: Twin) -> tuple[float | None, int]:
+    def judged(self, twin: Twin) -> Accuracy:
         """How far a twin is off under these controllers.
 
         Args:
             twin: to be judged.
-
-        Returns:
-            The median of the mean squared error in units of the states' scales over that of a model that never moves,
-            infinite where the twin diverges, None without controllers; and on how many the twin diverges.
         """
         errors = []
         scales = np.array([state.scale for state in twin.signals.states])
@@ -54,9 +67,19 @@ class HeldOut:
             off = twin.signals.difference(true_states(run), truth) / scales
             still = twin.signals.difference(truth[:1], truth) / scales
             errors.append(float(np.square(off).mean() / np.square(still).mean()))
+        signals = twin.signals
+        inside = [
+            error
+            for error, truth in zip(errors, self.states, strict=True)
+            if not outside(usages_of(signals, truth)).any()
+        ]
         diverged = sum(not np.isfinite(error) for error in errors)
-        # The middle by rank: half of the sum of two infinite errors is none.
-        return (sorted(errors)[len(errors) // 2] if errors else None), diverged
+        return Accuracy(_median(errors), _median(inside), diverged)
+
+
+def _median(errors: Sequence[float]) -> float | None:
+    """The middle by rank: half of the sum of two infinite errors is none."""
+    return sorted(errors)[len(errors) // 2] if errors else None
 
 
 def held_out(plant: Plant, count: int = COUNT) -> HeldOut:
