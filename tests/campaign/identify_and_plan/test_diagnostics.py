@@ -35,7 +35,7 @@ def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False, commands
     trajectory = tl.Trajectory(
         t, change(states), 0.1 * np.sin(5.0 * t[:-1, None]) if commands is None else commands
     )
-    return SimpleNamespace(trajectory=trajectory, complete=not cut)
+    return SimpleNamespace(trajectory=trajectory, complete=not cut, test=None)
 
 
 def said(*runs, follows=True):
@@ -261,3 +261,42 @@ def test_a_bias_that_outgrows_a_fast_swing_is_no_contradiction_and_a_small_swing
     assert said(flown(**small)) == []
     (sentence,) = said(flown(**small, change=lambda x: x * [1.0, 1.0, 180.0 / np.pi]))
     assert "times as fast as rate" in sentence
+
+
+def judged(number, predicted, spread, measured):
+    """A flight that says nothing but how its prediction fared."""
+    run = flown(number)
+    run.test, run.quality = SimpleNamespace(number=number, predicted=predicted, spread=spread), measured
+    return run
+
+
+@pytest.mark.parametrize(
+    ("flights", "severity"),
+    [
+        ([(1.0, 0.05, 1.3), (0.9, 0.05, 1.2)], "serious"),
+        ([(1.0, 0.05, 0.8), (0.9, 0.05, 0.7)], "serious"),
+        ([(1.0, 0.05, 1.3), (0.9, 0.05, 0.7)], None),  # one too good, one too bad
+        ([(1.0, 0.05, 1.3), (0.9, 0.05, 0.99)], None),  # the last one came true
+        ([(1.0, 0.05, 1.3), (0.9, 0.05, 1.2), (0.9, 0.05, 0.91)], None),
+        ([(1.0, 0.001, 1.3), (0.9, 0.001, 0.92)], "note"),  # two spreads, and hardly anything
+        (
+            [(1.0, 0.05, 1.3), (0.9, 0.05, None), (0.9, 0.05, 1.2)],
+            "serious",
+        ),  # one that was cut has no quality
+        ([(1.0, 0.05, 1.3), (np.inf, np.inf, 1.0), (None, None, 1.0), (0.9, 0.05, 1.2)], "serious"),
+        ([(0.9, 0.05, 1.2)], None),
+    ],
+)
+def test_two_predictions_in_a_row_that_missed_to_one_side_are_named(flights, severity):
+    runs = [judged(number, *flight) for number, flight in enumerate(flights)]
+    found = [one for one in diagnostics_of(runs, SIGNALS, True, STEPS) if one.code == "missed-predictions"]
+    assert [one.severity for one in found] == ([] if severity is None else [severity])
+    for one in found:
+        (first, *_, last) = (
+            f"test {number} ({predicted:.4g} ± {spread:.2g} predicted, {measured:.4g} measured)"
+            for number, (predicted, spread, measured) in enumerate(flights)
+            if predicted is not None and np.isfinite(predicted) and measured is not None
+        )
+        better = flights[-1][2] < flights[-1][0]
+        assert f"{'better' if better else 'worse'} than predicted" in one.sentence
+        assert f"{first} and {last}." in one.sentence

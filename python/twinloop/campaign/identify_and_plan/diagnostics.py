@@ -10,6 +10,7 @@ from twinloop.campaign.identify_and_plan.declared import against_derivatives
 from twinloop.campaign.identify_and_plan.misses import Miss
 from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.selection import distinct
+from twinloop.campaign.identify_and_plan.track_record import NEARLY, missed_in_a_row
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 
@@ -60,7 +61,8 @@ def diagnostics_of(
         said += _does_not_follow(any(remark.serious for remark in said), without_test, disturbed)
     elif misses:
         said += _free_run(misses, len(experiments), signals)
-    return [*said, *_model_error(recurring), *_copies(experiments), *_none_complete(experiments, steps)]
+    said += [*_model_error(recurring), *_copies(experiments), *_none_complete(experiments, steps)]
+    return [*said, *_missed_predictions(experiments)]
 
 
 def from_other_controllers(tests: Sequence[int], exchanged: Sequence[str] = ()) -> Iterator[Remark]:
@@ -195,6 +197,22 @@ def _none_complete(experiments: Sequence[Experiment], steps: int) -> Iterator[Re
             "none-complete",
             f"No run was complete, the longest had {longest} of {steps} steps. Nothing is known of"
             " later times.",
+        )
+
+
+def _missed_predictions(experiments: Sequence[Experiment]) -> Iterator[Remark]:
+    """That two predictions in a row missed to the same side: a note where they did so by less than matters."""
+    missed = missed_in_a_row(experiments)
+    if missed:
+        how = "worse" if missed[-1].measured > missed[-1].predicted else "better"
+        each = " and ".join(
+            f"test {found.test} ({found.predicted:.4g} ± {found.spread:.2g} predicted, {found.measured:.4g} measured)"
+            for found in missed
+        )
+        yield (serious if missed_in_a_row(experiments, NEARLY) else note)(
+            "missed-predictions",
+            f"Two flights in a row came out {how} than predicted, by more than two spreads: {each}. The twin is"
+            " too sure of qualities: trust neither a predicted one nor its spread until a prediction has come true.",
         )
 
 

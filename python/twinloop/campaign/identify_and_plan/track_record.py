@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,6 +70,50 @@ def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
             count += 1
         flown.add(genes)
     return count
+
+
+class Judged(NamedTuple):
+    """What was predicted of a flight, and what came of it.
+
+    Args:
+        test: its number.
+        predicted: quality, before the flight.
+        spread: standard deviation that was expected of the measured one.
+        measured: quality.
+    """
+
+    test: int
+    predicted: float
+    spread: float
+    measured: float
+
+    def missed(self, share: float) -> bool:
+        """Whether it came out more than two spreads from the prediction, and more than a share of itself."""
+        return abs(self.predicted - self.measured) > max(SURE * self.spread, share * self.measured)
+
+
+def missed_in_a_row(experiments: Sequence[Experiment], share: float = 0.0) -> tuple[Judged, ...]:
+    """The last two flights that have both a predicted and a measured quality, if both missed to the same side.
+
+    Args:
+        experiments: in the order of `tell`.
+        share: of its quality by which a flight may be off its prediction, beside two spreads.
+
+    Returns:
+        Two, or none.
+    """
+    judged = [
+        Judged(run.test.number, predicted, run.test.spread, run.quality)
+        for run, predicted in _predicted(experiments)
+        if run.test is not None
+        and run.test.spread is not None
+        and run.quality is not None
+        and np.isfinite(predicted)
+    ]
+    last = judged[-2:]
+    one_side = len({found.predicted < found.measured for found in last}) == 1
+    missed = len(last) == 2 and one_side and all(found.missed(share) for found in last)
+    return tuple(last) if missed else ()
 
 
 def promised_in_vain(experiments: Sequence[Experiment]) -> bool:
