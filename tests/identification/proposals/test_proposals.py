@@ -108,11 +108,14 @@ def test_what_finds_nothing_changes_nothing_wherever_it_is_proposed():
         )
         return [hypothesis, replace(hypothesis, sums=tuple(more))]
 
-    plain = end_of(context, start).best
-    for place in range(len(PROPOSALS) + 1):
+    # Of what was found a proposal sees the best alone, so one place at a time says it of all that follow.
+    found = Found(start)
+    for propose in PROPOSALS:
         for idle in (silent, longer):
-            several = (*PROPOSALS[:place], idle, *PROPOSALS[place:])
-            assert same(end_of(context, start, several).best, plain)
+            assert same(decided(found, idle(context, found.best)).best, found.best)
+        found = decided(found, propose(context, found.best))
+    idle_everywhere = [each for propose in PROPOSALS for each in (silent, longer, propose)]
+    assert same(end_of(context, start, [*idle_everywhere, silent, longer]).best, found.best)
 
 
 def test_where_nothing_is_hidden_it_does_not_matter_when_that_is_looked_for():
@@ -131,10 +134,19 @@ def test_a_lag_search_that_finds_no_lag_proposes_nothing_and_moves_nothing():
     assert PROPOSALS[0] is lags and same(with_lags, without)
 
 
-@pytest.mark.parametrize("after", range(len(PROPOSALS)))
-def test_a_search_that_is_read_back_from_its_record_goes_on_with_the_same_bits(after):
+@pytest.fixture(scope="module")
+def under_way():
+    """A search of two fans: its context, and what it had found before each proposal."""
     context = two_fans(2)
-    found = end_of(context, start_of(context), PROPOSALS[:after])
+    found = [Found(start_of(context))]
+    for propose in PROPOSALS[:-1]:
+        found.append(decided(found[-1], propose(context, found[-1].best)))
+    return context, found
+
+
+@pytest.mark.parametrize("after", range(len(PROPOSALS)))
+def test_a_search_that_is_read_back_from_its_record_goes_on_with_the_same_bits(under_way, after):
+    context, found = under_way[0], under_way[1][after]
     again = Found.from_record(through_json(found.to_record()), context.signals)
     assert same(found, again)
     propose = PROPOSALS[after]
