@@ -7,6 +7,7 @@ Half of the kills come after a random time, half at a random statement of SQL, o
 
 import argparse
 import hashlib
+import multiprocessing
 import os
 import random
 import signal
@@ -15,6 +16,8 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+import numpy as np
 
 import twinloop as tl
 from twinloop.records import to_text
@@ -73,6 +76,31 @@ def die_at_statement(number):
         left[0] -= 1
         if left[0] == 0:
             os.kill(os.getpid(), signal.SIGKILL)
+
+
+def telling(store, log, statement):
+    """Tells the log of its second test to a campaign, and dies at the n-th statement of that."""
+    campaign, rows = tl.Campaign.load(store, threads=1), np.load(log)
+    run = tl.Trajectory(rows["t"], rows["states"], rows["commands"])
+    die_at_statement(statement)
+    campaign.tell(campaign.tests[1], run)
+
+
+def withdrawing(store, statement):
+    """Withdraws the last flight of a campaign, and dies at the n-th statement of that."""
+    campaign = tl.Campaign.load(store, threads=1)
+    die_at_statement(statement)
+    campaign.withdraw(campaign.experiments[-1], "the log of another flight")
+
+
+def exit_code_of(work, *arguments):
+    """How a process ends that does this alone, forked off one that has imported what takes long."""
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload(["twinloop", "twinloop.store"])
+    child = processes.Process(target=work, args=arguments)
+    child.start()
+    child.join()
+    return child.exitcode
 
 
 def started(store, preset, statement=0):

@@ -18,7 +18,7 @@ from sqlalchemy import event
 
 import twinloop as tl
 from conftest import TINY
-from faults import killed_and_resumed
+from faults import exit_code_of, killed_and_resumed, telling, withdrawing
 from lives import LIFE, OTHER_GAINS, SMALL, WITHDRAWN_LIFE, flown, lived, plain, stored
 from sameness import same
 from twinloop.campaign import keeping
@@ -129,17 +129,6 @@ def test_a_tell_that_is_killed_before_any_of_its_statements_is_kept_whole_or_not
     path, preset, pendulum
 ):
     """And the campaign goes on to the bits of one that was not killed."""
-    code = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "import numpy as np, twinloop as tl\n"
-        "from faults import die_at_statement\n"
-        "from lives import stored\n"
-        "campaign = stored(sys.argv[2], sys.argv[3])\n"
-        "rows = np.load(sys.argv[4])\n"
-        "run = tl.Trajectory(rows['t'], rows['states'], rows['commands'])\n"
-        "die_at_statement(int(sys.argv[5]))\n"
-        "campaign.tell(campaign.tests[1], run)\n"
-    )
     campaign = flown(stored(path, preset), pendulum)
     second = campaign.test(OTHER_GAINS)
     seen = pendulum.run(second)
@@ -158,17 +147,14 @@ def test_a_tell_that_is_killed_before_any_of_its_statements_is_kept_whole_or_not
         for leftover in path.parent.glob(f"{path.name}*"):
             leftover.unlink()
         path.write_bytes(kept_before)
-        tests = str(Path(__file__).parents[1])
-        child = subprocess.run(
-            [sys.executable, "-c", code, tests, str(path), preset, str(log), str(statement)], check=False
-        )
+        code = exit_code_of(telling, path, log, statement)
         again = tl.Campaign.load(path)
         told = len(again.experiments)
-        if child.returncode == 0:
+        if code == 0:
             assert told == 2 and plain(again) == expected
             again.close()
             break
-        assert child.returncode == -signal.SIGKILL and told in (1, 2)
+        assert code == -signal.SIGKILL and told in (1, 2)
         killed += 1
         if told == 1:
             again.tell(again.tests[1], run)
@@ -207,30 +193,20 @@ def test_a_withdrawal_that_the_store_refuses_has_not_happened(path, pendulum, mo
 
 @pytest.mark.parametrize("preset", ["paper", "default"])
 def test_a_withdraw_that_is_killed_before_any_of_its_statements_is_kept_whole_or_not_at_all(path, preset):
-    code = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "import twinloop as tl\n"
-        "from faults import die_at_statement\n"
-        "campaign = tl.Campaign.load(sys.argv[2], threads=1)\n"
-        "die_at_statement(int(sys.argv[3]))\n"
-        "campaign.withdraw(campaign.experiments[-1], 'the log of another flight')\n"
-    )
     begun = WITHDRAWN_LIFE.index("withdraw")
     lived(stored(path, preset), WITHDRAWN_LIFE[:begun]).close()
     kept_before = path.read_bytes()
     either = [tl.Campaign.load(path, read_only=True)]
     either.append(lived(stored(path.with_name("whole.db"), preset), WITHDRAWN_LIFE[: begun + 1]))
     either = [plain(campaign) for campaign in either]
-    ends, statement, code_of_child = set(), 0, None
-    while code_of_child != 0:
+    ends, statement, code = set(), 0, None
+    while code != 0:
         statement += 1
         for leftover in path.parent.glob(f"{path.name}*"):
             leftover.unlink()
         path.write_bytes(kept_before)
-        tests = str(Path(__file__).parents[1])
-        child = subprocess.run([sys.executable, "-c", code, tests, str(path), str(statement)], check=False)
-        code_of_child = child.returncode
-        assert code_of_child in (0, -signal.SIGKILL)
+        code = exit_code_of(withdrawing, path, statement)
+        assert code in (0, -signal.SIGKILL)
         again = tl.Campaign.load(path, read_only=True)
         ends.add(either.index(plain(again)))
     assert statement > 3 and ends == {0, 1}
