@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 
 from twinloop.errors import unknown
@@ -117,6 +118,12 @@ def learner(name: str) -> Learner:
     return LEARNERS[name]
 
 
+def _fewer(settings: Mapping[str, object], **most: int) -> dict[str, int]:
+    """Those of a learner's counts that are larger than these."""
+    counts = ((name, settings.get(name), limit) for name, limit in most.items())
+    return {name: limit for name, count, limit in counts if isinstance(count, int) and count > limit}
+
+
 def for_smoke(who: Learner) -> Learner:
     """The same learner with so little to do that nothing is learnt.
 
@@ -133,7 +140,7 @@ def for_smoke(who: Learner) -> Learner:
         case Flyer():
             return replace(who, experiments=1)
         case Fitter():
-            settings = {**who.settings, **({"evaluations": 2000} if "evaluations" in who.settings else {})}
+            settings = {**who.settings, **_fewer(who.settings, evaluations=2000, ensemble=2)}
             return replace(who, settings=settings, experiments=(0, 1), seconds=min(who.seconds, 1.0))
         case Tuner():
             return replace(who, flights=4)

@@ -701,7 +701,7 @@ def bench(*arguments, code=0):
 @pytest.mark.filterwarnings("default")
 def test_a_smoke_run_without_optional_packages_says_what_it_left_out(monkeypatch):
     monkeypatch.setattr(kinds.importlib.util, "find_spec", lambda package: None)
-    done = bench("--smoke")
+    done = bench("--smoke", "--systems", "quadrotor-0", "--seeds", "0")
     for package in ("pysindy", "pyoperon", "bayes_opt", "cmaes", "optuna"):
         assert f"the package {package!r} is not installed" in done.stderr
     assert "about" in done.stderr
