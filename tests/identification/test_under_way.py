@@ -33,16 +33,27 @@ def learnt(signals, runs, rests, known, **more):
     )  # fmt: skip
 
 
+class NextStep(Exception):
+    """Ends an identification once it has come to one more step."""
+
+
+def next_step(under_way):
+    raise NextStep(under_way)
+
+
 @pytest.mark.parametrize(("posed", "starts"), [(one_run, 1), (with_a_hidden_state, 2)])
 def test_it_goes_on_from_every_step_that_was_kept_to_the_same_bits(posed, starts):
+    """To the next step from each, so to the end from all."""
     signals, runs, rests, known = posed()
     kept = []
     whole = learnt(signals, runs, rests, known, keep=kept.append)
     assert len(kept) == 1 + starts * (1 + len(PROPOSALS))
-    for step in kept[:: 2 * starts - 1]:
-        read = UnderWay.from_record(through_json(step.to_record()), signals)
-        assert same(read, step)
-        rest = []
-        again = learnt(signals, runs, rests, known, under_way=read, keep=rest.append)
-        assert same(again, whole)
-        assert len(rest) == len(kept) - 1 - kept.index(step)
+    read = [UnderWay.from_record(through_json(step.to_record()), signals) for step in kept]
+    assert same(read, kept)
+    for step, after in zip(read[:-1], kept[1:], strict=True):
+        with pytest.raises(NextStep) as reached:
+            learnt(signals, runs, rests, known, under_way=step, keep=next_step)
+        assert same(reached.value.args[0], after)
+    rest = []
+    assert same(learnt(signals, runs, rests, known, under_way=read[-1], keep=rest.append), whole)
+    assert rest == []
