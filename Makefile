@@ -13,6 +13,8 @@ RUST_SOURCES := Cargo.toml $(wildcard Cargo.lock rust-toolchain.toml .cargo/conf
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 unexport CONDA_PREFIX PYTHONHOME PYTHONPATH
+# Tests and examples start hundreds of processes; each would compile the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
