@@ -14,7 +14,7 @@ _Counters = tuple[int, int, int, int, int, int]
 """Seed, iteration, generation, evaluations, spared offspring, generations with a capped archive."""
 _Actuator = tuple[float, int, float | None]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
-_Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool]
+_Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool, float]
 """Commands, whether squares fill it, the mean at rest (scaled; None: of the first period), time (s), states that fill
 it where no commands do, and whether a run begins with it settled."""
 _Motion = tuple[float, float, float]

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 import twinloop as tl
 from law_twins import BODY, SIGNALS, STORED, stored_twin, twin_of
 from sameness import same, through_json
+from twinloop.law.actuation import Actuation
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
 
@@ -18,9 +19,13 @@ RNG = np.random.default_rng(4)
 COMMANDS = RNG.uniform([-2.0, 0.0], [2.0, 5.0], (60, 2))
 
 
-def linear_twin(form="acceleration"):
+SWINGING = [((), False, 0.25, 0.4, (1,), True, 0.11)] * 2
+"""Two that turn into each other."""
+
+
+def linear_twin(form="acceleration", hidden=STORED):
     lines = LINEAR if form in DERIVATIVES else STEPPED
-    return twin_of(lines, form, inputs=6, actuators=[(0.0, 0, None)] * 2, hidden=STORED)
+    return twin_of(lines, form, inputs=6, actuators=[(0.0, 0, None)] * 2, hidden=hidden)
 
 
 def test_a_free_run_is_the_solution_of_its_equations():
@@ -42,11 +47,52 @@ def test_a_free_run_is_the_solution_of_its_equations():
         np.testing.assert_allclose(state, y[:2], atol=2e-5)
 
 
+def test_two_that_turn_into_each_other_are_a_mass_on_a_spring():
+    twin = linear_twin(hidden=SWINGING)
+    fades, turns = np.array([[2.5, 0.0], [0.0, 2.5]]), np.array([[0.0, 1.0], [-1.0, 0.0]]) / 0.11
+
+    def slope(u):
+        def of(t, y):
+            acceleration = -3.0 * y[0] - 0.4 * y[1] + 5.0 * u[0] / 2.0 + 2.0 * y[2] - 14.0 * y[3]
+            return [y[1], acceleration, *(y[1] / 8.0 - 0.25 - (fades + turns) @ y[2:])]
+
+        return of
+
+    found = twin.simulate_commands([0.3, 2.0], COMMANDS).true_states
+    # It begins where nothing of it moves.
+    y = np.array([0.3, 2.0, *np.linalg.solve(fades + turns, [2.0 / 8.0 - 0.25] * 2)])
+    for state, u in zip(found[1:], COMMANDS, strict=True):
+        y = solve_ivp(slope(u), (0.0, SIGNALS.dt), y, rtol=1e-10, atol=1e-12).y[:, -1]
+        np.testing.assert_allclose(state, y[:2], atol=2e-4)
+    plant = twin.linearise([0.2, -1.0], [0.5, 1.0])
+    np.testing.assert_allclose(plant.A[2:, 2:], -(fades + turns))
+    text = twin.equations(3)
+    assert "d hidden_1 / dt = (rate/8) - 0.25 - hidden_1/0.4 - hidden_2/0.11" in text
+    assert "d hidden_2 / dt = (rate/8) - 0.25 - hidden_2/0.4 + hidden_1/0.11" in text
+
+
+def test_a_record_with_one_that_turns_into_nothing_is_refused():
+    twin = linear_twin(hidden=SWINGING)
+    law = Law.of(twin.model, SIGNALS)
+    assert same(Law.of(law.model(), SIGNALS).actuation, law.actuation)
+    assert same(tl.Twin.from_record(through_json(twin.to_record())).model.hidden, twin.model.hidden)
+    for place in (0, 1):
+        record = through_json(twin.to_record())
+        record["model"]["hidden"][place]["turns"] = 0.0
+        with pytest.raises(tl.InvalidInput, match="pairs"):
+            tl.Twin.from_record(record)
+        alone = through_json(law.actuation.to_record())
+        alone["hidden"][place]["turns"] = 0.2
+        with pytest.raises(tl.InvalidInput, match="turns into"):
+            Actuation.from_record(alone)
+
+
+@pytest.mark.parametrize("hidden", [STORED, SWINGING])
 @pytest.mark.parametrize(
     "form", ["acceleration", "explicit-euler", "semi-implicit-euler", "increment", "absolute"]
 )
-def test_of_a_linear_law_the_linearisation_flies_as_the_law_does(form):
-    twin = linear_twin(form)
+def test_of_a_linear_law_the_linearisation_flies_as_the_law_does(form, hidden):
+    twin = linear_twin(form, hidden)
     at = np.array([0.2, -1.0])
     plant = twin.linearise(at, COMMANDS[0], discrete=True)
     assert plant.states[2:4] == ("hidden_1", "hidden_2")
@@ -67,7 +113,7 @@ def test_at_an_instant_what_is_stored_is_filled_by_the_state_and_empties():
 
 def test_a_body_that_turns_stores_as_well():
     """With the attitude as a quaternion and in several steps a period, what is stored is integrated along."""
-    stored = [((), False, 0.0, 0.3, (3,), False)]
+    stored = [((), False, 0.0, 0.3, (3,), False, 0.0)]
     lines = ["r8 = r6 * 2.0", "r11 = r7 * -30.0", "r8 = r8 + r11"]
     twin = twin_of(lines, signals=BODY, inputs=8, actuators=[(0.0, 0, None)], hidden=stored)
     commands = RNG.uniform(-2.0, 2.0, (40, 1))

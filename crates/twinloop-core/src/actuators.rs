@@ -67,6 +67,13 @@ impl Actuation {
         if !hidden.is_sorted_by_key(Hidden::moves) {
             return invalid("hidden states: expected those that commands fill before those that states fill");
         }
+        let turning: Vec<usize> = (0..hidden.len()).filter(|&i| hidden[i].turning()).collect();
+        let paired = |pair: &[usize]| matches!(pair, &[i, j] if j == i + 1 && hidden[i] == hidden[j]);
+        if !turning.chunks(2).all(paired) {
+            return invalid(
+                "hidden states: expected those that turn in pairs of neighbours that the same fills",
+            );
+        }
         let direct = hidden.is_empty() && actuators.iter().all(Actuator::is_direct);
         Ok(Self { actuators: if direct { vec![] } else { actuators }, hidden })
     }
@@ -76,10 +83,13 @@ impl Actuation {
         self.actuators.is_empty()
     }
 
-    /// Lag of each actuator, then time of each hidden state, s.
+    /// Lag of each actuator, then time of each hidden state, then the time in which each that has a partner turns, s.
     pub fn times(&self) -> Vec<f64> {
         let lags = self.actuators.iter().map(|actuator| actuator.lag);
-        lags.chain(self.hidden.iter().map(|hidden| hidden.time)).collect()
+        let turning = self.hidden.iter().filter(|hidden| hidden.turning());
+        lags.chain(self.hidden.iter().map(|hidden| hidden.time))
+            .chain(turning.map(|hidden| hidden.turns))
+            .collect()
     }
 
     /// The same, each on so many lanes, lane by lane.
@@ -89,15 +99,15 @@ impl Actuation {
 
     /// The same with other lags and times.
     pub fn with_times(&self, times: &[f64]) -> Result<Self> {
-        if times.len() != self.actuators.len() + self.hidden.len() {
-            return invalid(format!(
-                "lags: expected {}, found {}",
-                self.actuators.len() + self.hidden.len(),
-                times.len()
-            ));
+        let expected = self.times().len();
+        if times.len() != expected {
+            return invalid(format!("lags: expected {expected}, found {}", times.len()));
         }
         let mut other = self.clone();
         let (lags, rest) = times.split_at(self.actuators.len());
+        let (rest, turns) = rest.split_at(self.hidden.len());
+        let turning = other.hidden.iter_mut().filter(|hidden| hidden.turning());
+        turning.zip(turns).for_each(|(hidden, &time)| hidden.turns = time);
         other.actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
         other.hidden.iter_mut().zip(rest).for_each(|(hidden, &time)| hidden.time = time);
         if self.is_direct() { Ok(other) } else { other.validated(self.actuators.len(), usize::MAX) }
@@ -278,6 +288,7 @@ mod tests {
                 rest: Some(0.25),
                 settled: false,
                 time,
+                turns: 0.0,
             };
             let actuation = Actuation { actuators: vec![Actuator::DIRECT; 2], hidden: vec![hidden] };
             // Ten periods of 3 and 1, then ten at rest.
@@ -308,6 +319,7 @@ mod tests {
             rest: None,
             settled: false,
             time,
+            turns: 0.0,
         };
         for wrong in
             [hidden(vec![], 1.0), hidden(vec![1], 1.0), hidden(vec![0], 0.0), hidden(vec![0], f64::NAN)]

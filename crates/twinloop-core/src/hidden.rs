@@ -6,6 +6,9 @@ use crate::lanes::{Vector, numbers, vectors};
 
 /// A hidden state h of a model: dh/dt = mean over its sources of what each gives − the same at rest − h / time.
 ///
+/// Two neighbours may turn into each other, as the place and the speed of a mass on a spring do: then −h₂ / turns is added
+/// to the first one's, and h₁ / turns to the second one's.
+///
 /// Its sources are commands or states. Each gives itself, or its square, in units of its scale; h is 0 at the start of a
 /// run, or where it neither fills nor empties there, and an input of the model's program after the commands.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +25,8 @@ pub struct Hidden {
     pub settled: bool,
     /// Its time constant, s.
     pub time: f64,
+    /// In which it and its partner turn by one radian, s; 0 where it has none. Only where states fill it.
+    pub turns: f64,
 }
 
 impl Hidden {
@@ -32,6 +37,9 @@ impl Hidden {
             && self.states.iter().all(|&state| state < states)
             && (self.commands.is_empty() || !self.settled)
             && (self.states.is_empty() || self.rest.is_some())
+            && self.turns.is_finite()
+            && self.turns >= 0.0
+            && (self.turns == 0.0 || self.moves())
             && self.rest.is_none_or(f64::is_finite)
             && self.time.is_finite()
             && self.time > 0.0;
@@ -40,9 +48,14 @@ impl Hidden {
         } else {
             invalid(format!(
                 "hidden state: expected some of {commands} commands, or some of {states} states with a rest, a finite \
-                 rest and a time above 0 s, found {self:?}"
+                 rest, a time above 0 s and turns only of states, found {self:?}"
             ))
         }
+    }
+
+    /// Whether it has a partner.
+    pub(crate) fn turning(&self) -> bool {
+        self.turns > 0.0
     }
 
     /// Whether states fill it.
@@ -103,8 +116,9 @@ pub(crate) struct Storage<V> {
 }
 
 impl<V: Vector> Storage<V> {
-    /// At the start of a run, of those among some hidden states that states fill, if there are any; their times are given
-    /// lane by lane, and steps of the integrator in s, `staged` if they are of Runge and Kutta.
+    /// At the start of a run, of those among some hidden states that states fill, if there are any; the times of all, then
+    /// those in which they turn, are given lane by lane, and steps of the integrator in s, `staged` if they are of Runge and
+    /// Kutta.
     #[inline(never)]
     pub fn new(
         hidden: &[Hidden],
@@ -113,7 +127,7 @@ impl<V: Vector> Storage<V> {
         dt: f64,
         staged: bool,
     ) -> Option<Box<Self>> {
-        let stored = Stored::new(hidden, factors, times, dt, staged)?;
+        let stored = Stored::new(hidden, factors, times, V::LANES, dt, staged)?;
         Some(Box::new(Self { stored, seen: vec![] }))
     }
 
@@ -138,8 +152,12 @@ struct Stored {
     /// Step of the integrator, s, and whether it is one of Runge and Kutta; else one by the rule of trapezoids.
     dt: f64,
     staged: bool,
+    /// The partner of each, which comes after it (1.0) or before it (-1.0); itself where it has none (0.0).
+    partners: Vec<(usize, f64)>,
     /// Time of each on every lane, s; and so on.
     times: Vec<f64>,
+    /// One over the time in which it turns, radians / s.
+    rates: Vec<f64>,
     now: Vec<f64>,
     /// Slope at the last point seen, and the weighted sum of those of the step.
     slope: Vec<f64>,
@@ -150,19 +168,44 @@ struct Stored {
 
 impl Stored {
     /// At the start of a run, of those among some hidden states that states fill, whose times are given lane by lane.
-    fn new(hidden: &[Hidden], factors: &[f64], times: &[f64], dt: f64, staged: bool) -> Option<Self> {
+    fn new(
+        hidden: &[Hidden],
+        factors: &[f64],
+        times: &[f64],
+        lanes: usize,
+        dt: f64,
+        staged: bool,
+    ) -> Option<Self> {
         let first = hidden.iter().position(Hidden::moves)?;
-        let times = &times[first * times.len() / hidden.len()..];
+        let (times, mut turning) = times.split_at(hidden.len() * lanes);
+        let (kinds, times) = (hidden[first..].to_vec(), times[first * lanes..].to_vec());
+        let (mut partners, mut rates) = (vec![], vec![]);
+        for (k, kind) in kinds.iter().enumerate() {
+            if kind.turning() {
+                let (own, others) = turning.split_at(lanes);
+                turning = others;
+                rates.extend(own.iter().map(|time| 1.0 / time));
+                // Those that turn come in pairs.
+                let before: Option<&(usize, f64)> = partners.last();
+                let second = before.is_some_and(|&(partner, side)| side > 0.0 && partner == k);
+                partners.push(if second { (k - 1, -1.0) } else { (k + 1, 1.0) });
+            } else {
+                rates.extend(vec![0.0; lanes]);
+                partners.push((k, 0.0));
+            }
+        }
         let empty = || vec![0.0; times.len()];
         Some(Self {
-            kinds: hidden[first..].to_vec(),
             factors: factors.to_vec(),
             dt,
             staged,
             now: empty(),
             slope: empty(),
             sum: empty(),
-            times: times.to_vec(),
+            kinds,
+            partners,
+            times,
+            rates,
             stage: None,
         })
     }
@@ -170,33 +213,62 @@ impl Stored {
     fn see(&mut self, state: &[f64], seen: &mut Vec<f64>) {
         let lanes = state.len() / self.factors.len();
         let (first, stage) = (self.stage.is_none(), self.stage.unwrap_or(0));
+        let filling: Vec<f64> = (0..self.now.len())
+            .map(|i| self.kinds[i / lanes].filling(state, &self.factors, lanes, i % lanes))
+            .collect();
+        if first {
+            for i in (0..self.now.len()).filter(|i| self.kinds[i / lanes].settled) {
+                let turning = self.kinds[i / lanes].turning();
+                self.now[i] = if turning {
+                    self.solved(i, lanes, 0.0, 1.0, &filling)
+                } else {
+                    filling[i] * self.times[i]
+                };
+            }
+        }
+        let half = 0.5 * self.dt;
+        let points: Vec<f64> = if self.staged && stage > 0 {
+            let ahead = NEXT[stage - 1] * self.dt;
+            self.now.iter().zip(&self.slope).map(|(now, slope)| now + slope * ahead).collect()
+        } else if self.staged || first {
+            self.now.clone()
+        } else {
+            // What the last period has added is known once the state at its end is.
+            let added: Vec<f64> =
+                (0..self.now.len()).map(|i| self.now[i] + half * (self.slope[i] + filling[i])).collect();
+            (0..self.now.len()).map(|i| self.solved(i, lanes, 1.0, half, &added)).collect()
+        };
         for i in 0..self.now.len() {
-            let filling = self.kinds[i / lanes].filling(state, &self.factors, lanes, i % lanes);
-            let time = self.times[i];
-            if first && self.kinds[i / lanes].settled {
-                self.now[i] = filling * time;
+            self.slope[i] = filling[i] - points[i] / self.times[i];
+            let (partner, side) = self.partners[i / lanes];
+            if side != 0.0 {
+                self.slope[i] -= side * points[partner * lanes + i % lanes] * self.rates[i];
             }
             if self.staged {
-                let point =
-                    self.now[i] + if stage > 0 { self.slope[i] * (NEXT[stage - 1] * self.dt) } else { 0.0 };
-                self.slope[i] = filling - point / time;
                 let weighted = self.slope[i] * SIXTHS[stage];
                 self.sum[i] = if stage > 0 { self.sum[i] + weighted } else { weighted };
                 if stage == SIXTHS.len() - 1 {
                     self.now[i] += self.sum[i] * (self.dt / 6.0);
                 }
-                seen.push(point);
-            } else {
-                // What the last period has added is known once the state at its end is.
-                let half = 0.5 * self.dt;
-                if !first {
-                    self.now[i] = (self.now[i] + half * (self.slope[i] + filling)) / (1.0 + half / time);
-                }
-                self.slope[i] = filling - self.now[i] / time;
-                seen.push(self.now[i]);
             }
         }
+        if !self.staged {
+            self.now.clone_from(&points);
+        }
+        seen.extend(points);
         self.stage = Some(if self.staged { (stage + 1) % SIXTHS.len() } else { 0 });
+    }
+
+    /// One of what solves `own` h + `share` (h / time + what it turns into) = `right`, for each of them.
+    fn solved(&self, i: usize, lanes: usize, own: f64, share: f64, right: &[f64]) -> f64 {
+        let (partner, side) = self.partners[i / lanes];
+        let j = partner * lanes + i % lanes;
+        let (fades, others) = (own + share / self.times[i], own + share / self.times[j]);
+        if side == 0.0 {
+            return right[i] / fades;
+        }
+        let turned = share * self.rates[i];
+        (right[i] * others - side * turned * right[j]) / (fades * others + turned * turned)
     }
 }
 
@@ -213,7 +285,15 @@ mod tests {
     const TIMES: [f64; 2] = [0.3, 0.05];
 
     fn filled_by_the_second(squared: bool, settled: bool) -> Hidden {
-        Hidden { commands: vec![], states: vec![1], squared, rest: Some(0.25), settled, time: 0.3 }
+        Hidden {
+            commands: vec![],
+            states: vec![1],
+            squared,
+            rest: Some(0.25),
+            settled,
+            time: 0.3,
+            turns: 0.0,
+        }
     }
 
     /// What a state of 4 (1 + t), in units of 4, has filled by a time: h' = 1 + t − rest − h / T, or with (1 + t)².
@@ -254,6 +334,54 @@ mod tests {
                             (found - expected).abs() < close,
                             "{squared} {settled} {staged} {k}: {found} {expected}"
                         );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_pair_turns_and_fades_as_its_equations_say() {
+        let (time, turns) = (0.5, 0.04);
+        for settled in [false, true] {
+            for (staged, close) in [(true, 2e-4), (false, 2e-3)] {
+                let one = Hidden { turns, time, ..filled_by_the_second(false, settled) };
+                let pair = [one.clone(), one];
+                let times = [time, time, time, time, turns, turns, turns, turns];
+                let mut storage =
+                    Storage::<Wide<f64, 2>>::new(&pair, &[1.0, 0.25], &times, 0.1 * DT, staged).unwrap();
+                // The complex number z = h1 + i h2 obeys z' = (1 + i) (0.75 + t) - (1 / time - i / turns) z.
+                let mut z = [0.0, 0.0];
+                let slope = |z: [f64; 2], t: f64| {
+                    [0.75 + t - z[0] / time - z[1] / turns, 0.75 + t - z[1] / time + z[0] / turns]
+                };
+                if settled {
+                    let (fades, turned) = (1.0 / time, 1.0 / turns);
+                    let det = fades * fades + turned * turned;
+                    z = [0.75 * (fades - turned) / det, 0.75 * (fades + turned) / det];
+                    assert!(slope(z, 0.0).iter().all(|rate| rate.abs() < 1e-12));
+                }
+                for k in 0..300 {
+                    let t = f64::from(k) * 0.1 * DT;
+                    let shares: &[f64] = if staged { &[0.0, 0.5, 0.5, 1.0] } else { &[0.0] };
+                    let seen: Vec<_> =
+                        shares.iter().map(|s| storage.see(&state(t + s * 0.1 * DT), &[]).to_vec()).collect();
+                    for (part, expected) in z.into_iter().enumerate() {
+                        for lane in 0..2 {
+                            let found = seen[0][part].lane(lane);
+                            assert!(
+                                (found - expected).abs() < close,
+                                "{settled} {staged} {k}: {found} {expected}"
+                            );
+                        }
+                    }
+                    // A hundred small steps of the midpoint rule.
+                    for part in 0..100 {
+                        let (h, now) = (1e-3 * DT, t + f64::from(part) * 1e-3 * DT);
+                        let first = slope(z, now);
+                        let second =
+                            slope([z[0] + 0.5 * h * first[0], z[1] + 0.5 * h * first[1]], now + 0.5 * h);
+                        z = [z[0] + h * second[0], z[1] + h * second[1]];
                     }
                 }
             }

@@ -114,10 +114,12 @@ impl PyModel {
         self.0.frame().actuation().actuators.iter().map(|a| (a.lag, a.delay, a.rest)).collect()
     }
 
-    /// (commands, squared, rest, time, states, settled) of each hidden state.
+    /// (commands, squared, rest, time, states, settled, turns) of each hidden state.
     #[getter]
     fn hidden(&self) -> Vec<HiddenParts> {
-        let parts = |h: &Hidden| (h.commands.clone(), h.squared, h.rest, h.time, h.states.clone(), h.settled);
+        let parts = |h: &Hidden| {
+            (h.commands.clone(), h.squared, h.rest, h.time, h.states.clone(), h.settled, h.turns)
+        };
         self.0.frame().actuation().hidden.iter().map(parts).collect()
     }
 
@@ -167,18 +169,19 @@ impl PyModel {
 
 /// Lag, delay, rest.
 type ActuatorParts = (f64, usize, Option<f64>);
-/// Commands, whether squared, rest, time, states, whether settled.
-type HiddenParts = (Vec<usize>, bool, Option<f64>, f64, Vec<usize>, bool);
+/// Commands, whether squared, rest, time, states, whether settled, in which it turns.
+type HiddenParts = (Vec<usize>, bool, Option<f64>, f64, Vec<usize>, bool, f64);
 
 fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Actuation {
     let actuator = |(lag, delay, rest)| Actuator { lag, delay, rest };
-    let filled = |(commands, squared, rest, time, states, settled)| Hidden {
+    let filled = |(commands, squared, rest, time, states, settled, turns)| Hidden {
         commands,
         states,
         squared,
         rest,
         settled,
         time,
+        turns,
     };
     Actuation {
         actuators: actuators.into_iter().map(actuator).collect(),
@@ -187,7 +190,7 @@ fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Actuati
 }
 
 /// Effects of commands (n, n_u) in their units behind actuators (lag, delay, rest), then the hidden states that they
-/// fill (commands, squared, rest, time, no states, not settled), at the start, the middle and the end of each period.
+/// fill (commands, squared, rest, time, no states, not settled, no turns), at the start, the middle and the end of each period.
 #[pyfunction]
 pub fn command_effects<'py>(
     py: Python<'py>,

@@ -201,7 +201,7 @@ class Lesson(Recorded, kind="lesson"):
             explain the flights: a lag in it may stand for a state that is not logged.
         delays: of each command's actuator, periods; 0 as with `lags`.
         hidden: unmeasured states: which commands or states drive each, whether squared, the mean at rest in units of
-            their scale (None: that of the first period), the time constant in s, and how it begins.
+            their scale (None: that of the first period), the time constant in s, how it begins, and whether it turns.
         offsets: delay of each state's readings against those of the driven states, s.
         closed_loop: of the best model, one for each selected test, SI units squared; infinite where it diverges.
         normalised: closed_loop over that of the model that never moves.
@@ -234,14 +234,14 @@ class Lesson(Recorded, kind="lesson"):
     undecided: tuple[str, ...] = ()
     asked: tuple[Planned, ...] = ()
 
-    VERSION = 2
+    VERSION = 3
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of an earlier version, in which commands alone filled hidden states, that had no names."""
+        """A record of an earlier version: commands alone filled hidden states, that had no names, or none turned."""
         found = super().renewed(record)
         if "hidden" in found:
-            found["hidden"] = with_names(found["hidden"], HiddenState._fields, [], False)
+            found["hidden"] = with_names(found["hidden"], HiddenState._fields, [], False, 0.0)
         return found
 
     def cause(self, state: str) -> Cause:

@@ -250,6 +250,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) 
                 "time": hidden.time,
                 "states": [campaign.signals.state_names[i] for i in hidden.states],
                 "settled": hidden.settled,
+                "turns": hidden.turns,
             }
             for hidden in lesson.hidden
         ],

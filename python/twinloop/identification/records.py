@@ -11,7 +11,7 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop.identification.interpolation import FALLS, FEWEST, integration_error, middles, points, segments
 from twinloop.identification.stored import stored
-from twinloop.law.actuation import Actuation, HiddenState
+from twinloop.law.actuation import Actuation, HiddenState, partners
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -77,7 +77,9 @@ class Stages:
     def storing(self, hidden: Sequence[HiddenState], signals: Signals) -> Stages:
         """The same with hidden states that states fill behind its inputs."""
         found = self
-        for one in hidden:
+        for place, one in enumerate(hidden):
+            if partners(hidden)[place] < place:
+                continue
             start, middle, end = stored(one, (self.start, self.middle, self.end), self.runs, signals)
             found = replace(
                 found,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
@@ -18,34 +19,41 @@ def stored(
     """A hidden state that states fill, within each period: one Runge-Kutta step of order four, as the law takes it.
 
     Args:
-        hidden: that states fill.
+        hidden: that states fill; of two that turn into each other the first one.
         stages: inputs of a model at the start, the middle and the end of each period (rows, inputs), all runs in one.
         runs: rows of each run.
         signals: of the system.
 
     Returns:
-        Its values at the start, the middle and the end of each period (rows,).
+        Its values at the start, the middle and the end of each period (rows, 1); with its partner's, if it has one
+        (rows, 2).
     """
     scales = np.array([signals.states[place].scale for place in hidden.states])
-    dt, time, rest = signals.dt, hidden.time, hidden.rest or 0.0
+    dt, rest = signals.dt, hidden.rest or 0.0
+    # Two that turn into each other are one complex number z: z' = (1 + i) filling - (1 / time - i / turns) z.
+    turning = hidden.turns > 0.0
+    fades = complex(1.0 / hidden.time, -1.0 / hidden.turns) if turning else 1.0 / hidden.time
+    time = 1.0 / fades if turning else hidden.time
 
-    def filling(inputs: Floats) -> Floats:
+    def filling(inputs: Floats) -> Any:
         given = inputs[:, list(hidden.states)] / scales
-        over: Floats = (given * given if hidden.squared else given).mean(axis=1) - rest
-        return over
+        over = (given * given if hidden.squared else given).mean(axis=1) - rest
+        return over * (1.0 + 1.0j) if turning else over
 
     first, half, last = (filling(inputs) for inputs in stages)
-    z = dt / time
+    z = dt * fades if turning else dt / time
     kept = 1.0 - z + z**2 / 2.0 - z**3 / 6.0 + z**4 / 24.0
     added = (
         dt / 6.0 * (first * (1.0 - z + z**2 / 2.0 - z**3 / 4.0) + half * (4.0 - 2.0 * z + z**2 / 2.0) + last)
     )
-    start, end = np.empty(len(first)), np.empty(len(first))
+    start, end = np.empty_like(first), np.empty_like(first)
     for rows in runs:
         if rows.start == rows.stop:
             continue
-        begun = time * float(first[rows][0]) if hidden.settled else 0.0
+        begun = time * first[rows][0].item() if hidden.settled else 0.0
         values = list(accumulate(added[rows].tolist(), lambda now, more: kept * now + more, initial=begun))
         start[rows], end[rows] = values[:-1], values[1:]
     slopes = first - start / time, last - end / time
-    return start, 0.5 * (start + end) + dt / 8.0 * (slopes[0] - slopes[1]), end
+    middle = 0.5 * (start + end) + dt / 8.0 * (slopes[0] - slopes[1])
+    parts = (np.real, np.imag) if turning else (np.real,)
+    return tuple(np.stack([part(each) for part in parts], axis=1) for each in (start, middle, end))  # type: ignore[return-value]

@@ -46,7 +46,9 @@ class HiddenState(NamedTuple):
     """An unmeasured state h that commands or states drive: dh/dt = level − rest − h / time.
 
     The level is the mean over its sources of what each gives, in units of its scale. At the start of a run h is 0, or
-    in steady state under the first level.
+    in steady state under the first level. Two neighbours that the same drives may turn into each other, as the place
+    and the speed of a mass on a spring do: - h2 / turns is added to the first one's derivative, h1 / turns to the
+    second's.
 
     Args:
         commands: places of those that drive it; none where states do.
@@ -55,6 +57,7 @@ class HiddenState(NamedTuple):
         time: after which 1/e of it is left, s.
         states: places of the states that drive it; none where commands do.
         settled: whether a run begins with it in steady state; only where states drive it.
+        turns: time in which it and its partner turn by one radian, s; 0 where it has none; only where states drive it.
     """
 
     commands: tuple[int, ...]
@@ -63,6 +66,16 @@ class HiddenState(NamedTuple):
     time: float
     states: tuple[int, ...] = ()
     settled: bool = False
+    turns: float = 0.0
+
+
+def partners(hidden: Sequence[HiddenState]) -> list[int]:
+    """Place of the partner of each hidden state, its own where it has none."""
+    found: list[int] = []
+    for place, state in enumerate(hidden):
+        second = bool(found) and found[-1] == place
+        found.append(place if state.turns == 0.0 else place - 1 if second else place + 1)
+    return found
 
 
 @dataclass(frozen=True)
@@ -77,7 +90,7 @@ class Actuation(Recorded, kind="actuation"):
     actuators: tuple[Actuator, ...]
     hidden: tuple[HiddenState, ...] = ()
 
-    VERSION = 2
+    VERSION = 3
 
     @staticmethod
     def direct(signals: Signals) -> Actuation:
@@ -90,8 +103,8 @@ class Actuation(Recorded, kind="actuation"):
         if not model.actuators:
             return Actuation.direct(signals)
         hidden = (
-            HiddenState(tuple(commands), squared, rest, time, tuple(states), settled)
-            for commands, squared, rest, time, states, settled in model.hidden
+            HiddenState(tuple(commands), squared, rest, time, tuple(states), settled, turns)
+            for commands, squared, rest, time, states, settled, turns in model.hidden
         )
         return Actuation(tuple(Actuator(*actuator) for actuator in model.actuators), tuple(hidden))
 
@@ -113,15 +126,20 @@ class Actuation(Recorded, kind="actuation"):
             _check_actuator(actuator, f"Record {where}.actuators[{i}]")
         for i, state in enumerate(found.hidden):
             _check_hidden(state, f"Record {where}.hidden[{i}]")
+        for i, j in enumerate(partners(found.hidden)):
+            if found.hidden[i] != dict(enumerate(found.hidden)).get(j):
+                raise InvalidInput(
+                    f"Record {where}.hidden[{i}]: expected a neighbour that it turns into, found none; it is damaged."
+                )
         return found
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of an earlier version, in which commands alone filled hidden states."""
+        """A record of an earlier version, in which commands alone filled hidden states, or none turned."""
         found = super().renewed(record)
         hidden = found.get("hidden")
         if isinstance(hidden, list):
-            by_commands = {"states": [], "settled": False}
+            by_commands = {"states": [], "settled": False, "turns": 0.0}
             found["hidden"] = [{**by_commands, **one} if isinstance(one, dict) else one for one in hidden]
         return found
 
@@ -185,7 +203,8 @@ def _check_hidden(state: HiddenState, where: str) -> None:
     number(f"{where}.time", state.time, above=0.0)
     if state.rest is not None:
         number(f"{where}.rest", state.rest)
-    driven = bool(state.commands) != bool(state.states)
+    at_least_zero(f"{where}.turns", state.turns)
+    driven = bool(state.commands) != bool(state.states) and (state.turns == 0.0 or bool(state.states))
     if not driven or (state.commands and state.settled) or (state.states and state.rest is None):
         raise InvalidInput(
             f"{where}: expected commands that drive it and that it is not settled, or states and a rest, found others."

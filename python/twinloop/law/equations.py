@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinloop.errors import InvalidInput
-from twinloop.law.actuation import Actuator, in_periods
+from twinloop.law.actuation import Actuator, in_periods, partners
 from twinloop.law.expansion import Expansion, Monomial, Polynomial, ordered, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.flown import Span
@@ -248,6 +248,10 @@ class _Page:
         note = f"{start}; its time {self.writer.number(hidden.time)}{deviation} s" if deviation else start
         emptied = [] if hidden.rest == 0.0 else [("-", rest)]
         terms = [*given, *emptied, ("-", f"{name}/{self.writer.number(hidden.time)}")]
+        partner = partners(self.law.actuation.hidden)[number]
+        if partner != number:
+            other = self.law.hidden_symbols[partner]
+            terms.append(("-" if partner > number else "+", f"{other}/{self.writer.number(hidden.turns)}"))
         return [*_equation(f"d {name} / dt", [_Piece(terms)]), *_comment(note)]
 
     def _alike(self, member: Law) -> bool:

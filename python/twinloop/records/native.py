@@ -89,14 +89,17 @@ def _hidden_record(
     time: float,
     states: Sequence[int],
     settled: bool,
+    turns: float,
 ) -> dict[str, Any]:
-    """A hidden state; one that commands fill as every version has written it."""
+    """A hidden state; one that commands fill, or that turns into no other, as every version has written it."""
     record = dict(zip(HIDDEN_KEYS, (list(commands), squared, rest, time), strict=True))
-    return record | dict(zip(MOTION_KEYS, (list(states), settled), strict=True)) if states else record
+    if states:
+        record |= dict(zip(MOTION_KEYS, (list(states), settled), strict=True))
+    return record | {"turns": turns} if turns else record
 
 
-def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, float, list[int], bool]:
-    found = keys(value, HIDDEN_KEYS, where, optional=MOTION_KEYS)
+def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, float, list[int], bool, float]:
+    found = keys(value, HIDDEN_KEYS, where, optional=(*MOTION_KEYS, "turns"))
 
     def places(key: str) -> list[int]:
         items = read_list(found.get(key, []), f"{where}.{key}")
@@ -104,7 +107,8 @@ def _hidden(value: object, where: str) -> tuple[list[int], bool, float | None, f
 
     squared, settled = (read_flag(found.get(key, False), f"{where}.{key}") for key in ("squared", "settled"))
     time = read_number(found["time"], f"{where}.time")
-    return places("commands"), squared, _rest(found["rest"], where), time, places("states"), settled
+    turns = read_number(found.get("turns", 0.0), f"{where}.turns")
+    return places("commands"), squared, _rest(found["rest"], where), time, places("states"), settled, turns
 
 
 def _rest(value: object, where: str) -> float | None:

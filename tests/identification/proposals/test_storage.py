@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import twinloop as tl
 from sameness import same, through_json
@@ -71,6 +72,19 @@ def room(seed, noise=0.01):
     return Run.of(states + noise * stream.normal(size=states.shape), commands)
 
 
+def coupled(seed, noise=1.0):
+    """A motor that turns a load by a spring, which nobody measures: 0.5 of its inertia, swinging at 12 rad/s."""
+    stream = np.random.default_rng(seed)
+    commands = held(stream, 160, -0.8, 0.8, 8)
+
+    def slope(x, u):
+        spring = 48.0 * (x[0] - x[2]) + 0.2 * (x[1] - x[3])
+        return np.array([x[1], 40.0 * u[0] - 0.5 * x[1] - spring, x[3], 2.0 * spring])
+
+    states = integrated(slope, [0.0] * 4, commands, JOINT.dt, steps=40)[:, :2]
+    return Run.of(states + noise * np.array([5e-4, 5e-3]) * stream.normal(size=states.shape), commands)
+
+
 def learnt(runs, signals, **changes):
     return identify_runs(runs, signals, options_of("default", {**QUICK, **changes}), workers=WORKERS)
 
@@ -109,6 +123,19 @@ def test_what_motion_fills_is_found_and_free_runs_miss_a_tenth_at_most(plant, si
     assert "d hidden / dt = (" in twin.equations(3)
     again = tl.Twin.from_record(through_json(twin.to_record()))
     assert same(again.model.hidden, found.model.hidden) and again.equations(17) == twin.equations(17)
+
+
+def test_a_load_behind_a_spring_is_a_pair_that_turns():
+    runs = [coupled(seed) for seed in range(2)]
+    blind, found = (learnt(runs, JOINT, storage=storage) for storage in (False, True))
+    first, second = found.actuation.hidden
+    assert first == second and first.states
+    # The motor held, the load swings at the root of 96 rad²/s², and fades with 0.2 of its speed a second.
+    poles = np.roots([1.0, 0.4, 96.0])
+    assert 1.0 / first.turns == pytest.approx(abs(poles[0].imag), rel=0.02)
+    assert 1.0 / first.time == pytest.approx(-poles[0].real, rel=0.1)
+    without, within = (missed(each, JOINT, coupled) for each in (blind, found))
+    assert within < 2e-3 and within < 0.02 * without
 
 
 def swinging(seed):
@@ -173,6 +200,24 @@ def test_regressions_see_what_a_free_run_of_the_law_stores():
         np.testing.assert_allclose(seen.start[:, 3], exact[1], atol=2e-6)
 
 
+def test_regressions_see_what_a_pair_that_turns_does():
+    one = HiddenState((), False, 0.5, 0.3, (1,), True, 0.08)
+    stream = np.random.default_rng(0)
+    times = np.arange(401) * JOINT.dt
+    speed = 3.0 * np.sin(1.7 * times) + np.cos(0.6 * times)
+    states = np.stack([-3.0 / 1.7 * np.cos(1.7 * times) + np.sin(0.6 * times) / 0.6, speed], axis=1)
+    seen = stages([Run.of(states, stream.normal(size=(400, 1)))], JOINT, Actuation((Actuator(),), (one, one)))
+    rates = np.array([[1.0 / 0.3, 1.0 / 0.08], [-1.0 / 0.08, 1.0 / 0.3]])
+
+    def slope(t, h):
+        return (3.0 * np.sin(1.7 * t) + np.cos(0.6 * t)) / 10.0 - 0.5 - rates @ h
+
+    begun = np.linalg.solve(rates, [speed[0] / 10.0 - 0.5] * 2)
+    exact = solve_ivp(slope, (0.0, times[-1]), begun, t_eval=times, rtol=1e-10, atol=1e-12).y.T
+    np.testing.assert_allclose(seen.start[:, 3:], exact[:-1], atol=2e-5)
+    np.testing.assert_allclose(seen.end[:, 3:], exact[1:], atol=2e-5)
+
+
 def test_a_hypothesis_with_storage_comes_back_from_its_record():
     options = options_of("default", QUICK)
     context = Context([joint(0), joint(1)], JOINT, options, Unit(0), WORKERS)
@@ -190,4 +235,6 @@ def test_what_motion_fills_and_a_period_empties_is_no_state(states, time, shown)
     quick = HiddenState((0,) if not states else (), False, 0.0, time, states, False)
     slow = HiddenState((), False, 0.0, 0.5, (1,), False)
     assert shows((slow, quick), 0.02) is shown
+    for turns, swings in ((0.2, False), (0.1, True)):
+        assert shows((slow._replace(turns=turns),) * 2, 0.02) is swings
     assert shows((), 0.02)

@@ -12,6 +12,7 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.bounds import Limits
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.actuation import partners
 from twinloop.law.expressions import SHARE
 from twinloop.signals import Bounds
 
@@ -20,7 +21,10 @@ def model_of(context: Context, hypothesis: Hypothesis) -> _core.Model:
     """The model whose outputs are a hypothesis' sums; without the last hidden states that no sum uses."""
     pool, actuation = hypothesis.pool, hypothesis.actuation
     used = (pool.reach(term) - pool.inputs for found in hypothesis.sums for term in found.weights)
-    actuation = replace(actuation, hidden=actuation.hidden[: max(used, default=0)])
+    seen = max(used, default=0)
+    # What turns does so with its partner, whether that is used or not.
+    seen = max([seen, *(place + 1 for place in partners(actuation.hidden)[:seen])])
+    actuation = replace(actuation, hidden=actuation.hidden[:seen])
     outputs = [dict.fromkeys(_fixed(hypothesis, found), 1.0) | found.weights for found in hypothesis.sums]
     if hypothesis.form == "absolute":
         for i, terms in enumerate(outputs):

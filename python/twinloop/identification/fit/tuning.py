@@ -82,19 +82,26 @@ def tune(
 
 
 def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals) -> list[list[int]]:
-    """Groups of lags, and of times of hidden states, each of which is one number: commands, then hidden states."""
+    """Groups of lags, of times of hidden states and of those in which pairs turn, each of which is one number."""
     actuation = Actuation.of(model, signals)
     lags = [list(group) for group in hypothesis.alike if actuation.actuators[group[0]].lag > 0.0]
     # Hidden states that begin with one time keep one.
     times = [state.time for state in actuation.hidden]
-    same = ([j for j, other in enumerate(times) if other == time] for time in dict.fromkeys(times))
-    return lags + [[signals.n_u + j for j in group] for group in same]
+    # Those in which pairs turn stand behind them.
+    turns = [state.turns for state in actuation.hidden if state.turns > 0.0]
+    groups = [
+        [first + j for j, other in enumerate(each) if other == time]
+        for first, each in ((signals.n_u, times), (signals.n_u + len(times), turns))
+        for time in dict.fromkeys(each)
+    ]
+    return lags + groups
 
 
 def _forgetting(model: _core.Model, signals: Signals, longest: float) -> tuple[_core.Model, set[int]]:
     """The model with hidden states that last for so many seconds at most, and the places of those that did not."""
     actuation = Actuation.of(model, signals)
     times = [actuator.lag for actuator in actuation.actuators] + [state.time for state in actuation.hidden]
+    times += [state.turns for state in actuation.hidden if state.turns > 0.0]
     endless = {place for place, time in enumerate(times) if place >= signals.n_u and time > longest}
     if endless:
         times = [longest if place in endless else time for place, time in enumerate(times)]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.actuation import partners
 from twinloop.law.expressions import Node
 
 
@@ -18,9 +19,9 @@ def without_unused(hypothesis: Hypothesis) -> Hypothesis:
     hidden, pool = hypothesis.actuation.hidden, hypothesis.pool
     if len(hidden) < 2:
         return hypothesis
-    used = sorted(
-        {number for found in hypothesis.sums for term in found.weights for number in pool.hidden_in(term)}
-    )
+    seen = {number for found in hypothesis.sums for term in found.weights for number in pool.hidden_in(term)}
+    beside = partners(hidden)
+    used = sorted(seen | {beside[number] for number in seen})
     if used == list(range(len(used))):
         return hypothesis
     candidates = hypothesis.candidates.growing()

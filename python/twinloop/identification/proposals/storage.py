@@ -11,6 +11,9 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from twinloop._ground.elementary import power
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import strongest
@@ -27,6 +30,16 @@ from twinloop.law.forms import DERIVATIVES
 
 TIMES = (0.02, 0.1, 0.5)
 """Times that are tried, in lengths of the longest run."""
+SWINGS = 7
+"""Frequencies of a pair that turns that are tried, from one swing in the longest run to one in a few periods."""
+FEWEST_PERIODS = 5.0
+"""Periods of the fastest of them."""
+FADING = (3.0, 20.0)
+"""Times in which such a pair fades, in those in which it turns by one radian."""
+SWINGING = 4.0
+"""Times in which a pair turns by one radian that it lasts at least."""
+FINER_SWINGS = (1.4, 1.15, 1.05)
+"""Factors between frequencies, and between times, where a pair has shown."""
 FINER = (2.0, 1.25)
 """Factors between times that are tried where a storage has shown."""
 STEPS = 4
@@ -62,14 +75,15 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 def shows(hidden: Sequence[HiddenState], period: float) -> bool:
     """Whether readings can show what motion fills: not what has emptied before the next of them.
 
-    Less what fills it, such a state is the slope of that over a period. Where one gust moves two states, the slope of
-    the one foretells the other, and would be taken for a law.
+    A pair has to swing, too: two that fade sooner stand in for what is no spring. Less what fills it, such a state is
+    the slope of that over a period. Where one gust moves two states, the slope of the one foretells the other, and
+    would be taken for a law.
 
     Args:
         hidden: states, with their tuned times.
         period: of the readings, s.
     """
-    return all(one.time >= period for one in hidden if one.states)
+    return all(one.time >= max(period, SWINGING * one.turns) for one in hidden if one.states)
 
 
 def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -94,18 +108,30 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
     best = [strongest(pair) for pair in zip(*singles.values(), strict=True)]
     near, without = sorted(best, key=lambda one: one.evidence.length)[:NEAR], screen(())
     others = [one.actuation.hidden[0].states[0] for one in near]
-    kinds: list[tuple[list[Hypothesis], Sequence[float]]] = [(found, FINER) for found in singles.values()]
+    kinds: list[tuple[_Screen, list[Hypothesis], Sequence[float]]]
+    kinds = [(screen, found, FINER) for found in singles.values()]
     for time in times:
-        kinds.append(([screen(pair) for one in near for pair in _pairs(context, one, others, time)], ()))
+        pairs = [screen(pair) for one in near for pair in _pairs(context, one, others, time)]
+        kinds.append((screen, pairs, ()))
+    swings = screen.beside()
+    for begins in (False, True):
+        swinging = [
+            swings(pair)
+            for place in _sources(context)
+            for pair in _swinging(place, begins, longest, context.signals.dt)
+        ]
+        kinds.append((swings, swinging, FINER_SWINGS))
     showing = [
-        (found, factors)
-        for found, factors in ((strongest(several), factors) for several, factors in kinds if several)
+        (of_kind, found, factors)
+        for of_kind, found, factors in (
+            (each, strongest(several), factors) for each, several, factors in kinds if several
+        )
         if found.evidence.beats(without.evidence)
     ]
     # Which one shows on the terms that there are; whether there is one, when all may change.
     bare = _with_all_terms(context, screen, without) if showing else without
-    for found, factors in showing:
-        grown = _with_all_terms(context, screen, _timed(screen, found, factors))
+    for of_kind, found, factors in showing:
+        grown = _with_all_terms(context, of_kind, _timed(of_kind, found, factors))
         if grown.evidence.beats(bare.evidence):
             yield grown
 
@@ -122,10 +148,12 @@ def _timed(screen: _Screen, best: Hypothesis, factors: Sequence[float]) -> Hypot
     for factor in factors:
         for _ in range(STEPS):
             hidden = best.actuation.hidden
-            beside = [
-                screen(tuple(one._replace(time=one.time * by) for one in hidden))
-                for by in (1.0 / factor, factor)
-            ]
+            by = (1.0 / factor, factor)
+            beside = [screen(tuple(one._replace(time=one.time * share) for one in hidden)) for share in by]
+            if all(one.turns for one in hidden):
+                beside += [
+                    screen(tuple(one._replace(turns=one.turns * share) for one in hidden)) for share in by
+                ]
             found = strongest([best, *beside])
             if found is best:
                 break
@@ -186,6 +214,10 @@ class _Screen:
         unit = context.unit.part(hypothesis.start + STORED)
         return _Screen(context, bare, terms, inputs, unit, itertools.count(1))
 
+    def beside(self) -> _Screen:
+        """The same with a unit of work of its own."""
+        return replace(self, unit=self.unit.part(0), numbers=itertools.count(1))
+
     def __call__(self, sources: Sources) -> Hypothesis:
         """The hypothesis behind some hidden states, with the best sums of few terms."""
         context, bare = self.context, self.hypothesis
@@ -219,6 +251,16 @@ def _pairs(context: Context, alone: Hypothesis, others: Sequence[int], time: flo
         for place in others:
             if place > by_state.states[0]:
                 yield first, first._replace(states=(place,))
+
+
+def _swinging(place: int, settled: bool, longest: float, period: float) -> Iterator[Sources]:
+    """Pairs that turn into each other while one state drives them, at rest or in steady state at the start."""
+    slowest, fastest = longest / (2.0 * np.pi), FEWEST_PERIODS * period / (2.0 * np.pi)
+    for number in range(SWINGS):
+        turns = slowest * float(power(fastest / slowest, number / (SWINGS - 1)))
+        for fading in FADING:
+            one = HiddenState((), False, 0.0, fading * turns, (place,), settled, turns)
+            yield one, one
 
 
 def _sources(context: Context) -> list[int]:

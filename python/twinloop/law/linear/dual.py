@@ -38,6 +38,10 @@ class Dual:
         of_rows = factor[:, np.newaxis] if isinstance(factor, np.ndarray) else factor
         return Dual(self.values * factor, self.slopes * of_rows)
 
+    def mapped(self, matrix: Floats) -> Dual:
+        """What a matrix (others, rows) makes of the numbers."""
+        return Dual(matrix @ self.values, matrix @ self.slopes)
+
     def rows(self, places: Sequence[int]) -> Dual:
         """Some of the numbers."""
         return Dual(self.values[list(places)], self.slopes[list(places)])

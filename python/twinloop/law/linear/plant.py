@@ -16,7 +16,7 @@ from twinloop.law.linear.dual import Dual
 from twinloop.law.linear.jacobian import jacobian
 from twinloop.law.linear.sensors import as_read
 from twinloop.law.linear.state_space import Linear
-from twinloop.law.linear.storage import filling, settled, times
+from twinloop.law.linear.storage import fading, filling, settled
 
 HALVINGS = 30
 """Times that a step to a command that holds a state is halved at most."""
@@ -80,11 +80,12 @@ def _instant(law: Law, state: Floats, command: Floats) -> Linear:
         A[:n_x, place] = by_effect[:, i]
         A[place, place], B[place, i] = -1.0 / lag, 1.0 / lag
     stored = filling(law, Dual(state, np.eye(n_x)))
-    A[size - len(stored.values) :, :n_x] = stored.slopes
+    kept = size - len(stored.values)
+    A[kept:, :n_x], A[kept:, kept:] = stored.slopes, -fading(law)
     for place, h in enumerate(hidden, start=n_x + len(lagging)):
-        A[place, place] = -1.0 / h.time
         if h.states:
             continue
+        A[place, place] = -1.0 / h.time
         level, slope = _level(h.commands, h.squared, factors * command, factors)
         B[place] = slope
         drift[place] = 0.0 if h.rest is None else level - h.rest
@@ -238,16 +239,17 @@ def _stepped(law: Law, x: Dual, stored: Dual, inputs: Sequence[Dual]) -> tuple[D
     """
     if law.form != "acceleration":
         after = _mapped(law, x, stored, inputs)
-        half, fading = 0.5 * law.signals.dt, 1.0 / times(law)
-        added = (filling(law, x) + filling(law, after) - stored * fading) * half
-        return after, (stored + added) * (1.0 / (1.0 + half * fading))
+        half, fades = 0.5 * law.signals.dt, fading(law)
+        added = (filling(law, x) + filling(law, after) - stored.mapped(fades)) * half
+        inverse = np.asarray(np.linalg.inv(np.eye(len(fades)) + half * fades), dtype=np.float64)
+        return after, (stored + added).mapped(inverse)
     size, n_x = len(x.values) + len(stored.values), len(x.values)
-    roots, body = law.derivatives(), law.signals.kinematics
+    roots, body, fades = law.derivatives(), law.signals.kinematics, fading(law)
 
     def slope(point: Dual, given: Dual) -> Dual:
         states, held = (seen(point) if body else point.rows(range(n_x))), point.rows(range(n_x, size))
         moved = [_given(law, roots, states, Dual.stacked([given, held]))]
-        moved.append(filling(law, states) - held * (1.0 / times(law)))
+        moved.append(filling(law, states) - held.mapped(fades))
         if body is not None:
             still = Dual(np.zeros(3), np.zeros((3, states.slopes.shape[1])))
             moved[0] = moved[0].put(turns, still)

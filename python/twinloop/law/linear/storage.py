@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop.law.actuation import partners
 from twinloop.law.law import Law
 from twinloop.law.linear.dual import Dual
 
 
-def times(law: Law) -> Floats:
-    """Time of each hidden state that states fill, s."""
-    return np.array([one.time for one in law.actuation.stored])
+def fading(law: Law) -> Floats:
+    """How fast the hidden states that states fill fade, and turn into each other (stored, stored), 1/s."""
+    stored = law.actuation.stored
+    rates = np.diag([1.0 / one.time for one in stored])
+    for place, partner in enumerate(partners(stored)):
+        if partner != place:
+            rates[place, partner] = (1.0 if partner > place else -1.0) / stored[place].turns
+    return rates
 
 
 def filling(law: Law, states: Dual) -> Dual:
@@ -39,5 +45,6 @@ def settled(law: Law, state: Floats) -> Floats:
         law: of a twin.
         state: (n_x,), SI units, radians.
     """
-    stored = filling(law, Dual(state, np.zeros((len(state), 0)))).values * times(law)
+    filled = filling(law, Dual(state, np.zeros((len(state), 0)))).values
+    stored = np.linalg.solve(fading(law), filled)
     return np.concatenate([np.zeros(len(law.actuation.hidden) - len(stored)), stored])
