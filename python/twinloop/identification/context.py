@@ -22,6 +22,8 @@ from twinloop.signals import Signals
 
 SEARCHED_ANEW = 4
 """Runs up to which form, lags, delays and offsets are searched anew with each run."""
+LONG_RUN = 1000
+"""Periods from which one run shows what several shorter ones do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,11 @@ class Context:
     def may_store(self) -> bool:
         """Whether a hidden state that motion fills is looked for; not in one run, as any other."""
         return self.options.storage and len(self.runs) > 1
+
+    @property
+    def may_couple(self) -> bool:
+        """Whether masses that joints share are looked for: in one short run poses are functions of time, as all is."""
+        return len(self.runs) > 1 or len(self.runs[0].commands) >= LONG_RUN
 
     @property
     def known_terms(self) -> list[int]:

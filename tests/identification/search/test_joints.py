@@ -12,13 +12,16 @@ import twinloop as tl
 from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
+from twinloop.identification.context import Context
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise, stages
+from twinloop.identification.search import selection
 from twinloop.identification.search.joints import with_joints
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
+from twinloop.identification.starts import begun
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import Priors
@@ -198,3 +201,14 @@ def test_the_masses_of_an_arm_that_moves_little_are_found(rubs):
     said = found.model.program.run(np.column_stack([states, torques / [20.0, 8.0]]))
     # Rates, torques and poses that no flight has come near.
     assert np.all(np.sqrt(np.square(said - truth).mean(axis=0)) < 0.05 * truth.std(axis=0))
+
+
+@pytest.mark.parametrize(("steps", "count", "sought"), [(120, 1, False), (120, 2, True), (1000, 1, True)])
+def test_shared_masses_are_sought_in_several_runs_or_a_long_one(steps, count, sought, monkeypatch):
+    searches = []
+    monkeypatch.setattr(selection, "with_joints", lambda *given: searches.append(given) or list(given[2]))
+    runs = [moved(seed, False, steps) for seed in range(count)]
+    context = Context(runs, ARM, options_of("default", BRIEF), Unit(0), WORKERS)
+    first = begun(context, "acceleration", context.first_pool(), 0)
+    selection.climbed(context, selection.from_both_sides(context, first))
+    assert bool(searches) is sought

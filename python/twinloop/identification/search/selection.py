@@ -151,7 +151,7 @@ def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages
     grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
     problem, signals = posed(context, grown, inputs), context.signals
     walks = context.walks(grown.next_unit(context.unit), options.moves // 2)
-    sums = with_joints(problem, signals, grown.sums, walks)
+    sums = with_joints(problem, signals, grown.sums, walks) if context.may_couple else list(grown.sums)
     if again:
         sums = renewed(problem, signals, sums, walks)
     else:
