@@ -11,6 +11,7 @@ from twinloop.campaign.presets import options_of
 from twinloop.campaign.remaining import Estimate, duration
 from twinloop.faces.result import plain, to_json
 from twinloop.faces.text import quality_words, render, table
+from twinloop.faces.text.twin import hidden_states
 
 
 @pytest.mark.parametrize(
@@ -155,3 +156,14 @@ def test_gains_that_are_fixed_at_nothing_are_counted_rather_than_listed():
     assert "\n2 gains fixed at 0 left out.\n" in text and "rate.kp" not in text and "rate.ki" not in text
     (row,) = [line for line in text.splitlines() if line.startswith("rate.kd")]
     assert row.split() == ["rate.kd", "0.7", "0.7", "N", "m/rad", "fixed"]
+
+
+def testhidden_states_are_said_one_by_one_and_a_mass_on_a_spring_once():
+    one = {"commands": [], "states": ["rate"], "squared": False, "time": 6.5, "turns": 0.1}
+    other = {"commands": ["torque"], "states": [], "squared": True, "time": 1e6, "turns": 0.0}
+    first, second, third = hidden_states([other, one, one, {**one, "turns": 0.2}, {**one, "turns": 0.2}])
+    assert (
+        first == "Hidden state: the squares of torque drive a state that is not measured; it does not decay."
+    )
+    assert "values of rate" in second and "swings once in 0.628 s and decays to 1/e in 6.5 s" in second
+    assert "swings once in 1.26 s" in third

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -67,7 +68,7 @@ def states_text(result: Mapping[str, Any]) -> str:
         " Noise:\nstandard deviation, as estimated. A ratio of 1: only the sensors' noise is left.",
         _disturbances(twin["disturbances"]),
         _actuators(twin["actuators"]),
-        *(_hidden(state) for state in twin["hidden"]),
+        *hidden_states(twin["hidden"]),
         f"{twin['terms']} terms, {twin['committee']} models in the committee; χ² a reading {cell(twin['misfit'])}"
         f" (1: noise and disturbances explain the residuals)\nover {twin['readings']} readings,"
         f" {twin['ignored']} ignored.",
@@ -107,12 +108,25 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
     return f"Actuators: {'; '.join(words)}."
 
 
-def _hidden(state: Mapping[str, Any]) -> str:
-    """A state that no sensor reads, in words."""
-    what = "squares" if state["squared"] else "values"
-    fading = f"decays to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "does not decay"
-    sources = ", ".join((*state["commands"], *state.get("states", ())))
-    return f"Hidden state: the {what} of {sources} drive a state that is not measured; it {fading}."
+def hidden_states(states: Sequence[Mapping[str, Any]]) -> list[str]:
+    """States that no sensor reads, in words; two that turn into each other are one mass on a spring."""
+    said, alone = [], True
+    for state in states:
+        what = "squares" if state["squared"] else "values"
+        fading = f"decays to 1/e in {state['time']:.3g} s" if state["time"] < A_DAY else "does not decay"
+        sources = ", ".join((*state["commands"], *state.get("states", ())))
+        turns = state.get("turns", 0.0)
+        if not turns:
+            said.append(
+                f"Hidden state: the {what} of {sources} drive a state that is not measured; it {fading}."
+            )
+        elif alone:
+            said.append(
+                f"Hidden mass on a spring: the {what} of {sources} drive it; it swings once in"
+                f" {2.0 * math.pi * turns:.3g} s and {fading}."
+            )
+        alone = not (turns and alone)
+    return said
 
 
 def errors_text(result: Mapping[str, Any]) -> str:
