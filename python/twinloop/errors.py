@@ -114,9 +114,12 @@ def engine_input() -> Iterator[None]:
 
 
 def _raised_by_others(error: BaseException) -> bool:
-    """Whether an error in a block of `engine_input` passed through frames of another package than the block's own.
+    """Whether an error in a block of `engine_input` was raised in a frame of another package than the block's own.
 
     The engine has no frames of Python: what it refuses itself is raised in the frame that called it.
     """
     _, *frames = traceback.walk_tb(error.__traceback__)  # the first one is that of `engine_input`
-    return len({str(frame.f_globals.get("__name__")).partition(".")[0] for frame, _ in frames}) > 1
+    block, *_, innermost = [
+        str(frame.f_globals.get("__name__")).partition(".")[0] for frame, _ in (frames[0], *frames)
+    ]
+    return innermost != block

@@ -117,7 +117,15 @@ def test_a_campaign_that_never_was_is_refused(path, value, word):
         tl.Campaign.from_record(damaged(record, path, value))
 
 
-HIDDEN = {"commands": [0], "squared": False, "rest": None, "time": 1.0, "states": [], "settled": False}
+HIDDEN = {
+    "commands": [0],
+    "squared": False,
+    "rest": None,
+    "time": 1.0,
+    "states": [],
+    "settled": False,
+    "turns": 0.0,
+}
 
 
 @pytest.fixture(scope="module")
