@@ -5,9 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import twinloop as tl
-from law_twins import BODY, SIGNALS, STORED, stored_twin, twin_of
+from law_twins import BODY, SIGNALS, STORED, flown, stored_twin, twin_of
 from sameness import same, through_json
 from twinloop.law.actuation import Actuation
+from twinloop.law.exports.augmented import begun
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
 
@@ -111,11 +112,15 @@ def test_at_an_instant_what_is_stored_is_filled_by_the_state_and_empties():
     np.testing.assert_allclose(plant.drift[3], 0.0, atol=1e-15)
 
 
-def test_a_body_that_turns_stores_as_well():
-    """With the attitude as a quaternion and in several steps a period, what is stored is integrated along."""
+def turning_twin():
     stored = [((), False, 0.0, 0.3, (3,), False, 0.0)]
     lines = ["r8 = r6 * 2.0", "r11 = r7 * -30.0", "r8 = r8 + r11"]
-    twin = twin_of(lines, signals=BODY, inputs=8, actuators=[(0.0, 0, None)], hidden=stored)
+    return twin_of(lines, signals=BODY, inputs=8, actuators=[(0.0, 0, None)], hidden=stored)
+
+
+def test_a_body_that_turns_stores_as_well():
+    """With the attitude as a quaternion and in several steps a period, what is stored is integrated along."""
+    twin = turning_twin()
     commands = RNG.uniform(-2.0, 2.0, (40, 1))
     found = twin.simulate_commands(np.zeros(6), commands).true_states
     y = np.zeros(2)
@@ -147,12 +152,35 @@ def test_a_law_and_a_record_give_it_back_to_the_bit():
     assert same(run.true_states, other.true_states)
 
 
-@pytest.mark.parametrize("kind", ["python", "c", "casadi", "control", "gymnasium"])
-def test_an_export_that_lacks_it_says_so(kind):
+@pytest.mark.parametrize("kind", ["python", "c", "fmu3", "casadi", "control"])
+@pytest.mark.parametrize("which", ["stored", "swinging", "turning"])
+def test_an_export_has_it_as_states(which, kind, tmp_path):
+    """What is written is compared with the twin's own free runs before it is handed out."""
+    needed = {"casadi": "casadi", "control": "control", "fmu3": "fmpy"}
+    if kind in needed:
+        pytest.importorskip(needed[kind])
+    made = {"stored": stored_twin, "swinging": lambda: linear_twin(hidden=SWINGING), "turning": turning_twin}
+    plain = made[which]()
+    twin = tl.Twin(plain.model, plain.signals, flights=[flown(plain, seed=seed) for seed in range(2)])
+    suffix = {"c": ".c", "fmu3": ".fmu"}.get(kind, ".py")
+    twin.export(tmp_path / f"twin{suffix}", kind=kind)
+    if kind == "python":
+        module = {}
+        exec((tmp_path / "twin.py").read_text(encoding="utf-8"), module)
+        flight, hidden = twin.flights[0], len(twin.law.actuation.stored)
+        assert len(module["STATES"]) == twin.signals.n_x + hidden
+        start = begun(twin.law, flight.states[0])
+        states = np.array(module["simulate"](start.tolist(), flight.commands.tolist()))
+        expected = twin.simulate_commands(flight.states[0], flight.commands).true_states
+        np.testing.assert_allclose(states[:, : twin.signals.n_x], expected, rtol=1e-9, atol=1e-9)
+        assert np.abs(states[1:, twin.signals.n_x :]).min(axis=0).max() > 0.0
+
+
+def test_an_export_without_further_states_says_so():
     with pytest.raises(tl.NotAvailable, match="motion fills"):
-        stored_twin().export(
-            kind if kind in ("python", "c") else "twin.py", kind=None if kind in ("python", "c") else kind
-        )
+        stored_twin().export("twin.py", kind="gymnasium")
+    with pytest.raises(tl.NotAvailable, match="motion fills"):
+        linear_twin("increment").export("python")
     assert "hidden_2" in stored_twin().export("latex")
     assert "hidden_2" in stored_twin().export("sympy")
 

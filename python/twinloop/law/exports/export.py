@@ -166,8 +166,9 @@ def exported(source: Source, kind: str, name: str, precision: str = "double") ->
     if law.actuation.stored:
         raise NotAvailable(
             f"Export, {kind}: expected a law whose hidden states are filled by commands, found one that motion fills,"
-            " which is integrated with the states; export its equations ('sympy', 'latex') or the twin itself ('json'),"
-            " or learn without them: storage=False."
+            " and whose steps or rewards know no further states; export it as 'python', 'c' or 'fmu3' where its outputs"
+            " are derivatives, its equations ('sympy', 'latex') or the twin itself ('json'), or learn without them:"
+            " storage=False."
         )
     if kind in MODULES:
         what, write, simulated = MODULES[kind]

@@ -1,0 +1,84 @@
+"""A law whose hidden states that motion fills are states like others: for exports, which step states and no more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twinloop._ground.arrays import Floats
+from twinloop.law.actuation import Actuation, HiddenState, partners
+from twinloop.law.expressions import INPUT, Expressions
+from twinloop.law.law import Law
+from twinloop.law.linear.storage import settled
+from twinloop.signals import Signals, State
+
+
+def augmented(law: Law) -> Law:
+    """The same law with its stored hidden states behind the other states, integrated with them by the same steps.
+
+    Args:
+        law: whose outputs are derivatives, integrated by Runge and Kutta's method.
+    """
+    stored, signals = law.actuation.stored, law.signals
+    n_x, count = signals.n_x, len(stored)
+    names = law.hidden_symbols[len(law.hidden_symbols) - count :]
+    added = [
+        State(name, "s", min(one.time, one.turns or one.time))
+        for name, one in zip(names, stored, strict=True)
+    ]
+    expressions, made = Expressions(), dict[int, int]()
+
+    def moved(place: int) -> int:
+        """An input's place behind the new states, or among them."""
+        kept = law.inputs - count
+        return place if place < n_x else place + count if place < kept else n_x + place - kept
+
+    for number in law.expressions.needed(law.outputs):
+        node = law.expressions[number]
+        if node.operation == INPUT:
+            made[number] = expressions.input(moved(int(node.value or 0)))
+        else:
+            operands = tuple(made[operand] for operand in node.operands)
+            made[number] = expressions.enter(node._replace(operands=operands))
+    slopes = [_slope(expressions, signals, stored, place) for place in range(count)]
+    return Law(
+        replace(signals, states=(*signals.states, *added)),
+        law.form,
+        expressions,
+        (*(made[output] for output in law.outputs), *slopes),
+        Actuation(law.actuation.actuators, law.actuation.hidden[: len(law.actuation.hidden) - count]),
+        (*law.offsets, *[0.0] * count),
+        law.levels,
+    )
+
+
+def begun(law: Law, state: Floats) -> Floats:
+    """A state (n_x,) with what its law's stored hidden states are there at the start of a run."""
+    stored = law.actuation.stored
+    still = settled(law, state)[len(law.actuation.hidden) - len(stored) :]
+    return np.concatenate([state, np.where([one.settled for one in stored], still, 0.0)])
+
+
+def _slope(expressions: Expressions, signals: Signals, stored: Sequence[HiddenState], place: int) -> int:
+    """The node of a stored hidden state's derivative."""
+    one, make, constant = stored[place], expressions.add, expressions.constant
+    total: int | None = None
+    for source in one.states:
+        given = make("*", expressions.input(source), constant(1.0 / signals.states[source].scale))
+        given = make("*", given, given) if one.squared else given
+        total = given if total is None else make("+", total, given)
+    assert total is not None
+    level = make("*", total, constant(1.0 / len(one.states))) if len(one.states) > 1 else total
+    level = make("-", level, constant(one.rest)) if one.rest else level
+
+    def itself(of: int) -> int:
+        return expressions.input(signals.n_x + of)
+
+    slope = make("-", level, make("/", itself(place), constant(one.time)))
+    partner = partners(stored)[place]
+    if partner == place:
+        return slope
+    turned = make("/", itself(partner), constant(one.turns))
+    return make("-" if partner > place else "+", slope, turned)
