@@ -73,19 +73,24 @@ class Context:
         return self.options.lags and not self.settled
 
     @property
+    def several(self) -> bool:
+        """Whether runs tell what is hidden from a function of time: several do, and a long one."""
+        return len(self.runs) > 1 or len(self.runs[0].commands) >= LONG_RUN
+
+    @property
     def may_hide(self) -> bool:
-        """Whether a hidden state is looked for: in one run it is a function of time, and that may be anything."""
-        return self.options.hidden and len(self.runs) > 1
+        """Whether a hidden state is looked for: in one short run it is a function of time, and that may be anything."""
+        return self.options.hidden and self.several
 
     @property
     def may_store(self) -> bool:
-        """Whether a hidden state that motion fills is looked for; not in one run, as any other."""
-        return self.options.storage and len(self.runs) > 1
+        """Whether a hidden state that motion fills is looked for; not in one short run, as any other."""
+        return self.options.storage and self.several
 
     @property
     def may_couple(self) -> bool:
         """Whether masses that joints share are looked for: in one short run poses are functions of time, as all is."""
-        return len(self.runs) > 1 or len(self.runs[0].commands) >= LONG_RUN
+        return self.several
 
     @property
     def known_terms(self) -> list[int]:

@@ -47,10 +47,10 @@ def held(stream, steps, low, high, hold):
     return np.repeat(stream.uniform(low, high, (steps // hold + 1, 1)), hold, axis=0)[:steps]
 
 
-def joint(seed, noise=1.0):
+def joint(seed, noise=1.0, steps=160):
     """A motor that turns a load of much friction and no mass by a spring: its twist is filled by the motor's speed."""
     stream = np.random.default_rng(seed)
-    commands = held(stream, 160, -0.8, 0.8, 12)
+    commands = held(stream, steps, -0.8, 0.8, 12)
 
     def slope(x, u):
         return np.array([x[1], 100.0 * u[0] - 200.0 * x[2] - 2.0 * x[1], x[1] - 5.0 * x[2]])
@@ -163,7 +163,14 @@ def test_nothing_is_found_where_motion_fills_nothing(plant, signals):
         assert not learnt([plant(first + i) for i in range(3)], signals).actuation.stored
 
 
-def test_one_run_shows_no_storage_and_neither_do_increments():
+def test_one_long_run_shows_what_several_do():
+    wide = replace(JOINT, states=(replace(JOINT.states[0], scale=40.0), JOINT.states[1]))
+    found = learnt([joint(0, steps=1000)], wide)
+    (stored,) = found.actuation.hidden
+    assert stored.states and stored.time == pytest.approx(0.2, rel=0.01)
+
+
+def test_one_short_run_shows_no_storage_and_neither_do_increments():
     options = options_of("default", QUICK)
     for runs, form in (([joint(0)], "acceleration"), ([joint(0), joint(1)], "increment")):
         context = Context(runs, JOINT, options, Unit(0), WORKERS)
