@@ -11,7 +11,7 @@ from conftest import PENDULUM_GAINS
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, distinct
 from twinloop.campaign.identify_and_plan.misses import Miss, unexplained
-from twinloop.campaign.identify_and_plan.readings import froze, ratio
+from twinloop.campaign.identify_and_plan.readings import derived, froze, ratio, repeats
 from twinloop.campaign.identify_and_plan.sent import exchanged, other_commands
 
 DT, STEPS = 0.02, 200
@@ -300,3 +300,57 @@ def test_two_predictions_in_a_row_that_missed_to_one_side_are_named(flights, sev
         better = flights[-1][2] < flights[-1][0]
         assert f"{'better' if better else 'worse'} than predicted" in one.sentence
         assert f"{first} and {last}." in one.sentence
+
+
+def every(periods, start=3):
+    """Makes a sensor of the height give a new reading each so many periods."""
+
+    def change(states):
+        rows = start + (np.arange(len(states)) - start) // periods * periods
+        states[:, 0] = states[np.maximum(rows, 0), 0]
+        return states
+
+    return change
+
+
+@pytest.mark.parametrize("periods", [2, 10])
+def test_a_slow_sensor_is_named_with_its_period(periods):
+    runs = [flown(seed, change=every(periods)) for seed in range(2)]
+    (said,) = [one for one in diagnostics_of(runs, SIGNALS, True, STEPS) if one.code == "repeated-readings"]
+    assert said.sentence.startswith(
+        f"height repeats every reading: it gives a new one each {periods} periods"
+    )
+    assert not said.serious
+
+
+def test_readings_that_come_anew_or_now_and_then_are_no_slow_sensor():
+    stream = np.random.default_rng(0)
+    fresh = stream.normal(size=300)
+    counted = np.round(3.0 * np.sin(0.02 * np.arange(300)) / 0.2) * 0.2
+    now_and_then = np.repeat(fresh[:60], stream.integers(1, 9, 60))
+    assert repeats([fresh]) == repeats([counted]) == repeats([now_and_then]) == repeats([np.zeros(50)]) == 1
+
+
+@pytest.mark.parametrize("keeps", [0.0, 0.7])
+def test_a_rate_that_is_computed_from_an_angle_is_named(keeps):
+    def change(states):
+        rate = states[0, 2] = 0.0
+        for k in range(1, len(states)):
+            rate = keeps * rate + (1.0 - keeps) * (states[k, 1] - states[k - 1, 1]) / DT
+            states[k, 2] = rate
+        return states
+
+    runs = [flown(seed, change=change) for seed in range(2)]
+    (said,) = [one for one in diagnostics_of(runs, SIGNALS, True, STEPS) if one.code == "derived-rate"]
+    assert said.sentence.startswith("rate is computed from the readings of angle")
+
+
+def test_sensors_of_their_own_and_exact_steps_are_not_computed_from_each_other():
+    assert list(derived([flown(seed).trajectory.states for seed in range(2)])) == []
+    # A step of Euler with the new rate: without noise the rate is the angle's difference, too.
+    x, states = np.array([1.0, 0.0]), []
+    for _ in range(300):
+        rate = x[1] - DT * 9.0 * np.sin(x[0])
+        x = np.array([x[0] + DT * rate, rate])
+        states.append(x)
+    assert list(derived([np.array(states)])) == []
