@@ -10,6 +10,7 @@ import twinloop as tl
 from conftest import pendulum_step
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign.identify_and_plan.track_record import (
+    UNEXPLAINED,
     UNPROVEN,
     WEIGHT,
     confirmed,
@@ -114,6 +115,9 @@ def test_gains_that_have_not_flown_are_a_risk_until_a_prediction_has_come_true()
     assert unproven_risk([true, missed], NEW, BOUNDED) == UNPROVEN
     assert unproven_risk([true], NEW, BOUNDED) == unproven_risk([missed, true], NEW, BOUNDED) == 0.0
     # Gains that flew show it themselves, and without an envelope none is left.
+    # A twin that does not explain its own flights foretells others less well.
+    assert unproven_risk([missed], NEW, BOUNDED, explains=False) == UNEXPLAINED > UNPROVEN
+    assert unproven_risk([true], NEW, BOUNDED, explains=False) == 0.0
     assert unproven_risk([], KEPT, BOUNDED) == unproven_risk([], NEW, FREE) == 0.0
 
 

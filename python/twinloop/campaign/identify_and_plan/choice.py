@@ -230,9 +230,8 @@ class Choice:
         predicted, spread = self._expected(test, recorded[:, :, pick])
         usages = judged.usages[:, :, pick]
         own = self._fared(test)
-        least = max(
-            own.risk, self._moved(test.genes).risk, unproven_risk(self.book.experiments, own, test.signals)
-        )
+        unproven = unproven_risk(self.book.experiments, own, test.signals, self.committee.explains)
+        least = max(own.risk, self._moved(test.genes).risk, unproven)
         return replace(test, predicted=predicted, measured=measured).explained(
             spread, max(risk(usages), least), reason
         )

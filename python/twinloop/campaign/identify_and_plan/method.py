@@ -173,7 +173,7 @@ class IdentifyAndPlan:
         predicted, spread = gusts.added_to(found.predicted, found.spread)
         spread = calibrated(spread, predicted, book.experiments)
         own = standing.fared(book, found.genes, found.excitation is not None)
-        unproven = unproven_risk(book.experiments, own, self.setup.signals)
+        unproven = unproven_risk(book.experiments, own, self.setup.signals, committee.explains)
         risk = max(found.risk, own.risk, gusts.risk, unproven)
         found = replace(found, predicted=predicted, spread=spread, risk=risk)
         test = book.new_test(
