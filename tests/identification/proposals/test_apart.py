@@ -81,3 +81,30 @@ def test_what_was_found_apart_is_not_alike_later():
     assert alike_commands(SIGNALS) == ((0, 1),)
     assert alike_commands(SIGNALS, known) == ((0,), (1,))
     assert alike_commands(SIGNALS, Actuation((Actuator(0.2),) * 2)) == ((0, 1),)
+
+
+def gates(delays, seed, steps=200):
+    """Two gates between three pools, each of which acts so many periods after it was sent."""
+    stream = np.random.default_rng(seed)
+    commands = np.repeat(stream.uniform(-0.8, 0.8, (steps // 10, 2)), 10, axis=0)
+    sent = np.vstack([np.repeat(commands[:1], 20, axis=0), commands])
+    levels, rows = np.zeros(2), [np.zeros(2)]
+    for k in range(steps):
+        first, second = (sent[20 + k - delay, i] for i, delay in enumerate(delays))
+        for _ in range(10):
+
+            def flow(x, first=first, second=second):
+                return np.array([first - 0.6 * second - 0.3 * x[0], 0.6 * second - 0.4 * x[1] + 0.2 * x[0]])
+
+            begun = flow(levels)
+            levels = levels + 0.05 * DT * (begun + flow(levels + 0.1 * DT * begun))
+        rows.append(levels)
+    readings = np.array(rows) + 3e-3 * stream.normal(size=(steps + 1, 2))
+    return tl.Trajectory(DT * np.arange(steps + 1), readings, commands)
+
+
+@pytest.mark.parametrize("delays", [(7, 0), (3, 8), (4, 4), (0, 0)])
+def test_alike_commands_are_given_delays_of_their_own(delays):
+    twin = tl.identify([gates(delays, seed) for seed in (1, 2)], SIGNALS)
+    assert tuple(actuator.delay for actuator in twin.law.actuation.actuators) == delays
+    assert all(actuator.lag < 0.1 * DT for actuator in twin.law.actuation.actuators)

@@ -15,6 +15,7 @@ from twinloop.identification.evidence import strongest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import search
+from twinloop.identification.sensors.noise import calm
 from twinloop.law.actuation import Actuation, Actuator
 from twinloop.signals import Signals
 
@@ -22,6 +23,8 @@ LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 """Time constants that are tried, in periods."""
 FINER = 2.0**0.5
 """Ratio of the lags that are tried beside the best of them."""
+FEW = 3
+"""Commands that are alike up to which each is tried with a lag and a delay of its own."""
 MOST_DELAY = 50
 """Periods beyond which no delay is tried."""
 GRID = 0
@@ -35,21 +38,48 @@ def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if hypothesis.fit is not None or not context.may_lag:
         return
     context.watch("actuators")
-    trial = _trials(context, hypothesis)
+    number = itertools.count()
+    trial = _trials(context, hypothesis, number)
     best = trial(Actuation.direct(context.signals))
     for group in hypothesis.alike:
-        for delay in range(context.options.longest_delay + 1):
-            best = _best_lag(context, trial, best, group, delay)
-        best = _longer(context, trial, best, group)
+        best = _searched(context, trial, best, group)
     best = _without(trial, best)
+    best = _each(context, best, number)
     if best.actuation != hypothesis.actuation:
         # The noise was that of other actuators, and a disturbance may still stand in for terms.
         yield from_both_sides(context, best, best.sums)
 
 
-def _trials(context: Context, hypothesis: Hypothesis) -> Trial:
+def _searched(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
+    """The best so far, or a better one with another lag or delay of a group."""
+    for delay in range(context.options.longest_delay + 1):
+        best = _best_lag(context, trial, best, group, delay)
+    return _longer(context, trial, best, group)
+
+
+def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothesis:
+    """The best so far, or a better one in which each of a few alike commands has a lag or a delay of its own.
+
+    Two that differ, such as gates at either end of a canal, hide what they share: it suits neither.
+    """
+    for group in best.alike:
+        problem = posed(context, best)
+        still = all(calm(problem, found.chain) is found.chain for found in best.sums)
+        if still or not context.options.apart or not 1 < len(group) <= FEW:
+            continue
+        alike = tuple(other for other in best.alike if other != group) + tuple((i,) for i in group)
+        split = replace(best, alike=tuple(sorted(alike)))
+        trial = _trials(context, split, number)
+        own = trial(best.actuation)
+        for i in group:
+            own = _searched(context, trial, own, (i,))
+        best = strongest([best, own])
+    return best
+
+
+def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int]) -> Trial:
     """What tries actuators for a hypothesis; the searches of each trial are a part of one unit of work."""
-    unit, number = context.unit.part(hypothesis.start, GRID), itertools.count()
+    unit = context.unit.part(hypothesis.start, GRID)
     driven = [found.chain for found in hypothesis.sums]
 
     def trial(actuation: Actuation) -> Hypothesis:
