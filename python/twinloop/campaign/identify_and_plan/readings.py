@@ -130,17 +130,13 @@ def derived(records: Sequence[Floats]) -> Iterator[tuple[int, int]]:
     runs = [Run.of(states, np.zeros((len(states) - 1, 1))) for states in records]
     sizes = np.max([np.abs(states).max(axis=0) for states in records], axis=0)
     noise = np.sqrt(guessed_noise(runs, np.where(sizes > 0.0, sizes, 1.0)))
-    count = records[0].shape[1]
-    for i in range(count):
-        for j in (j for j in range(count) if j != i):
+    # What is exact, or never moves, says nothing of how it was made.
+    read = [i for i in range(records[0].shape[1]) if 0.0 < NOISY * sizes[i] < noise[i]]
+    for i in read:
+        for j in (j for j in read if j != i):
             columns = [np.stack([x[:-1, i], x[1:, j], x[:-1, j]], axis=1) for x in records]
             rows, wanted = np.concatenate(columns), np.concatenate([x[1:, i] for x in records])
-            # What is exact, or hardly moves, says nothing of how it was made.
-            if (
-                len(rows) < FEWEST_DERIVED
-                or not noise[i] > NOISY * sizes[i]
-                or not noise[j] > NOISY * sizes[j]
-            ):
+            if len(rows) < FEWEST_DERIVED:
                 continue
             # A filtered difference: r[k] = a r[k-1] + b (x[k] - x[k-1]); with a = 1 it would be the other one's rate.
             last, change = rows[:, 0] / sizes[i], (rows[:, 1] - rows[:, 2]) / sizes[j]
