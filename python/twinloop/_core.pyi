@@ -16,7 +16,7 @@ _Actuator = tuple[float, int, float | None]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
 _Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool, float]
 """Commands, whether squares fill it, the mean at rest (scaled; None: of the first period), time (s), states that fill
-it where no commands do, and whether a run begins with it settled."""
+it where no commands do, whether a run begins with it settled, and in which it turns with its neighbour (s; 0: none)."""
 _Motion = tuple[float, float, float]
 """Variance of a white disturbance, variance of a lasting one, time after which that is forgotten to 1/e (s)."""
 _Chain = tuple[Sequence[int], Sequence[float], _Motion, str]

@@ -9,6 +9,8 @@ import pytest
 import twinloop as tl
 from lives import LIFE, lived, new
 from sameness import same, through_json
+from twinloop.campaign.history import Lesson
+from twinloop.law.actuation import Actuation, Actuator, HiddenState
 from twinloop.records import to_text
 
 ELSEWHERE = """
@@ -191,3 +193,21 @@ def test_what_was_learnt_from_more_runs_than_there_are_is_refused():
 def test_a_record_names_every_option_so_that_later_defaults_do_not_matter():
     for preset in ("default", "paper"):
         assert set(new(preset).setup.to_record()["options"]) == set(vars(new(preset).options))
+
+
+@pytest.mark.parametrize("kind", ["lesson", "actuation"])
+def test_hidden_states_of_earlier_versions_are_read(kind, remembered):
+    """The first version wrote bare lists of lessons, the second one named what states fill; none turned."""
+    names, later = ("commands", "squared", "rest", "time"), {"states": [], "settled": False}
+    own = Actuation((Actuator(),), (HiddenState((0,), True, None, 0.7),))
+    if kind == "lesson":
+        lesson = remembered["memory"]["latest"]["lessons"][0]
+        record, read = {**lesson, "hidden": own.to_record()["hidden"]}, Lesson.from_record
+    else:
+        record, read = own.to_record(), Actuation.from_record
+    expected = read(record)
+    assert expected.hidden == own.hidden
+    first = {name: record["hidden"][0][name] for name in names}
+    unnamed = [list(first.values())] if kind == "lesson" else [first]
+    for version, hidden in ((1, unnamed), (2, [{**first, **later}])):
+        assert read({**record, "version": version, "hidden": hidden}).hidden == own.hidden

@@ -8,9 +8,9 @@ from typing import Literal
 from twinloop._experiment.envelope import readings_leave, usages_of
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
-from twinloop.law.actuation import HiddenState
+from twinloop.law.actuation import HiddenState, renewed_hidden
 from twinloop.objectives import normalised_error
-from twinloop.records import Record, Recorded, with_names
+from twinloop.records import Record, Recorded
 from twinloop.remarks import Remark
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -241,7 +241,7 @@ class Lesson(Recorded, kind="lesson"):
         """A record of an earlier version: commands alone filled hidden states, that had no names, or none turned."""
         found = super().renewed(record)
         if "hidden" in found:
-            found["hidden"] = with_names(found["hidden"], HiddenState._fields, [], False, 0.0)
+            found["hidden"] = renewed_hidden(found["hidden"])
         return found
 
     def cause(self, state: str) -> Cause:

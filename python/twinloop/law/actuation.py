@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats, at_least_zero, number, whole
 from twinloop.errors import InvalidInput
-from twinloop.records import Record, Recorded
+from twinloop.records import Record, Recorded, with_names
 from twinloop.signals import Signals
 
 LONGEST_DELAY = 1000
@@ -42,6 +42,10 @@ def in_periods(count: int) -> str:
     return f"{count} period{'s' if count != 1 else ''}"
 
 
+LATER: Mapping[str, object] = {"states": [], "settled": False, "turns": 0.0}
+"""What hidden states of earlier versions did not have."""
+
+
 class HiddenState(NamedTuple):
     """An unmeasured state h that commands or states drive: dh/dt = level − rest − h / time.
 
@@ -67,6 +71,14 @@ class HiddenState(NamedTuple):
     states: tuple[int, ...] = ()
     settled: bool = False
     turns: float = 0.0
+
+
+def renewed_hidden(items: object) -> object:
+    """Hidden states as earlier versions wrote them: without names, filled by commands alone, or none that turned."""
+    found, later = with_names(items, HiddenState._fields, *LATER.values()), dict(LATER)
+    if not isinstance(found, list):
+        return found
+    return [{**later, **one} if isinstance(one, dict) else one for one in found]
 
 
 def partners(hidden: Sequence[HiddenState]) -> list[int]:
@@ -137,10 +149,8 @@ class Actuation(Recorded, kind="actuation"):
     def renewed(cls, record: Record) -> Record:
         """A record of an earlier version, in which commands alone filled hidden states, or none turned."""
         found = super().renewed(record)
-        hidden = found.get("hidden")
-        if isinstance(hidden, list):
-            by_commands = {"states": [], "settled": False, "turns": 0.0}
-            found["hidden"] = [{**by_commands, **one} if isinstance(one, dict) else one for one in hidden]
+        if "hidden" in found:
+            found["hidden"] = renewed_hidden(found["hidden"])
         return found
 
     def at_once(self, commands: Sequence[int]) -> Actuation:
