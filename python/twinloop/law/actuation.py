@@ -177,6 +177,17 @@ def alike_commands(signals: Signals, known: Actuation | None = None) -> tuple[tu
     return tuple(tuple(group) for group in found.values())
 
 
+def one_by_one(alike: Sequence[tuple[int, ...]], group: tuple[int, ...]) -> tuple[tuple[int, ...], ...]:
+    """Groups of alike commands, of which those of one are alike no more.
+
+    Args:
+        alike: groups of commands.
+        group: one of them.
+    """
+    others = [other for other in alike if other != group]
+    return tuple(sorted([*others, *((i,) for i in group)]))
+
+
 def delayed(model: _core.Model, signals: Signals, periods: float = 1.0) -> _core.Model:
     """The same model with commands that act later, by a delay of whole periods and a lag of what is left.
 

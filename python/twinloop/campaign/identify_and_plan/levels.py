@@ -31,29 +31,33 @@ def levels_of(experiments: Sequence[Experiment], signals: Signals) -> Levels:
         experiments: that were learnt from; controllers are run on the readings.
         signals: of the system.
     """
-    flown = [(run.test, *sent_and_asked(run.test, run.trajectory)) for run in experiments if run.test]
+    flown = [(run.test, run.trajectory) for run in experiments if run.test is not None]
+    if not flown:
+        return ()
+    sent = np.concatenate([run.commands for _, run in flown])
+    seen = [np.unique(values) for values in sent.T]
+    few = [i for i, values in enumerate(seen) if 2 <= len(values) <= MOST]
+    # Controllers are run only where there may be levels, for that takes its time.
+    pairs = [sent_and_asked(*one) for one in flown] if few else []
     # A controller that is at its bounds all the time sends few values, too, as it should.
-    off = [apart(sent, asked, test) > LITTLE * LITTLE for test, sent, asked in flown]
-    found = [
-        _levels([(sent[:, i], asked[:, i]) for _, sent, asked in flown], command.bounds)
-        if np.any(off, axis=0)[i]
-        else ()
-        for i, command in enumerate(signals.commands if off else ())
-    ]
+    off = [apart(*pair, test) > LITTLE * LITTLE for (test, _), pair in zip(flown, pairs, strict=False)]
+    found: list[tuple[float, ...]] = [()] * signals.n_u
+    for i in few:
+        if np.any(off, axis=0)[i]:
+            asked = np.concatenate([gave[:, i] for _, gave in pairs])
+            found[i] = _levels(seen[i], sent[:, i], asked, signals.commands[i].bounds)
     return tuple(found) if any(found) else ()
 
 
-def _levels(pairs: Sequence[tuple[Floats, Floats]], bounds: Bounds) -> tuple[float, ...]:
+def _levels(seen: Floats, sent: Floats, asked: Floats, bounds: Bounds) -> tuple[float, ...]:
     """The levels of one command, none if it has none.
 
     Args:
-        pairs: what was sent (n,) and what was asked for (n,) in each flight.
+        seen: values that were sent, rising.
+        sent: in each period of all flights (n,).
+        asked: by the controller in the same periods (n,).
         bounds: of the command, levels themselves as long as nothing speaks against it: flights may not have shown them.
     """
-    sent, asked = (np.concatenate(each) for each in zip(*pairs, strict=True))
-    seen = np.unique(sent)
-    if not 2 <= len(seen) <= MOST:
-        return ()
     candidates = [np.union1d(seen, bounds), seen]
     alike = [float(np.mean(nearest(values, asked) == sent)) for values in candidates]
     best = int(np.argmax(alike))

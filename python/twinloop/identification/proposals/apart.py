@@ -10,7 +10,7 @@ from twinloop.identification.evidence import strongest
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import climbed, from_both_sides
-from twinloop.law.actuation import Actuator
+from twinloop.law.actuation import Actuator, one_by_one
 
 
 def apart(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -28,8 +28,7 @@ def apart(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         if len(group) > 1 and hypothesis.actuation.actuators[group[0]].lag > 0.0
     ]
     for group in lagging:
-        alike = tuple(other for other in hypothesis.alike if other != group) + tuple((i,) for i in group)
-        split = replace(hypothesis, alike=tuple(sorted(alike)), fit=None)
+        split = replace(hypothesis, alike=one_by_one(hypothesis.alike, group), fit=None)
         found = [fitted(context, each) for each in (split, *_undelayed(context, split, group))]
         own = strongest(found)
         if own.evidence.beats(hypothesis.evidence):

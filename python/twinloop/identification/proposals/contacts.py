@@ -9,7 +9,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import from_below, from_both_sides, posed
-from twinloop.identification.sensors.noise import calm
+from twinloop.identification.sensors.noise import still
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, entered, hinges
 from twinloop.law.actuation import Actuation
@@ -24,9 +24,9 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if not (options.contacts and options.libraries) or hypothesis.fit is None:
         return
     problem = posed(context, hypothesis)
-    still = all(calm(problem, found.chain) is found.chain for found in hypothesis.sums)
+    quiet = still(problem, (found.chain for found in hypothesis.sums))
     # A hinge would evade the bounds of what it is made of.
-    if problem.priors.bounds or (still and hypothesis.fit.stable):
+    if problem.priors.bounds or (quiet and hypothesis.fit.stable):
         return
     context.watch("terms")
     every = hinges(context.signals, problem.stages.start)

@@ -23,7 +23,7 @@ from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import Sum, priced, prices
-from twinloop.identification.sensors.noise import RIDGE, calm
+from twinloop.identification.sensors.noise import RIDGE, calm, still
 from twinloop.identification.terms.friction import entered, frictions, frictions_in
 
 WORTH = 20.0
@@ -45,7 +45,7 @@ def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     # Friction would evade the bounds of the speed that it is made of.
     if problem.priors.bounds or hypothesis.form == "absolute":
         return
-    bases = [] if _still(problem, hypothesis) else [hypothesis]
+    bases = [] if still(problem, (found.chain for found in hypothesis.sums)) else [hypothesis]
     terms = [term for found in hypothesis.sums for term in found.weights]
     # Terms of higher rungs and evolved ones may stand in for friction: it is looked for beside few terms, too.
     beside_few = bool(hypothesis.from_above) and hypothesis.pool.rung(terms) > 0
@@ -94,11 +94,6 @@ def _reselected(context: Context, hypothesis: Hypothesis) -> Hypothesis:
         return hypothesis
     other = by_innovations(context, other)
     return other if shorter(other.evidence.length, hypothesis.evidence.length) else hypothesis
-
-
-def _still(problem: Problem, hypothesis: Hypothesis) -> bool:
-    """Whether hardly anything disturbs what terms leave."""
-    return all(calm(problem, found.chain) is found.chain for found in hypothesis.sums)
 
 
 def _with_one_more(context: Context, hypothesis: Hypothesis) -> Hypothesis:

@@ -15,8 +15,8 @@ from twinloop.identification.evidence import strongest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import search
-from twinloop.identification.sensors.noise import calm
-from twinloop.law.actuation import Actuation, Actuator
+from twinloop.identification.sensors.noise import still
+from twinloop.law.actuation import Actuation, Actuator, one_by_one
 from twinloop.signals import Signals
 
 LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
@@ -63,12 +63,10 @@ def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothes
     Two that differ, such as gates at either end of a canal, hide what they share: it suits neither.
     """
     for group in best.alike:
-        problem = posed(context, best)
-        still = all(calm(problem, found.chain) is found.chain for found in best.sums)
-        if still or not context.options.apart or not 1 < len(group) <= FEW:
+        several = context.options.apart and 1 < len(group) <= FEW
+        if not several or still(posed(context, best), (found.chain for found in best.sums)):
             continue
-        alike = tuple(other for other in best.alike if other != group) + tuple((i,) for i in group)
-        split = replace(best, alike=tuple(sorted(alike)))
+        split = replace(best, alike=one_by_one(best.alike, group))
         trial = _trials(context, split, number)
         own = trial(best.actuation)
         for i in group:

@@ -24,7 +24,7 @@ from twinloop.identification.proposals.hidden import filled, with_hidden, withou
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.selection import from_both_sides, posed
 from twinloop.identification.search.structure import search
-from twinloop.identification.sensors.noise import calm
+from twinloop.identification.sensors.noise import still
 from twinloop.law.actuation import Actuation, HiddenState, alike_commands
 from twinloop.law.forms import DERIVATIVES
 
@@ -58,9 +58,9 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     if not context.may_store or hypothesis.fit is None or hypothesis.form not in DERIVATIVES:
         return
     problem = posed(context, hypothesis)
-    still = all(calm(problem, found.chain) is found.chain for found in hypothesis.sums)
+    quiet = still(problem, (found.chain for found in hypothesis.sums))
     # A storage would evade the bounds of what fills it.
-    if problem.priors.bounds or (still and hypothesis.fit.stable) or hypothesis.actuation.stored:
+    if problem.priors.bounds or (quiet and hypothesis.fit.stable) or hypothesis.actuation.stored:
         return
     context.watch("hidden")
     # Behind a short memory of noisy readings their noise would explain itself.

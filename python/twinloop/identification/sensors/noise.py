@@ -5,7 +5,7 @@ From below, it is what a fit of all terms leaves; from above, everything that mo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -164,6 +164,11 @@ def calm(problem: Problem, chain: Chain) -> Chain:
     period = problem.dt if chain.integrated else 1.0
     moved = chain.motion.white * period + chain.motion.correlated * period * period
     return chain if moved <= CALM * float(chain.sensors[0]) else chain.with_noise(chain.sensors, slow)
+
+
+def still(problem: Problem, chains: Iterable[Chain]) -> bool:
+    """Whether hardly anything disturbs some chains: terms leave their sensors' noise alone."""
+    return all(calm(problem, chain) is chain for chain in chains)
 
 
 def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:
