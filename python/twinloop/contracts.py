@@ -57,7 +57,8 @@ def check_system(
     start = _first(initial_state, getattr(system, "initial_state", None), np.zeros(signals.n_x))
     target = _first(target_state, getattr(system, "target_state", None), np.zeros(signals.n_x))
     test = Test(family, family.genes(chosen), start, target, steps)
-    trajectory = check_recorded(system.run(test), Limits(signals), steps)
+    trajectory = system.run(test)
+    check_recorded(trajectory, Limits(signals), steps)
     if trajectory.ended == "completed":
         _promise(trajectory.steps == steps, f"a completed run of {steps} steps, found {trajectory.steps}")
     else:

@@ -257,8 +257,8 @@ class Signals(Recorded, kind="signals"):
         return tuple(i for i, name in enumerate(self.state_names) if name not in given)
 
     @cached_property
-    def _periods(self) -> list[tuple[int, float]]:
-        """Places and periods of the states that have one."""
+    def periods(self) -> list[tuple[int, float]]:
+        """Places and periods of the states that wrap."""
         return [(i, state.period) for i, state in enumerate(self.states) if state.period is not None]
 
     def difference(self, a: ArrayLike, b: ArrayLike) -> Floats:
@@ -272,7 +272,7 @@ class Signals(Recorded, kind="signals"):
             Differences (…, n_x), in their units.
         """
         difference = np.asarray(np.subtract(a, b), dtype=np.float64)
-        for i, period in self._periods:
+        for i, period in self.periods:
             difference[..., i] -= np.rint(difference[..., i] / period) * period
         return difference
 
@@ -286,7 +286,7 @@ class Signals(Recorded, kind="signals"):
             A copy.
         """
         wrapped = np.array(states, dtype=np.float64)
-        for i, period in self._periods:
+        for i, period in self.periods:
             wrapped[..., i] -= np.rint(wrapped[..., i] / period) * period
         return wrapped
 
@@ -300,10 +300,10 @@ class Signals(Recorded, kind="signals"):
         Returns:
             The rows, periodic states shifted by whole periods.
         """
-        if not self._periods:
+        if not self.periods:
             return states
         continued = states.copy()
-        for i, period in self._periods:
+        for i, period in self.periods:
             last = float(start[i])
             for k, reading in enumerate(states[:, i].tolist()):
                 last = reading - float(np.rint((reading - last) / period)) * period

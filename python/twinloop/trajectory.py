@@ -76,7 +76,7 @@ class Trajectory(Shown, Recorded, kind="trajectory"):
         return len(self.commands)
 
 
-def check_recorded(trajectory: object, limits: Limits, steps: int | None, least: int = 2) -> Trajectory:
+def check_recorded(trajectory: object, limits: Limits, steps: int | None, least: int = 2) -> None:
     """Refuses what cannot be learnt from.
 
     Args:
@@ -84,9 +84,6 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
         limits: of a run, with the signals that it should consist of.
         steps: number of steps of the test; None for an attached run.
         least: steps that it must have.
-
-    Returns:
-        The trajectory, unchanged.
 
     Raises:
         InvalidInput: no trajectory, another width or period, too short, too long, far out of scale, or with commands
@@ -128,7 +125,6 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
             " it, or declare a larger scale."
         )
     _check_commands(trajectory, signals)
-    return trajectory
 
 
 def check_period(trajectory: Trajectory, signals: Signals) -> None:
@@ -174,8 +170,11 @@ def continued(trajectory: Trajectory, signals: Signals, start: Floats) -> Trajec
     Returns:
         The run; itself where no state is periodic.
     """
-    states = signals.continued(trajectory.states, start)
-    return trajectory if states is trajectory.states else replace(trajectory, states=states)
+    return (
+        replace(trajectory, states=signals.continued(trajectory.states, start))
+        if signals.periods
+        else trajectory
+    )
 
 
 def _check_commands(trajectory: Trajectory, signals: Signals) -> None:

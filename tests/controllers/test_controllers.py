@@ -174,3 +174,17 @@ def test_a_reading_that_is_not_finite_is_refused_and_changes_nothing(quadrotor_f
     with pytest.raises(tl.InvalidInput, match="expected finite numbers"):
         spoilt.command([0.0, np.nan, 0.0, 0.0, 0.0, 0.0], target)
     assert same_bits(spoilt.command(np.zeros(6), target), clean.command(np.zeros(6), target))
+
+
+def test_commands_of_a_whole_run_are_those_that_a_loop_gets(pendulum_signals, pendulum_controller):
+    family = pendulum_controller.bind(pendulum_signals)
+    draw = np.random.default_rng(4)
+    states, targets = draw.normal(size=(2, 30, 2))
+    excitation = 0.1 * draw.normal(size=(20, 1))
+    one, other = (family.controller([2.0, 2.0, 0.3], excitation) for _ in range(2))
+    other.command(states[3], targets[3])  # what was before is forgotten
+    expected = np.array([one.command(*row) for row in zip(states, targets, strict=True)])
+    assert other.commands(states, targets).tobytes() == expected.tobytes()
+    for wrong in (states[:, :1], states[:-1], np.where(states > 1.0, np.nan, states)):
+        with pytest.raises(tl.InvalidInput, match=r"Controller\.commands"):
+            one.commands(wrong, targets)

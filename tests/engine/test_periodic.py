@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -156,6 +156,7 @@ def test_errors_of_models_do_not_see_how_a_record_was_wrapped(seed):
     family = family_of(SIGNALS)
     rate = np.cumsum(draw.integers(-200, 200, 25)) / 64
     truth = np.column_stack([np.concatenate([[0.0], np.cumsum(rate[:-1] / 16)]), rate])
+    assume((truth[:, 0] % PERIOD != PERIOD / 2.0).all())  # which may be read as either
     shifted = truth + np.column_stack([PERIOD * draw.integers(-3, 4, 25), np.zeros(25)])
     commands = draw.uniform(-2.0, 2.0, (24, 1))
     test = tl.Test(family, np.array([2.0, 1.0, 0.2]), truth[0], np.array([1.0, 0.0]), 24)
@@ -164,7 +165,8 @@ def test_errors_of_models_do_not_see_how_a_record_was_wrapped(seed):
         record = tl.Trajectory(0.05 * np.arange(25), states, commands)
         selected = selected_tests([test], [record])
         errors = [of(pendulums(SIGNALS), selected, WORKERS) for of in (open_loop, closed_loop)]
-        whole = continued(check_recorded(record, Limits(SIGNALS), 24), SIGNALS, test.initial_state)
+        check_recorded(record, Limits(SIGNALS), 24)
+        whole = continued(record, SIGNALS, test.initial_state)
         assert same_bits(whole.states, truth)
         found.append([*errors, frozen_error(whole, SIGNALS), final_distance(states[-1], [1.0, 0.0], SIGNALS)])
     for one, other in zip(*found, strict=True):
@@ -176,7 +178,7 @@ def test_an_angle_may_turn_as_often_as_it_likes():
     test = tl.Test(family_of(SIGNALS), np.zeros(3), np.array([0.0, 11.0]), np.array([1.0, 0.0]), 200)
     run = tl.Twin(spinning, SIGNALS).simulate(test)
     assert run.ended == "completed" and run.states[-1, 0] == pytest.approx(110.0)
-    assert check_recorded(run, Limits(SIGNALS), 200) is run
+    check_recorded(run, Limits(SIGNALS), 200)
     cut = tl.Twin(model(rig(periodic=False), "r3 = r3 * 0.0"), rig(periodic=False)).simulate(
         tl.Test(family_of(rig(periodic=False)), np.zeros(3), [0.0, 11.0], [1.0, 0.0], 200)
     )

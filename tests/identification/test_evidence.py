@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, STORING, Evidence, price, strongest
+from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, STORING, Evidence, by_evidence, price
 from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -22,10 +22,10 @@ STATES = 3
 
 @given(EVIDENCE, EVIDENCE, EVIDENCE)
 def test_to_beat_is_a_strict_order(one, two, three):
-    assert not one.beats(one)
-    assert not (one.beats(two) and two.beats(one))
-    if one.beats(two) and two.beats(three):
-        assert one.beats(three)
+    assert not one > one
+    assert not (one > two and two > one)
+    if one > two and two > three:
+        assert one > three
 
 
 class Named:
@@ -36,11 +36,11 @@ class Named:
 @given(st.lists(EVIDENCE, min_size=1, max_size=6))
 def test_nobody_beats_the_strongest_and_it_is_the_first_of_its_kind(several):
     named = [Named(i, evidence) for i, evidence in enumerate(several)]
-    best = strongest(named)
-    assert not any(other.evidence.beats(best.evidence) for other in named)
-    assert best.name == 0 or best.evidence.beats(named[0].evidence)
+    best = max(named, key=by_evidence)
+    assert not any(other.evidence > best.evidence for other in named)
+    assert best.name == 0 or best.evidence > named[0].evidence
     # What does not beat it may as well not have been proposed, wherever it stood behind.
-    assert strongest([best, *(other for other in named if other is not best)]) is best
+    assert max([best, *(other for other in named if other is not best)], key=by_evidence) is best
 
 
 def evidence(length=0.0, **changes):
@@ -50,15 +50,15 @@ def evidence(length=0.0, **changes):
 
 def test_what_runs_away_beats_nothing_that_was_fitted_and_what_lasts_beats_it():
     away = evidence(-1e9, stable=False)
-    assert evidence(1e9).beats(away) and not away.beats(evidence(1e9))
-    assert not away.beats(evidence(0.0, stable=False)) and not evidence(0.0, stable=False).beats(away)
-    assert not evidence(-1e9, stable=False, smoothed=True).beats(away)
+    assert evidence(1e9) > away and not away > evidence(1e9)
+    assert not away > evidence(0.0, stable=False) and not evidence(0.0, stable=False) > away
+    assert not evidence(-1e9, stable=False, smoothed=True) > away
 
 
 def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
-    assert evidence(5.0, smoothed=True).beats(evidence(0.0))
-    assert evidence(-1.0, smoothed=True).beats(evidence(0.0, smoothed=True))
-    assert not evidence(1.0, smoothed=True).beats(evidence(0.0, smoothed=True))
+    assert evidence(5.0, smoothed=True) > evidence(0.0)
+    assert evidence(-1.0, smoothed=True) > evidence(0.0, smoothed=True)
+    assert not evidence(1.0, smoothed=True) > evidence(0.0, smoothed=True)
 
 
 @pytest.mark.parametrize(
@@ -88,4 +88,4 @@ def test_each_group_of_commands_that_lags_pays_and_commands_of_one_group_pay_onc
 def test_rounding_alone_decides_nothing():
     lengths = -1e5 + TIE * np.linspace(-0.4, 0.4, 5)
     named = [Named(i, evidence(length)) for i, length in enumerate(lengths)]
-    assert strongest(named).name == 0
+    assert max(named, key=by_evidence).name == 0

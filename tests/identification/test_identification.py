@@ -23,7 +23,7 @@ from twinloop.identification.proposals.parts import cut
 from twinloop.identification.records import HELD, Run, guessed_noise
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import prices
-from twinloop.identification.search.subsets import all_judged
+from twinloop.identification.search.subsets import Judge
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
 from twinloop.identification.starts import ANEW, begun
@@ -387,9 +387,9 @@ def test_terms_that_exact_runs_cannot_tell_apart_are_left_out():
     gram = _core.Regression(1, 1.0, "increment", [record]).gram([1e-6], (1e-9, 0.0, 1.0))
     both, prices_ = [(0, 1, 3), (1, 4)], np.ones(6)
     assert all(gram.solve(list(subset)) is None for subset in both)
-    found = all_judged(gram, both, prices_, {})
+    found = Judge(gram, prices_, {})(both)
     assert {judged.features for judged in found} == {(0, 1), (1,)}
-    assert all_judged(gram, [*both, (2,)], prices_, {})[0].features == (2,)
+    assert Judge(gram, prices_, {})([*both, (2,)])[0].features == (2,)
 
 
 def test_where_nothing_drives_a_state_but_noise_no_term_does():

@@ -16,7 +16,7 @@ from oracles import EXACT, evaluate, registers_of, same_bits
 from strategies import exact_programs, program_text, programs, rows
 from twinloop import _core
 from twinloop.identification.terms.pool import Pool
-from twinloop.law.equations import equations
+from twinloop.law.equations import Equations
 from twinloop.law.forms import FORMS
 from twinloop.law.law import Law
 
@@ -26,6 +26,10 @@ SIGNALS = tl.Signals(
     dt=0.1,
 )
 NAMES = ["x", "v", "u_scaled", "t1"]
+
+
+def equations(*law, **as_said):
+    return str(Equations(*law, **as_said))
 
 
 def law_of(program, form="absolute", **actuation):

@@ -36,7 +36,7 @@ def test_what_is_multiplied_out_computes_the_same(data):
         assume(not (divided and (np.abs(before[second]) < 1e-2).any()))
     source, target = Expressions(), Expressions()
     expansion = Expansion(source, target)
-    roots = [written(target, expansion.polynomial(node)) for node in source.entered(program)]
+    roots = [written(target, expansion[node]) for node in source.entered(program)]
     found = target.program(roots, 3).run(inputs)
     np.testing.assert_allclose(found, run_program(program, inputs), rtol=1e-9, atol=1e-9)
 
@@ -69,7 +69,7 @@ def test_long_products_stay_products():
     for place in range(1, 8):
         total = store.add("+", total, store.input(place))
     cube = store.add("*", store.add("*", total, total), total)
-    found = Expansion(store, target).polynomial(cube)
+    found = Expansion(store, target)[cube]
     assert len(found) <= MOST_TERMS
     inputs = np.random.default_rng(1).normal(size=(5, 8))
     values = target.program([written(target, found)], 8).run(inputs)[:, 0]
@@ -81,7 +81,7 @@ def test_what_overflows_when_it_is_multiplied_out_stays_as_it_is():
     small = store.add("*", store.input(0), store.constant(1e-200))
     large = store.add("*", store.add("*", small, store.constant(1e200)), store.constant(1e200))
     square = store.add("*", large, large)
-    node = written(target, Expansion(store, target).polynomial(square))
+    node = written(target, Expansion(store, target)[square])
     assert target.program([node], 1).run([[1e-150]])[0, 0] == np.float64(1e-150 * 1e200) ** 2
 
 

@@ -438,7 +438,7 @@ class Campaign(Shown, Persistent, kind="campaign"):
         known, twin = self._shown_twin or (None, None)
         now = self._method.memory.latest, self._book.revision
         if twin is None or known is None or known[0] is not now[0] or known[1] != now[1]:
-            twin = self._method.twin(self._book)
+            twin = self._method.knowledge(self._book).twin(self._workers)
             self._shown_twin = (
                 now,
                 twin,
@@ -483,10 +483,10 @@ class Campaign(Shown, Persistent, kind="campaign"):
             NotAvailable: there is no run.
         """
         self._learn()
-        known, book = self._method, self._book
-        twins = known.twins_before(book)
-        errors = closed_loop([before.twin.model for before in twins], book.selected, self._workers)
-        return Examination(self, Earlier(twins, errors, known.innovations(book), known.rivals(book)))
+        known = self._method.knowledge(self._book)
+        twins = known.twins_before()
+        errors = closed_loop([before.twin.model for before in twins], self._book.selected, self._workers)
+        return Examination(self, Earlier(twins, errors, known.innovations(self._workers), known.rivals()))
 
     def checks(self) -> Checks:
         """Whether the twin can be trusted and the controller flown, check by check; printable.

@@ -24,7 +24,7 @@ Judge = Callable[[_core.SelectedTests], float | None]
 """The error, on the one test of a set, of what is known so far; None where nothing is."""
 
 
-def flown_test(setup: Setup, test: Test, trajectory: object, judge: Judge, least: int = 2) -> Experiment:
+def flown_test(setup: Setup, test: Test, trajectory: Trajectory, judge: Judge, least: int = 2) -> Experiment:
     """The experiment of a test that was flown.
 
     Args:
@@ -37,8 +37,8 @@ def flown_test(setup: Setup, test: Test, trajectory: object, judge: Judge, least
     Raises:
         InvalidInput: a trajectory that cannot be learnt from.
     """
-    recorded = check_recorded(trajectory, setup.limits, test.steps, least)
-    recorded = continued(recorded, setup.signals, test.initial_state)
+    check_recorded(trajectory, setup.limits, test.steps, least)
+    recorded = continued(trajectory, setup.signals, test.initial_state)
     check_first_reading(recorded, test)
     distance = quality = None
     if recorded.ended == "completed" and recorded.steps == test.steps:
@@ -49,7 +49,7 @@ def flown_test(setup: Setup, test: Test, trajectory: object, judge: Judge, least
     return Experiment(test, recorded, before, frozen_error(recorded, setup.signals), distance, quality)
 
 
-def attached_run(setup: Setup, trajectory: object, judge: Judge) -> Experiment:
+def attached_run(setup: Setup, trajectory: Trajectory, judge: Judge) -> Experiment:
     """The experiment of an attached run.
 
     Args:
@@ -60,8 +60,8 @@ def attached_run(setup: Setup, trajectory: object, judge: Judge) -> Experiment:
     Raises:
         InvalidInput: a trajectory that cannot be learnt from.
     """
-    recorded = check_recorded(trajectory, setup.limits, None)
-    recorded = continued(recorded, setup.signals, recorded.states[0])
+    check_recorded(trajectory, setup.limits, None)
+    recorded = continued(trajectory, setup.signals, trajectory.states[0])
     replayed = Replay(setup.signals, recorded.states[0], recorded.commands)
     before = judge(with_run(setup.none_selected(), replayed, recorded))
     frozen = frozen_error(recorded, setup.signals)

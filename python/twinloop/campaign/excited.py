@@ -13,7 +13,6 @@ from enum import Enum
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.history import Experiment
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -65,18 +64,6 @@ def as_excited(test: Test, how: Excited) -> Test:
     return replace(test, hold_back=None) if how is Excited.WHOLE else test
 
 
-def as_it_was_flown(run: Experiment) -> Experiment:
-    """A run whose test is excited as the recorded commands show; nothing was predicted of it if that was not asked for.
-
-    Args:
-        run: as it was recorded.
-    """
-    if run.test is None or (how := excited(run.test, run.trajectory)) is Excited.HELD_BACK:
-        return run
-    flown = as_excited(run.test, how)
-    return replace(run, replayed=replace(flown, predicted=None, spread=None, risk=None))
-
-
 def given(test: Test, states: Floats) -> Floats:
     """What a test's controller gives on some readings, with its excitation held back as it says (n, n_u).
 
@@ -84,9 +71,8 @@ def given(test: Test, states: Floats) -> Floats:
         test: that was flown.
         states: that were read (n + 1, n_x).
     """
-    controller = test.controller()
-    controller.reset()
-    return np.array([controller.command(state, test.target(k)) for k, state in enumerate(states[:-1])])
+    targets = np.array([test.target(k) for k in range(len(states) - 1)])
+    return test.controller().commands(states[:-1], targets)
 
 
 def apart(sent: Floats, asked: Floats, test: Test) -> Floats:

@@ -17,6 +17,38 @@ from twinloop.records import Record
 from twinloop.test import Test
 
 
+class Knowledge(Protocol):
+    """What was learnt, as a twin and as the numbers that an engineer looks at."""
+
+    def twin(self, workers: _core.Workers | None = None) -> Twin:
+        """The best model.
+
+        Args:
+            workers: that work out its errors on all runs; None: they are of no interest.
+        """
+        ...
+
+    def twins_before(self) -> tuple[TwinBefore, ...]:
+        """Earlier twins, the oldest first."""
+        ...
+
+    def innovations(self, workers: _core.Workers) -> tuple[Floats, ...] | None:
+        """Innovations of each experiment that was learnt: readings less their predictions one period before.
+
+        Args:
+            workers: how the work is carried out.
+
+        Returns:
+            Over the standard deviation that is expected of them (n + 1, n_x); None where the method knows no noise, or
+            the model diverges.
+        """
+        ...
+
+    def rivals(self) -> tuple[Rival, ...]:
+        """Sums of terms that were considered for the twin, the chosen ones among them."""
+        ...
+
+
 class Method(Protocol):
     """One way through the double loop."""
 
@@ -105,30 +137,13 @@ class Method(Protocol):
         """
         ...
 
-    def twin(self, book: Logbook) -> Twin:
-        """The best model with its errors; all runs are learnt."""
+    def knowledge(self, book: Logbook) -> Knowledge:
+        """What was learnt, for a person to look at; all runs are learnt."""
         ...
 
     @property
     def asked_model(self) -> _core.Model | None:
         """The best model when the last test was asked for; None before."""
-        ...
-
-    def twins_before(self, book: Logbook) -> tuple[TwinBefore, ...]:
-        """Earlier twins, the oldest first."""
-        ...
-
-    def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
-        """Innovations of each experiment that was learnt: readings less their predictions one period before.
-
-        Returns:
-            Over the standard deviation that is expected of them (n + 1, n_x); None where the method knows no noise, or
-            the model diverges.
-        """
-        ...
-
-    def rivals(self, book: Logbook) -> tuple[Rival, ...]:
-        """Sums of terms that were considered for the twin, the chosen ones among them."""
         ...
 
     def history(self, book: Logbook) -> tuple[Iteration, ...] | tuple[Lesson, ...]:

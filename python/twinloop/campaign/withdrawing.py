@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from twinloop.campaign.excited import as_it_was_flown
+from twinloop.campaign.excited import as_excited, excited
 from twinloop.campaign.history import Experiment, Failure, Withdrawal
 from twinloop.errors import InvalidInput
 from twinloop.test import Test
@@ -58,10 +58,12 @@ def as_it_counts(run: Experiment, place: int, withdrawals: Sequence[Withdrawal])
         place: among all that were.
         withdrawals: of the campaign.
     """
-    run = as_it_was_flown(run)
     test = run.test
-    if test is not None and any(test.number in each.planned for each in withdrawals):
-        run = replace(run, replayed=replace(test, predicted=None, spread=None, risk=None))
+    if test is not None:
+        flown = as_excited(test, excited(test, run.trajectory))
+        # Of what was not asked for nothing was predicted.
+        if flown is not test or any(test.number in each.planned for each in withdrawals):
+            run = replace(run, replayed=replace(flown, predicted=None, spread=None, risk=None))
     if any(
         each.planned and each.run is not None and each.run < place < each.recorded for each in withdrawals
     ):

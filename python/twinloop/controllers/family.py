@@ -261,6 +261,29 @@ class Controller:
         with engine_input():
             return self._law.command(reading, goal)
 
+    def commands(self, states: Floats, targets: Floats) -> Floats:
+        """The commands of a whole run, from rest.
+
+        Args:
+            states: measured states (n, n_x), SI units, radians.
+            targets: target states (n, n_x), the same units.
+
+        Returns:
+            Commands (n, n_u), as `command` gives them one after another.
+
+        Raises:
+            InvalidInput: other shapes, or numbers that are not finite.
+        """
+        finite = np.isfinite(states).all() and np.isfinite(targets).all()
+        if states.shape != targets.shape or states.shape[1:] != (self.family.signals.n_x,) or not finite:
+            raise InvalidInput(
+                f"Controller.commands: expected as many finite states as targets of {self.family.signals.n_x} numbers"
+                f" each, found the shapes {states.shape} and {targets.shape}; record each period."
+            )
+        self.reset()
+        with engine_input():
+            return np.array([self._law.command(*row) for row in zip(states, targets, strict=True)])
+
     def __repr__(self) -> str:
         gains = ", ".join(f"{name}={value:.6g}" for name, value in self.parameters.items())
         return f"Controller({gains})"

@@ -94,7 +94,8 @@ def identify(
 def _flight(file: Path, signals: Signals, config: Path) -> Trajectory:
     flight = load(file, signals, columns=read_fields(config))
     try:
-        return check_recorded(flight, Limits(signals), None)
+        check_recorded(flight, Limits(signals), None)
+        return flight
     except InvalidInput as reason:
         raise InvalidInput(
             f"Log {file}: {reason} To look into it: twinloop check {file} {config}"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from operator import attrgetter
 
 from twinloop._ground.elementary import log
 from twinloop.identification.search.description import shorter
@@ -48,32 +48,15 @@ class Evidence:
         """How far it was worked out; a model that diverges is worth nothing."""
         return self.fitted, self.stable, self.stable and self.smoothed
 
-    def beats(self, other: Evidence) -> bool:
+    def __gt__(self, other: Evidence) -> bool:
         """Whether this hypothesis is believed rather than the other; of two whose models diverge neither is."""
         if self.stage != other.stage:
             return self.stage > other.stage
         return self.stable and shorter(self.length, other.length)
 
 
-class Judged(Protocol):
-    """Anything with evidence."""
-
-    @property
-    def evidence(self) -> Evidence:
-        """What the readings say for it."""
-
-
-Hypotheses = TypeVar("Hypotheses", bound=Judged)
-
-
-def strongest(hypotheses: Iterable[Hypotheses]) -> Hypotheses:
-    """The first of some hypotheses, at least one, that none of those after it beats."""
-    several = iter(hypotheses)
-    best = next(several)
-    for hypothesis in several:
-        if hypothesis.evidence.beats(best.evidence):
-            best = hypothesis
-    return best
+by_evidence = attrgetter("evidence")
+"""Of several hypotheses `max(several, key=by_evidence)` is the first that none of those after it beats."""
 
 
 def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], states: int) -> float:

@@ -21,7 +21,8 @@ from twinloop.identification.identified import Identified
 from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import Run
 from twinloop.identification.search.description import shorter, shortest
-from twinloop.identification.search.selection import climbed, from_both_sides, posed, undisturbed
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
 from twinloop.identification.sensors.euler_steps import euler_form
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import FORMS, begun, with_offsets
@@ -166,7 +167,7 @@ def _read_at_the_end(context: Context, look: Hypothesis) -> float:
     """
     if look.form != "acceleration":
         return 0.0
-    problem, total = posed(context, look), 0.0
+    problem, total = Problem(context, look), 0.0
     for found in look.sums:
         fixed = dict.fromkeys(problem.priors.fixed.get(found.chain.states[0], ()), 1.0)
         weights = fixed | found.weights

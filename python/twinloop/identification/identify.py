@@ -16,8 +16,8 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
-from twinloop.identification.fit.committee import committee
+from twinloop.identification.evidence import by_evidence
+from twinloop.identification.fit.committee import Committee
 from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
@@ -161,7 +161,7 @@ def goes_on(searches: Sequence[Found], number: int) -> bool:
     """
     own = searches[number].best
     known = own.fit is not None and not own.actuation.hidden
-    return not (known and any(other.best.evidence.beats(own.evidence) for other in searches[:number]))
+    return not (known and any(other.best.evidence > own.evidence for other in searches[:number]))
 
 
 def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
@@ -172,7 +172,7 @@ def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
         proposed: the hypotheses that it gives.
     """
     several = [found.best, *proposed]
-    best = strongest(several)
+    best = max(several, key=by_evidence)
     others = (other for other in several[1:] if other is not best and other.evidence.stable)
     # What is drawn from here on is nothing that one of those that are not believed has drawn.
     drawn = max(other.searches for other in several if other.start == best.start)
@@ -185,7 +185,7 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
     best, signals = found.best, context.signals
     fit, sums = best.fit, list(best.sums)
     assert fit is not None  # `terms` and the starts see to it
-    seated = committee(context, best, fit, found.rivals)
+    seated = Committee(context, best, fit, found.rivals)
     # What parts have entered stays known.
     of_rivals = (rival.pool for rival in found.rivals if rival.of_part)
     pool = max((best.pool, *(pool for pool in of_rivals if pool.extends(best.pool))), key=len)

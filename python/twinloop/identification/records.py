@@ -51,9 +51,10 @@ class Run(Recorded, kind="run"):
 
     def continued(self, signals: Signals) -> Run:
         """The run with periodic states that go on from reading to reading by the short way."""
+        if not signals.periods:
+            return self
         states = signals.continued(self.states, self.states[0])
-        shifted = states - self.states
-        return self if states is self.states else replace(self, states=states, smooth=self.smooth + shifted)
+        return replace(self, states=states, smooth=self.smooth + (states - self.states))
 
     def part(self, first: int, last: int) -> Run:
         """The run from one period to another."""

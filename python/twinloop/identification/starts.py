@@ -42,10 +42,13 @@ def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:
     aligned = cache(lambda: with_offsets(context, begun(context, form, context.first_pool(), ANEW)))
     known = context.earlier
     if known is None:
-        return (lambda: anew(context, aligned()),)
+        return (lambda: from_both_sides(context, aligned()),)
     # A law that followed fewer runs may be lost in a search among more; what is hidden shows when terms are nearly
     # right, and these when it shows.
-    return lambda: anew(context, aligned()), lambda: renewed(context, known, aligned())
+    return (
+        lambda: from_both_sides(context, *without_what_is_hidden(context, known, aligned())),
+        lambda: renewed(context, known, aligned()),
+    )
 
 
 def begun(context: Context, form: str, pool: Pool, start: int) -> Hypothesis:
@@ -98,14 +101,13 @@ def with_offsets(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     return replace(hypothesis, offsets=offsets, runs=at_once, given=given)
 
 
-def anew(context: Context, aligned: Hypothesis) -> Hypothesis:
-    """Noise and terms searched anew, with lags as they were known to begin with."""
-    known = context.earlier
-    if known is None:
-        return from_both_sides(context, aligned)
+def without_what_is_hidden(
+    context: Context, known: Identified, aligned: Hypothesis
+) -> tuple[Hypothesis, list[Sum | None]]:
+    """What noise and terms are searched anew with: lags as they were known, and sums, those of hidden states not."""
     sums = [_left_of(found, aligned.pool) for found in known.sums]
     alike = alike_commands(context.signals, known.actuation)
-    return from_both_sides(context, replace(aligned, actuation=known.actuation.bare(), alike=alike), sums)
+    return replace(aligned, actuation=known.actuation.bare(), alike=alike), sums
 
 
 def renewed(context: Context, known: Identified, aligned: Hypothesis) -> Hypothesis:

@@ -11,7 +11,7 @@ import numpy as np
 
 from twinloop.errors import InvalidInput
 from twinloop.law.actuation import Actuator, in_periods, partners
-from twinloop.law.expansion import Expansion, Monomial, Polynomial, ordered, written
+from twinloop.law.expansion import Expansion, Monomial, Polynomial, written
 from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.flown import Span
 from twinloop.law.forms import DERIVATIVES
@@ -39,11 +39,11 @@ class _Piece:
     note: str = ""
 
 
-def equations(law: Law, members: Sequence[Law] = (), digits: int = 6, flown: Sequence[Span] = ()) -> str:
-    """A law as text that SymPy reads, too, with symbols for the names as its `locals`.
+class Equations:
+    """A law as text that SymPy reads, too, with symbols for the names as its `locals`: `str(Equations(law))`.
 
     Sums are multiplied out and like terms collected, unless every bit is asked for. A line that goes on begins with the
-    sign of its first term.
+    sign of its first term. Lines have at most 100 columns, where the names of the signals allow it.
 
     Args:
         law: to be written.
@@ -51,22 +51,15 @@ def equations(law: Law, members: Sequence[Law] = (), digits: int = 6, flown: Seq
         digits: significant digits of constants; 17 give every bit back, as the program computes it and without ±.
         flown: how far the flights went that it was learnt from.
 
-    Returns:
-        Lines of at most 100 columns, where the names of the signals allow it.
-
     Raises:
         InvalidInput: digits out of range.
     """
-    if not 1 <= digits <= EXACT:
-        raise InvalidInput(f"Equations, digits: expected 1 to 17, found {digits}; 17 are exact.")
-    page = _Page(law, members, digits, flown)
-    return "\n".join([*page.legend(), "", *page.body()])
 
-
-class _Page:
-    """One law on its way to text."""
-
-    def __init__(self, law: Law, members: Sequence[Law], digits: int, flown: Sequence[Span]) -> None:
+    def __init__(
+        self, law: Law, members: Sequence[Law] = (), digits: int = 6, flown: Sequence[Span] = ()
+    ) -> None:
+        if not 1 <= digits <= EXACT:
+            raise InvalidInput(f"Equations, digits: expected 1 to 17, found {digits}; 17 are exact.")
         self.law, self.signals, self.flown = law, law.signals, flown
         self.exact = digits == EXACT
         self.members = () if self.exact else tuple(members)
@@ -74,7 +67,7 @@ class _Page:
 
         def expanded(each: Law) -> list[Polynomial]:
             expansion = Expansion(each.expressions, self.expressions)
-            return [expansion.polynomial(output) for output in each.outputs]
+            return [expansion[output] for output in each.outputs]
 
         self.polynomials: list[Polynomial] = []
         if self.exact:
@@ -94,7 +87,7 @@ class _Page:
 
     # The legend
 
-    def legend(self) -> list[str]:
+    def _legend(self) -> list[str]:
         dt, signals = self.signals.dt, self.signals
         kinds = {
             "absolute": f"the state one period of {dt:g} s later",
@@ -181,11 +174,23 @@ class _Page:
 
     # The equations
 
-    def body(self) -> list[str]:
-        """Parts that have a name, then an equation for each state, then one for each hidden state."""
+    def __str__(self) -> str:
+        """The legend, parts that have a name, then an equation for each state, then one for each hidden state."""
+
+        def pieces_of(output: int) -> list[_Piece]:
+            """An output, in pieces that share a constant where a committee stands behind it."""
+            terms = [term for term, _ in self.writer.summands(self.outputs[output])]
+            if not self.members or not self.polynomials[output]:
+                return [_Piece(terms)]
+            found, alike = self.spreads[output], dict[tuple[str, str], list[Term]]()
+            for (monomial, coefficient), term in zip(self.polynomials[output].items(), terms, strict=True):
+                key = self.writer.number(abs(coefficient)), _note(found[monomial], self.writer.names)
+                alike.setdefault(key, []).append(term)
+            return [_Piece(terms, note) for (_, note), terms in alike.items()]
+
         law, names = self.law, self.signals.state_names
-        lines = _named(self.writer, self._note_inside)
-        pieces = [self._pieces(output) for output in range(len(self.outputs))]
+        lines = [*self._legend(), "", *_named(self.writer, self._note_inside)]
+        pieces = [pieces_of(output) for output in range(len(self.outputs))]
         if law.form in DERIVATIVES:
             driven, slopes = self.signals.driven, dict(enumerate(law.derivatives()))
             given = [node for place, node in slopes.items() if place not in driven]
@@ -205,19 +210,7 @@ class _Page:
                 lines += _equation(f"{name}{LATER}", own)
         for number, name in enumerate(law.hidden_symbols):
             lines += self._filling(name, number)
-        return lines
-
-    def _pieces(self, output: int) -> list[_Piece]:
-        """An output, in pieces that share a constant where a committee stands behind it."""
-        if not self.members or not self.polynomials[output]:
-            return [_Piece(self.writer.terms(self.outputs[output]))]
-        found = self.spreads[output]
-        pieces: dict[tuple[str, str], list[Term]] = {}
-        terms = self.writer.terms(self.outputs[output])
-        for (monomial, coefficient), term in zip(ordered(self.polynomials[output]), terms, strict=True):
-            key = self.writer.number(abs(coefficient)), _note(found[monomial], self.writer.names)
-            pieces.setdefault(key, []).append(term)
-        return [_Piece(terms, note) for (_, note), terms in pieces.items()]
+        return "\n".join(lines)
 
     def _note_inside(self, node: int) -> str:
         """± of the constants of a part of an equation."""
@@ -334,7 +327,7 @@ def readable(expressions: Expressions, number: int, symbols: Sequence[str], digi
     target = Expressions()
     for place in range(len(symbols)):
         target.input(place)
-    root = written(target, Expansion(expressions, target).polynomial(number))
+    root = written(target, Expansion(expressions, target)[number])
     endless = replace(TEXT, longest=sys.maxsize, worth=sys.maxsize)
     return Writer(target, [root], symbols, digits, "t", False, endless).text(root)
 

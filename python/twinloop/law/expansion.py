@@ -52,19 +52,20 @@ class Expansion:
         self.source, self.target = source, target
         self._known: dict[int, Polynomial] = {}
 
-    def polynomial(self, root: int) -> Polynomial:
+    def __getitem__(self, root: int) -> Polynomial:
         """An expression as a sum of monomials.
 
         Args:
             root: a node of the source.
 
         Returns:
-            Coefficients by monomial; the same value wherever it is finite, but for rounding.
+            Coefficients by monomial, in the order in which they are written; the same value wherever it is finite, but
+            for rounding.
         """
         for number in self.source.needed([root]):
             if number not in self._known:
                 self._known[number] = self._of(number)
-        return self._known[root]
+        return dict(sorted(self._known[root].items(), key=_place))
 
     def _of(self, number: int) -> Polynomial:
         operation, operands, value = self.source[number]
@@ -132,14 +133,9 @@ class Expansion:
         return _alone(self.target.enter(Node(operation, nodes)))
 
 
-def ordered(polynomial: Polynomial) -> list[tuple[Monomial, float]]:
-    """Terms in the order in which they are written: by their factors, high powers and long products first."""
-    return sorted(polynomial.items(), key=lambda term: _place(term[0]))
-
-
 def written(target: Expressions, polynomial: Polynomial) -> int:
     """The node of a polynomial as it is written, term after term from left to right."""
-    terms = ordered(polynomial)
+    terms = sorted(polynomial.items(), key=_place)
     if not terms:
         return target.constant(0.0)
     total: int | None = None
@@ -177,8 +173,9 @@ def _is_quotient(target: Expressions, number: int) -> bool:
     return operation == "/" and target.constant_value(operands[0]) == 1.0
 
 
-def _place(monomial: Monomial) -> list[tuple[float, float]]:
-    return [*((factor, -exponent) for factor, exponent in monomial), (math.inf, 0.0)]
+def _place(term: tuple[Monomial, float]) -> list[tuple[float, float]]:
+    """Where a term is written: by its factors, high powers and long products first."""
+    return [*((factor, -exponent) for factor, exponent in term[0]), (math.inf, 0.0)]
 
 
 def _alone(factor: int) -> Polynomial:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.law.expansion import Monomial, Polynomial, ordered
+from twinloop.law.expansion import Monomial, Polynomial
 from twinloop.law.expressions import CONSTANT, Expressions
 
 Shape = tuple[object, ...]
@@ -99,11 +99,15 @@ def spreads(
     Returns:
         A spread for each monomial.
     """
-    found = [_by_shape(expressions, member) for member in members]
+    own, *others = (
+        [_Term(expressions, monomial, coefficient) for monomial, coefficient in one.items()]
+        for one in (law, *members)
+    )
     result = {}
-    for shape, terms in _by_shape(expressions, law).items():
+    for shape in dict.fromkeys(term.shape for term in own):
+        terms, *found = ([term for term in one if term.shape == shape] for one in (own, *others))
         # Terms that differ by constants alone are told apart by their order, where there are as many.
-        alike = [member[shape] for member in found if len(member.get(shape, ())) == len(terms)]
+        alike = [member for member in found if len(member) == len(terms)]
         for place, term in enumerate(terms):
             values = np.array([member[place].values for member in alike])
             sds = _deviations(values) if len(alike) > 1 else [None] * (1 + len(term.paths))
@@ -118,41 +122,23 @@ def _deviations(values: Floats) -> list[float]:
     return found
 
 
-@dataclass(frozen=True)
 class _Term:
-    """A term with its coefficient and the constants inside its factors, and how to get to these."""
+    """A term with its coefficient and the constants inside its factors, how to get to these, and what else it is."""
 
-    monomial: Monomial
-    values: list[float]
-    paths: list[tuple[Visit, ...]]
-
-
-def _by_shape(expressions: Expressions, polynomial: Polynomial) -> dict[Shape, list[_Term]]:
-    """Terms with their constants, by what is left without these."""
-    found: dict[Shape, list[_Term]] = {}
-    for monomial, coefficient in ordered(polynomial):
-        walk = _Walk(expressions, coefficient)
-        shape = tuple((walk.shape(factor, ()), power) for factor, power in monomial)
-        found.setdefault(shape, []).append(_Term(monomial, walk.values, walk.paths))
-    return found
-
-
-class _Walk:
-    """From node to node, entering constants in their order."""
-
-    def __init__(self, expressions: Expressions, coefficient: float) -> None:
-        self.expressions = expressions
+    def __init__(self, expressions: Expressions, monomial: Monomial, coefficient: float) -> None:
+        self.monomial = monomial
         self.values = [coefficient]
         self.paths: list[tuple[Visit, ...]] = []
-        self.visits = 0
+        self._expressions, self._visits = expressions, 0
+        self.shape: Shape = tuple((self._shaped(factor, ()), power) for factor, power in monomial)
 
-    def shape(self, number: int, path: tuple[Visit, ...]) -> object:
-        """A node without its constants."""
-        operation, operands, value = self.expressions[number]
+    def _shaped(self, number: int, path: tuple[Visit, ...]) -> object:
+        """A node without its constants, which are entered in their order."""
+        operation, operands, value = self._expressions[number]
         if operation == CONSTANT:
             self.values.append(value)
             self.paths.append(path)
             return CONSTANT
-        self.visits += 1
-        here = (*path, Visit(number, self.visits))
-        return operation, value, tuple(self.shape(operand, here) for operand in operands)
+        self._visits += 1
+        here = (*path, Visit(number, self._visits))
+        return operation, value, tuple(self._shaped(operand, here) for operand in operands)

@@ -19,7 +19,7 @@ from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop._ground.showing import Shown
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
-from twinloop.law.equations import equations
+from twinloop.law.equations import Equations
 from twinloop.law.exports.environment import Reward, environment
 from twinloop.law.exports.gymnasium_source import Episode
 from twinloop.law.exports.taking import taken_twin
@@ -226,7 +226,7 @@ class Twin(Shown, Recorded, kind="twin"):
             InvalidInput: digits out of range.
         """
         law, *members = (Law.of(model, self.signals) for model in (self.model, *self.members))
-        return equations(law, members, digits, self.flown)
+        return str(Equations(law, members, digits, self.flown))
 
     def simulate(self, test: Test | Replay, initial_state: ArrayLike | None = None) -> Trajectory:
         """Flies a test on the twin instead of the system.
@@ -471,9 +471,9 @@ class Twin(Shown, Recorded, kind="twin"):
         Raises:
             InvalidInput: other columns, or no step.
         """
-        recorded = check_recorded(trajectory, self.limits, None, least=1)
+        check_recorded(trajectory, self.limits, None, least=1)
         noise = Noise.of_sensors(np.zeros(self.signals.n_x)) if self.noise is None else self.noise
-        return judged_length(self.model, recorded, noise, self.limits)
+        return judged_length(self.model, trajectory, noise, self.limits)
 
     def fit(self, trajectory: Trajectory) -> FitTable:
         """How well the twin's free run under the recorded commands, from the first reading, follows a record.
@@ -489,11 +489,11 @@ class Twin(Shown, Recorded, kind="twin"):
         Raises:
             InvalidInput: other columns, or no step.
         """
-        recorded = check_recorded(trajectory, self.limits, None, least=1)
-        whole = Replay(self.signals, self.began(recorded), recorded.commands)
-        sent = in_pieces(whole, self.model, recorded.states, self.piece_of(recorded))
+        check_recorded(trajectory, self.limits, None, least=1)
+        whole = Replay(self.signals, self.began(trajectory), trajectory.commands)
+        sent = in_pieces(whole, self.model, trajectory.states, self.piece_of(trajectory))
         free = fly(self.model, sent, limits=self.limits).states
-        read = continued(recorded, self.signals, recorded.states[0]).states[1:]
+        read = continued(trajectory, self.signals, trajectory.states[0]).states[1:]
         return fit_table(self.signals, read, free[1:] if len(free) > len(read) else None)
 
     def __repr__(self) -> str:

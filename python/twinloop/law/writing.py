@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from twinloop.law.expressions import CONSTANT, INPUT, POWER, SMALLEST_DIVISOR, UPRIGHT, Expressions
 
@@ -52,6 +53,27 @@ TEXT = Dialect({"sqrt": "sqrt(abs({}))", "min": "Min({}, {})", "max": "Max({}, {
 """What people, Python and SymPy read alike."""
 
 
+class Written(NamedTuple):
+    """A node as text.
+
+    Args:
+        text: without outer brackets.
+        binds: how tightly.
+    """
+
+    text: str
+    binds: int
+
+    def within(self, level: int, first: bool = False) -> str:
+        """In brackets where it binds less tightly than a level, or has a sign that something other stands before."""
+        return (
+            f"({self.text})"
+            if self.binds < level
+            or (not first and self.text.startswith("-") and (level > PRODUCT or self.binds < PRODUCT))
+            else self.text
+        )
+
+
 class Writer:
     """Writes nodes; parts that are used several times, or are long, are written by name.
 
@@ -75,9 +97,11 @@ class Writer:
         every: bool,
         dialect: Dialect = TEXT,
     ) -> None:
-        self.expressions, self.symbols, self.digits = expressions, symbols, digits
+        self.expressions, self.symbols = expressions, symbols
         self.dialect = dialect
-        self._texts: dict[int, tuple[str, int]] = {}
+        self.number: Callable[[float], str] = lambda value: dialect.number(value, digits)
+        """A constant as text."""
+        self._texts: dict[int, Written] = {}
         self.names: dict[int, str] = {}
         """Of parts, in the order in which they must be defined."""
         named = self._chosen(roots, every)
@@ -94,13 +118,9 @@ class Writer:
         divisors = (self.expressions[n.operands[1]] for n in nodes if n.operation == "/")
         return any(divisor.operation not in (CONSTANT, UPRIGHT) for divisor in divisors)
 
-    def number(self, value: float) -> str:
-        """A constant as text."""
-        return self.dialect.number(value, self.digits)
-
     def text(self, number: int) -> str:
         """A node as text, by its name if it has one, without outer brackets."""
-        return self.names.get(number) or self._texts[number][0]
+        return self.names.get(number) or self._texts[number].text
 
     def terms(self, number: int, define: bool = False) -> list[Term]:
         """What a node is the sum of, from left to right.
@@ -120,10 +140,10 @@ class Writer:
         while self._is_plain_sum(number) or (define and self._is_sum(number)):
             operation, operands, _ = self.expressions[number]
             number, second = self._in_order(operation, operands)
-            sign, text = _signed(self._operand(second, PRODUCT))
+            sign, text = _signed(self._operand(second).within(PRODUCT))
             found.append(((sign if operation == "+" else _opposite(sign), text), second))
             define = False
-        found.append((_signed(self._texts[number][0] if define else self.text(number)), number))
+        found.append((_signed(self._texts[number].text if define else self.text(number)), number))
         return found[::-1]
 
     def _chosen(self, roots: Sequence[int], every: bool) -> set[int]:
@@ -140,12 +160,14 @@ class Writer:
                 long = len(self.text(parts[0])) > self.dialect.longest
             else:
                 parts = sorted(set(operands), key=lambda operand: -len(self.text(operand)))
-                long = len(self._texts[number][0]) > self.dialect.longest
+                long = len(self._texts[number].text) > self.dialect.longest
             for part in parts:
                 if long and self.expressions[part].operation not in (INPUT, CONSTANT):
                     self.names[part] = "t00"
                     self._texts[number] = self._composed(number)
-                    long = operation not in ("+", "-") and len(self._texts[number][0]) > self.dialect.longest
+                    long = (
+                        operation not in ("+", "-") and len(self._texts[number].text) > self.dialect.longest
+                    )
             if count > 1 and (every or self._pays(number)):
                 self.names[number] = "t00"
         return set(self.names)
@@ -153,38 +175,45 @@ class Writer:
     def _pays(self, number: int) -> bool:
         """Whether a part that is used twice gets a name, where short ones do not."""
         whole = self.expressions[number].operation not in ("*", "/", "+", "-", POWER)
-        return whole and len(self._texts[number][0]) > self.dialect.worth
+        return whole and len(self._texts[number].text) > self.dialect.worth
 
-    def _composed(self, number: int) -> tuple[str, int]:
-        """A node as text of its operands, and how tightly it binds."""
+    def _composed(self, number: int) -> Written:
+        """A node as text of its operands."""
         operation, operands, value = self.expressions[number]
         if operation == INPUT:
-            return self.symbols[int(value)], ATOM
+            return Written(self.symbols[int(value)], ATOM)
         if operation == CONSTANT:
-            return self.number(value), ATOM
+            return Written(self.number(value), ATOM)
         if operation == POWER:
-            return self.dialect.power.format(self._operand(operands[0], ATOM), int(value)), HIGH
+            return Written(
+                self.dialect.power.format(self._operand(operands[0]).within(ATOM), int(value)), HIGH
+            )
         if operation in ("+", "-"):
             first, second = self._in_order(operation, operands)
             if operation == "-" and self.expressions.constant_value(first) == 0.0:
-                text = self._operand(second, PRODUCT)
-                return f"-({text})" if text.startswith("-") else f"-{text}", SUM
-            sign, text = _signed(self._operand(second, PRODUCT))
+                text = self._operand(second).within(PRODUCT)
+                return Written(f"-({text})" if text.startswith("-") else f"-{text}", SUM)
+            sign, text = _signed(self._operand(second).within(PRODUCT))
             sign = sign if operation == "+" else _opposite(sign)
-            return f"{self._operand(first, SUM, first=True)} {sign} {text}", SUM
+            return Written(f"{self._operand(first).within(SUM, first=True)} {sign} {text}", SUM)
         division = self.dialect.division
         if operation == "/" and division is not None and not self._is_plain_divisor(operands[1]):
-            return division.format(*(self.text(operand) for operand in operands)), ATOM
+            return Written(division.format(*(self.text(operand) for operand in operands)), ATOM)
         if operation not in ("*", "/"):
             inside = [self.text(operand) for operand in operands]
             known = self.dialect.functions.get(operation)
-            return f"{operation}({', '.join(inside)})" if known is None else known.format(*inside), ATOM
+            return Written(
+                f"{operation}({', '.join(inside)})" if known is None else known.format(*inside), ATOM
+            )
         first, second = operands
         if operation == "*" and self.expressions.constant_value(second) is not None:
             first, second = second, first  # a product commutes to the bit
         # The right operand keeps its brackets even where algebra would not need them: rounding does.
         between = self.dialect.times if operation == "*" else operation
-        return f"{self._operand(first, PRODUCT, first=True)}{between}{self._operand(second, HIGH)}", PRODUCT
+        return Written(
+            f"{self._operand(first).within(PRODUCT, first=True)}{between}{self._operand(second).within(HIGH)}",
+            PRODUCT,
+        )
 
     def _is_plain_divisor(self, number: int) -> bool:
         """Whether a division by a node needs no protection: it is a constant that is large enough, or kept from 0."""
@@ -210,11 +239,9 @@ class Writer:
             return False
         return not (operation == "-" and self.expressions.constant_value(operands[0]) == 0.0)
 
-    def _operand(self, number: int, level: int, first: bool = False) -> str:
-        """An operand, in brackets where it binds less tightly or has a sign that something other stands before."""
-        text, own = (self.names[number], ATOM) if number in self.names else self._texts[number]
-        signed = not first and text.startswith("-") and (level > PRODUCT or own < PRODUCT)
-        return f"({text})" if signed or own < level else text
+    def _operand(self, number: int) -> Written:
+        """An operand, by its name if it has one."""
+        return Written(self.names[number], ATOM) if number in self.names else self._texts[number]
 
 
 def _signed(text: str) -> Term:

@@ -13,11 +13,12 @@ from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import CORRELATED
 from twinloop.identification.fit.fitting import fitted
-from twinloop.identification.fit.innovations import described
+from twinloop.identification.fit.innovations import Described
 from twinloop.identification.fit.models import model_of
 from twinloop.identification.identify import PROPOSALS, Found, decided
 from twinloop.identification.records import Run
-from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import priced
 from twinloop.identification.starts import ANEW, begun, starts
 
@@ -102,8 +103,8 @@ def test_another_noise_gains_what_it_makes_readings_likelier_by_less_what_a_dist
     (found,) = hypothesis.sums
     assert [hypothesis.pool.text(term, ["v", "f"]) for term in found.weights] == ["f"]
     own = found.chain.with_noise(found.chain.sensors * factor, found.chain.motion)
-    said = described(context, replace(hypothesis, sums=(replace(found, chain=own),)))
-    problem = posed(context, hypothesis)
+    said = Described(context, replace(hypothesis, sums=(replace(found, chain=own),)))
+    problem = Problem(context, hypothesis)
     regression = problem.regression(own, problem.values(problem.usable(list(found.weights))))
 
     def length(chain):
@@ -125,6 +126,6 @@ def test_terms_are_paid_for():
     model = model_of(context, other := replace(grown, sums=(weighed,), fit=None))
     other = replace(other, fit=replace(hypothesis.fit, model=model))
     costs = [priced(grown.pool, list(sum_.weights), 202, 2) for sum_ in (found, weighed)]
-    lengths = [described(context, each).hypothesis.evidence.length for each in (hypothesis, other)]
+    lengths = [Described(context, each).hypothesis.evidence.length for each in (hypothesis, other)]
     assert lengths[1] - lengths[0] == pytest.approx(costs[1] - costs[0], abs=1e-6)
     assert costs[1] > costs[0]

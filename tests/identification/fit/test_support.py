@@ -4,15 +4,11 @@ import numpy as np
 import pytest
 
 import twinloop as tl
-from twinloop import _core
+from problems import problem_of
 from twinloop.identification.fit.support import EACH, MANY, borne
-from twinloop.identification.records import Run, guessed_noise, stages
-from twinloop.identification.search.problem import Problem
+from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import chains
-from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Priors
-from twinloop.law.actuation import Actuation
 
 DT, STEPS, NOISE = 0.05, 200, 1e-4
 SIGNALS = tl.Signals([tl.State("level", "m", 1.0)], [tl.Command("valve", "1", (0.0, 1.0))], DT)
@@ -27,10 +23,8 @@ def filled(opened):
         level.append(4.0 * u + (level[-1] - 4.0 * u) * np.exp(-0.5 * DT))
     readings = np.array(level)[:, None] + NOISE * np.random.default_rng(3).standard_normal((STEPS + 1, 1))
     run = Run.of(readings, valve[:, None])
-    pool = Pool(2, 10)
-    problem = Problem(
-        pool, [run], stages([run], SIGNALS, Actuation.direct(SIGNALS)), DT, _core.Workers(1), Priors({}, {})
-    )
+    problem = problem_of(SIGNALS, run)
+    pool = problem.pool
     products = [1]
     for _ in range(4):
         products.append(pool.product(products[-1], 0))
@@ -70,15 +64,7 @@ def test_terms_of_enough_readings_are_all_left():
 def test_a_record_that_is_short_as_a_whole_bears_what_it_did():
     for terms in ([0], [0, 1]):
         run = Run.of(np.linspace(1.0, 2.0, 9)[:, None], np.ones((8, 1)))
-        pool = Pool(2, 10)
-        problem = Problem(
-            pool,
-            [run],
-            stages([run], SIGNALS, Actuation.direct(SIGNALS)),
-            DT,
-            _core.Workers(1),
-            Priors({}, {}),
-        )
+        problem = problem_of(SIGNALS, run)
         (chain,) = chains(SIGNALS, "acceleration", guessed_noise([run], np.ones(1)))
-        found = Sum(dict.fromkeys([*terms, pool.one], 1.0), 0.0, chain)
+        found = Sum(dict.fromkeys([*terms, problem.pool.one], 1.0), 0.0, chain)
         assert borne(problem, found) is found

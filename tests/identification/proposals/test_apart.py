@@ -59,7 +59,7 @@ def test_commands_that_lag_differently_get_lags_of_their_own(lags):
     context, hypothesis = shared(lags)
     assert hypothesis.alike == ((0, 1),)
     (found,) = apart(context, hypothesis)
-    assert found.alike == ((0,), (1,)) and found.evidence.beats(hypothesis.evidence)
+    assert found.alike == ((0,), (1,)) and found.evidence > hypothesis.evidence
     np.testing.assert_allclose([actuator.lag for actuator in found.actuation.actuators], lags, rtol=0.03)
     weights = [
         {found.pool.text(node, ["p", "r", "m", "t"]): w for node, w in s.weights.items()} for s in found.sums

@@ -39,7 +39,7 @@ def test_a_lag_that_is_tuned_to_nothing_saves_its_price():
     context, hypothesis = found(0.0)
     assert 0.0 < hypothesis.actuation.actuators[0].lag < NOTHING * DT
     (other,) = at_once(context, hypothesis)
-    assert other.actuation == Actuation.direct(SIGNALS) and other.evidence.beats(hypothesis.evidence)
+    assert other.actuation == Actuation.direct(SIGNALS) and other.evidence > hypothesis.evidence
     assert other.evidence.length < hypothesis.evidence.length - LAGGING + 1.0
     np.testing.assert_allclose(other.fit.model.constants, [-0.8, 3.0], rtol=0.01)
     assert list(at_once(context, other)) == []

@@ -9,7 +9,7 @@ from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
+from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.proposals.bare import bare
 from twinloop.identification.proposals.hidden import with_hidden
@@ -49,7 +49,7 @@ def names_of(hypothesis):
 def test_a_hidden_state_that_stood_in_for_terms_gives_way_to_these():
     context, hypothesis = of_first_rung([swung(gravity, seed, noise=1e-3) for seed in range(2)])
     assert "sin(angle)" not in names_of(hypothesis) and "hidden" in names_of(hypothesis)
-    best = strongest([hypothesis, *bare(context, hypothesis)])
+    best = max([hypothesis, *bare(context, hypothesis)], key=by_evidence)
     assert best.actuation.hidden == () and best.evidence.length < hypothesis.evidence.length - 30.0
     assert names_of(best) == {"sin(angle)", "rate", "torque"}
     # It is not looked for where nothing is hidden, or nothing fitted.

@@ -41,7 +41,7 @@ def test_what_a_disturbance_stood_in_for_is_found(noise):
     motion = hypothesis.sums[0].chain.motion
     assert "sin(angle)" not in law(hypothesis) and max(motion.white, motion.correlated) > 0.0
     *_, best = sorted(undisturbed(context, hypothesis), key=lambda found: -found.evidence.length)
-    assert best.evidence.beats(hypothesis.evidence)
+    assert best.evidence > hypothesis.evidence
     found = law(best)
     for term, weight in {"sin(angle)": -9.0, "rate": -0.4, "torque": 5.0}.items():
         assert found[term] == pytest.approx(weight, rel=0.01)

@@ -9,23 +9,21 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import twinloop as tl
+from problems import problem_of
 from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.records import Run, guessed_noise, stages
+from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.search import selection
 from twinloop.identification.search.joints import with_joints
-from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.starts import begun
 from twinloop.identification.terms.joints import forces, masses, solution
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Priors
-from twinloop.law.actuation import Actuation
 
 WORKERS = _core.Workers(1)
 WEIGHT = st.floats(-0.2, 0.2)
@@ -92,9 +90,8 @@ def posed(slope, noise):
         dt=length / (steps - 1),
     )
     run = Run.of(readings, np.zeros((steps - 1, 1)))
-    pool = Pool(5, 10)
-    inputs = stages([run], signals, Actuation.direct(signals))
-    problem = Problem(pool, [run], inputs, signals.dt, WORKERS, Priors({}, {}))
+    problem = problem_of(signals, run)
+    pool = problem.pool
     terms = [pool.one, 0, 1, 2, 3, pool.add("sin", 2)]
     problem.usable(terms)
     known = []

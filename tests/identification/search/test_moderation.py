@@ -10,7 +10,8 @@ from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.records import Run
 from twinloop.identification.search.moderation import TIMES, precisions
-from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.starts import ANEW, begun
 
 DT = 0.02
@@ -45,7 +46,7 @@ def hypothesis(runs, **options):
 def test_the_prior_is_as_wide_as_what_moves_the_chain_in_units_of_what_a_term_moves():
     run = swinging(0, 1e-4)
     context, first = hypothesis([run])
-    problem, (chain,) = posed(context, first), first.driven
+    problem, (chain,) = Problem(context, first), first.driven
     terms = problem.usable([first.pool.one, 0, 1])
     found = precisions(problem, chain, terms)
     assert found[0] == 0.0  # a constant moves nothing to and fro
@@ -61,7 +62,7 @@ def test_no_term_is_many_times_what_moves_the_chain(seed):
     run = swinging(seed, 0.02)
     context, first = hypothesis([run])
     found = from_both_sides(context, first)
-    problem = posed(context, found)
+    problem = Problem(context, found)
     (sum_,) = found.sums
     parts = problem.values(problem.usable(list(sum_.weights)))[1] * np.array(list(sum_.weights.values()))
     together = parts.sum(axis=1).std()
@@ -87,7 +88,7 @@ def test_a_large_term_that_is_right_is_found():
     context = Context([run], signals, options_of("default", {"moves": 4000}), Unit(0), _core.Workers(1))
     found = from_both_sides(context, begun(context, "acceleration", context.first_pool(), ANEW))
     (sum_,) = found.sums
-    problem = posed(context, found)
+    problem = Problem(context, found)
     values = problem.values(problem.usable(list(sum_.weights)))[1]
     predicted = (values * np.array(list(sum_.weights.values()))).sum(axis=1)
     assert np.abs(predicted - slopes).max() < 0.05 * np.abs(slopes).max()

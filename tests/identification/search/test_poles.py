@@ -4,19 +4,17 @@ import numpy as np
 import pytest
 
 import twinloop as tl
+from problems import problem_of
 from twinloop import _core
 from twinloop._ground.streams import Unit
-from twinloop.identification.records import Run, guessed_noise, stages
+from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.search.poles import room, vanishes_nowhere
-from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import with_quotients
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.search.walks import Walks
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.terms.denominators import denominators
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Priors
-from twinloop.law.actuation import Actuation
 
 WORKERS = _core.Workers(1)
 COMMAND = tl.Command("u", "1", (0.0, 1.0))
@@ -52,14 +50,12 @@ def test_a_pole_between_states_is_seen(highest, clear):
 
 @pytest.mark.parametrize(("highest", "found"), [(1.8, True), (4.0, False)])
 def test_no_quotient_has_a_pole_in_the_room_of_its_states(highest, found):
-    signals = tl.Signals([tl.State("x", "1", 1.0)], [COMMAND], 0.02)
+    signals = tl.Signals([tl.State("x", "1", 1.0, envelope=(0.0, highest))], [COMMAND], 0.02)
     # Solves dx/dt = 0.3 / (1 - 0.5 x), which has its pole at 2, from x = 0.0975 on.
     x = 2.0 - 2.0 * np.sqrt(1.0 - 0.095 - 0.3 * signals.dt * np.arange(120))
     run = Run.of(x[:, np.newaxis], np.zeros((len(x) - 1, 1)))
-    pool, inputs = Pool(2, 10), stages([run], signals, Actuation.direct(signals))
-    problem = Problem(
-        pool, [run], inputs, signals.dt, WORKERS, Priors({}, {}), room=((0.0, highest), (0.0, 1.0))
-    )
+    problem = problem_of(signals, run)
+    pool = problem.pool
     (chain,) = chains(signals, "acceleration", guessed_noise([run], np.ones(1)))
     terms = [pool.one, 0, pool.product(0, 0)]
     problem.usable(terms)

@@ -10,13 +10,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 import twinloop as tl
+from problems import problem_of as one_run
 from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.identification.identify import identify_runs
-from twinloop.identification.records import Run, guessed_noise, stages
+from twinloop.identification.records import Run, guessed_noise
 from twinloop.identification.search.implicit import Quotient
 from twinloop.identification.search.newton import refined
-from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.saturation import saturations
 from twinloop.identification.search.structure import Sum
@@ -26,8 +26,6 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.slopes import slopes
 from twinloop.identification.terms.denominators import denominators, over, quotient
 from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Priors
-from twinloop.law.actuation import Actuation
 
 WORKERS = _core.Workers(1)
 STEPS = 150
@@ -53,12 +51,8 @@ def signals_of(names, length):
 def problem_of(readings, signals):
     """A problem, and its chains with the noise that readings seem to have."""
     run = Run.of(readings, np.zeros((len(readings) - 1, 1)))
-    pool = Pool(signals.n_x + signals.n_u, 10)
-    inputs = stages([run], signals, Actuation.direct(signals))
     noise = guessed_noise([run], np.ones(signals.n_x))
-    return Problem(pool, [run], inputs, signals.dt, WORKERS, Priors({}, {})), chains(
-        signals, "acceleration", noise
-    )
+    return one_run(signals, run), chains(signals, "acceleration", noise)
 
 
 def saturating(s, p):

@@ -31,7 +31,7 @@ def test_it_is_the_least_that_bounds_allow(seed, data):
         low[i], high[i] = sorted(data.draw(st.tuples(*[st.floats(-3.0, 3.0)] * 2)))
         high[i] += 1e-3
     limits = {i: (float(a), float(b)) for i, (a, b) in enumerate(zip(low, high, strict=True)) if a > -np.inf}
-    weights, left = bounded_solution(gram, range(4), limits)
+    weights, left = bounded_solution(gram.solve(range(4)), range(4), limits)
     assert all(a <= weights[i] <= b for i, (a, b) in limits.items())
     # χ² is what the free fit leaves, and a paraboloid about it.
     root = np.linalg.cholesky(np.linalg.inv(covariance)).T
@@ -47,7 +47,7 @@ def test_it_is_that_too_where_sweeps_over_the_bounds_would_not_end():
     root = np.linalg.cholesky(np.linalg.inv(covariance)).T
     low, high = np.array([0.0, 0.0, 0.0, -np.inf]), np.array([1e-3, 1e-3, 1e-3, np.inf])
     expected = lsq_linear(root, root @ free, (low, high), method="trf", tol=1e-14)
-    weights, left = bounded_solution(gram, range(4), dict.fromkeys(range(3), (0.0, 1e-3)))
+    weights, left = bounded_solution(gram.solve(range(4)), range(4), dict.fromkeys(range(3), (0.0, 1e-3)))
     assert left == pytest.approx(least + 2.0 * expected.cost, rel=1e-9)
     np.testing.assert_allclose(weights, expected.x, atol=1e-9)
 
@@ -55,5 +55,7 @@ def test_it_is_that_too_where_sweeps_over_the_bounds_would_not_end():
 def test_bounds_that_do_not_bind_change_no_bit():
     gram = inner_products(3)
     free, _, left = gram.solve([0, 2])
-    weights, other = bounded_solution(gram, [0, 2], {0: (-1e3, 1e3), 2: (-1e3, 1e3), 3: (5.0, 6.0)})
+    weights, other = bounded_solution(
+        gram.solve([0, 2]), [0, 2], {0: (-1e3, 1e3), 2: (-1e3, 1e3), 3: (5.0, 6.0)}
+    )
     assert weights.tobytes() == free.tobytes() and other == left

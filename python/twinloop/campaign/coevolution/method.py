@@ -11,17 +11,14 @@ from twinloop import _core
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
 from twinloop.campaign import standing
+from twinloop.campaign.coevolution.knowledge import Knowledge
 from twinloop.campaign.coevolution.learning import Learner, Learning
 from twinloop.campaign.coevolution.search import chunks, committee, start_tests
 from twinloop.campaign.coevolution.written import WrittenMemory
-from twinloop.campaign.examination.rivals import Rival
-from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.history import Iteration, Progress, TestLoop
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
-from twinloop.campaign.twin_errors import errors_of
-from twinloop.law.twin import Twin
 from twinloop.objectives import final_distances
 from twinloop.records import Record
 from twinloop.test import Test
@@ -169,12 +166,10 @@ class Coevolution:
         """None: the paper adds none."""
         return None, None
 
-    def twin(self, book: Logbook) -> Twin:
-        """The best trade-off."""
-        model = self.models.best_model
-        rows = errors_of(model, book, self.workers)
-        flights = [run.trajectory for run in book.experiments]
-        return Twin(model, self.setup.signals, rows, self.setup.limits, flights=flights)
+    def knowledge(self, book: Logbook) -> Knowledge:
+        """The best trade-off, and the one when the last test was asked for."""
+        assert self.memory.latest is not None
+        return Knowledge(self.setup, book, self.memory.latest, self.memory.asked)
 
     @property
     def models(self) -> _core.ModelSearch:
@@ -187,22 +182,6 @@ class Coevolution:
         """The best trade-off when the last test was asked for."""
         asked = self.memory.asked
         return None if asked is None else asked.models.best_model
-
-    def twins_before(self, book: Logbook) -> tuple[TwinBefore, ...]:
-        """The best trade-off when the last test was asked for."""
-        asked, latest = self.memory.asked, self.memory.latest
-        if asked is None or latest is None or len(asked.experiments) >= len(latest.experiments):
-            return ()
-        twin = Twin(asked.models.best_model, self.setup.signals, (), self.setup.limits)
-        return (TwinBefore(len(asked.experiments), twin),)
-
-    def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
-        """None: the paper knows no noise."""
-        return None
-
-    def rivals(self, book: Logbook) -> tuple[Rival, ...]:
-        """None: programs are no sums."""
-        return ()
 
     def history(self, book: Logbook) -> tuple[Iteration, ...]:
         """One record for each iteration, from 0."""

@@ -7,7 +7,7 @@ does not always.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from twinloop import _core
 from twinloop._ground.streams import Unit
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.causes import causes_of
-from twinloop.campaign.identify_and_plan.following import Following, following, in_pieces
+from twinloop.campaign.identify_and_plan.following import WRONG, Following, following, in_pieces
 from twinloop.campaign.identify_and_plan.misses import Miss, misses_any, misses_of, of_each_state
 from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
@@ -23,11 +23,6 @@ from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.law.pieces import left
-
-FEWEST = 4
-"""Members of a committee that are kept in any case."""
-WRONG = 0.5
-"""Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +36,8 @@ class Answer:
         causes: of the correlated disturbances, by the state that each drives.
         unmoved: states that move, and nothing moves them by the law.
         missed: whether the best one misses a flight by more than noise and whatever may disturb explains.
-        beside: the best model of the other kind, where none explains the flights; it sits in the committee, too.
+        believed: members of the committee that follow the flights, the best first; where none explains them, the best
+            one of another kind behind it.
         lost: places of the flights that the best of them does not follow.
     """
 
@@ -51,7 +47,7 @@ class Answer:
     causes: Mapping[int, Cause]
     unmoved: Sequence[int]
     missed: bool
-    beside: _core.Model | None = None
+    believed: Sequence[_core.Model]
     lost: Sequence[int] = ()
 
     @property
@@ -95,15 +91,25 @@ class Answer:
         """
         noise = identified.noise(setup.signals)
         followed = following(identified.members, flights, setup.limits, workers, noise)
+        believed = [identified.members[i] for i in followed.believed()]
         unmoved = unmoved_states(identified, flights, setup)
         if not np.isfinite(identified.chi_squared):
             # Of a model that diverges no more is known.
-            return Answer(identified, followed, False, {}, unmoved, False)
+            return Answer(identified, followed, False, {}, unmoved, False, believed)
         causes = causes_of(identified, flights, setup.signals, setup.limits, options, workers)
         model, unit = identified.members[0], Unit(setup.seed).part(len(flights), 1, number)
         missed = misses_any(model, followed, flights, noise, causes, unit, setup.limits, workers)
         lost = _lost(identified, followed, flights, setup, workers)
-        return Answer(identified, followed, 2 * len(lost) <= len(flights), causes, unmoved, missed, lost=lost)
+        follows = 2 * len(lost) <= len(flights)
+        return Answer(identified, followed, follows, causes, unmoved, missed, believed, lost)
+
+    def beside(self, other: Answer) -> Answer:
+        """The same with the best model of another answer in its committee.
+
+        Gains are tuned on the first few members: it comes second.
+        """
+        first, *others = self.believed
+        return replace(self, believed=[first, other.identified.model, *others])
 
     def misses(self, flights: Sequence[Experiment], setup: Setup, workers: _core.Workers) -> list[Miss]:
         """States that the best member misses by more than noise and known disturbances explain.
@@ -121,22 +127,6 @@ class Answer:
         model, noise = self.identified.members[0], self.identified.noise(setup.signals)
         unit = Unit(setup.seed).part(len(flights), 2)
         return misses_of(model, flights, noise, self.causes, unit, setup.limits, workers)
-
-    @property
-    def believed(self) -> list[_core.Model]:
-        """Members of the committee that follow the flights, and the best one in any case, in order.
-
-        One that cannot is no member (E-SINDy's stability filter).
-        """
-        free = self.followed.free
-        wrong = (free > np.maximum(WRONG * self.followed.frozen, 4.0 * free[0])).any(axis=1)
-        believed = {0, *np.flatnonzero(~wrong).tolist()}
-        # Where hardly any can, the ones that go wrong least still show where more must be known.
-        others = [i for i in self.followed.order() if i not in believed]
-        kept = sorted(believed | set(others[: max(0, FEWEST - len(believed))]))
-        members = [self.identified.members[i] for i in kept]
-        # Gains are tuned on the first few members.
-        return members if self.beside is None else [members[0], self.beside, *members[1:]]
 
 
 def _lost(

@@ -18,6 +18,10 @@ from twinloop.law.noise import Noise
 from twinloop.law.pieces import held
 from twinloop.test import Test
 
+FEWEST = 4
+"""Members of a committee that are kept in any case."""
+WRONG = 0.5
+"""Normalised closed-loop error on a flown test at which a member of the committee is not believed."""
 PIECES = 5
 """Of a flight, each of which is followed from its own first reading where commands were sent in pulses."""
 
@@ -43,6 +47,17 @@ class Following:
         """Models, the one that goes wrong least on its worst flight first; of the diverging, what lasts longest."""
         numbers: list[int] = np.lexsort((-self.lasted.min(axis=1), self.ratios.max(axis=1))).tolist()
         return numbers
+
+    def believed(self) -> list[int]:
+        """Models that follow the flights, and the first one in any case, in order.
+
+        One that cannot is no member of a committee (E-SINDy's stability filter). Where hardly any can, the ones that go
+        wrong least still show where more must be known.
+        """
+        wrong = (self.free > np.maximum(WRONG * self.frozen, 4.0 * self.free[0])).any(axis=1)
+        follow = {0, *np.flatnonzero(~wrong).tolist()}
+        others = [i for i in self.order() if i not in follow]
+        return sorted(follow | set(others[: max(0, FEWEST - len(follow))]))
 
     def worst(self, model: int) -> float:
         """Of a model, on the flight that it misses most: its mean square over that of the model that never moves."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from twinloop import _core
@@ -16,12 +15,11 @@ from twinloop.campaign.identify_and_plan.calibration import (
     residuals_of_flights,
 )
 from twinloop.campaign.identify_and_plan.causes import observed
-from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
+from twinloop.campaign.identify_and_plan.memory import Learnt
 from twinloop.campaign.logbook import Logbook
-from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
+from twinloop.campaign.twin_errors import errors_of
 from twinloop.identification.remarks import symbols_of
-from twinloop.law.accuracy import TestErrors
 from twinloop.law.twin import Twin
 
 
@@ -31,43 +29,25 @@ class Knowledge:
 
     Args:
         setup: of the campaign.
-        options: of the preset.
         book: of the campaign.
+        learnt: from the first experiments.
+        asked: what was known when the last test was asked for; None: nothing, or of no interest.
     """
 
     setup: Setup
-    options: DefaultOptions
     book: Logbook
+    learnt: Learnt
+    asked: Learnt | None = None
 
-    def twin(self, learnt: Learnt, errors: Sequence[TestErrors]) -> Twin:
+    def twin(self, workers: _core.Workers | None = None) -> Twin:
         """The best model, with the committee and the noise for its band.
 
         Args:
-            learnt: from the first experiments.
-            errors: of the twin on all of them.
+            workers: that work out its errors on all runs; None: they are of no interest.
         """
-        ensemble = self.ensemble(learnt)
-        return Twin(
-            learnt.identified.model,
-            self.setup.signals,
-            errors,
-            self.setup.limits,
-            members=ensemble.members,
-            noise=ensemble.noise,
-            seed=self.setup.seed,
-            inflation=ensemble.inflation,
-            remarks=learnt.lessons[-1].remarks,
-            flights=[run.trajectory for run in self.book.experiments],
-        )
-
-    def ensemble(self, learnt: Learnt) -> Ensemble:
-        """What the band of the twin is made of.
-
-        Args:
-            learnt: from the first experiments.
-        """
-        found = learnt.identified
+        learnt, found = self.learnt, self.learnt.identified
         noise = found.noise(self.setup.signals)
+        errors = [] if workers is None else errors_of(found.model, self.book, workers, noise)
         inflation = OF_PARTS if found.of_parts else factor(learnt.needed)
         if found.exact:
             # What follows exact readings to rounding is the law: its members are too sure of nothing.
@@ -75,32 +55,35 @@ class Knowledge:
                 found.model, self.book.experiments[: learnt.experiments], self.setup.limits
             )
             noise, inflation = replace(noise, sensors=residuals), 1.0
-        return Ensemble(tuple(learnt.believed), noise, inflation)
+        return Twin(
+            found.model,
+            self.setup.signals,
+            errors,
+            self.setup.limits,
+            members=learnt.believed,
+            noise=noise,
+            seed=self.setup.seed,
+            inflation=inflation,
+            remarks=learnt.lessons[-1].remarks,
+            flights=[run.trajectory for run in self.book.experiments],
+        )
 
-    def needed_factors(self, learnt: Learnt) -> tuple[float, ...]:
-        """Factors that the flights told since would have needed, after those before them.
-
-        Args:
-            learnt: from the first experiments.
-        """
+    def needed_factors(self) -> tuple[float, ...]:
+        """Factors that the flights told since would have needed, after those before them."""
+        learnt = self.learnt
         # A committee with parts in it says nothing of those that come after it.
         if learnt.identified.of_parts:
             return learnt.needed
-        twin = self.twin(learnt, [])
+        twin = self.twin()
         needed = [
             needed_factor(twin, run.replayed, run.trajectory)
             for run in self.book.experiments[learnt.experiments :]
         ]
         return (*learnt.needed, *(found for found in needed if found is not None))
 
-    def twins_before(self, latest: Learnt, asked: Learnt | None) -> tuple[TwinBefore, ...]:
-        """Twins that have not learnt all, with bands; models alone where an older version has not kept what bands need.
-
-        Args:
-            latest: what was learnt last.
-            asked: what was known when the last test was asked for.
-        """
-        limits, seed = self.setup.limits, self.setup.seed
+    def twins_before(self) -> tuple[TwinBefore, ...]:
+        """Twins that have not learnt all, with bands; models alone where an older version has not kept their parts."""
+        limits, seed, latest = self.setup.limits, self.setup.seed, self.learnt
         told = [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
         found = {
             learnt: Twin(model, self.setup.signals, (), limits)
@@ -112,36 +95,32 @@ class Knowledge:
                 found[learnt].model, self.setup.signals, (), limits,
                 members=ensemble.members, noise=ensemble.noise, seed=seed, inflation=ensemble.inflation,
             )  # fmt: skip
-        if asked is not None:
-            found[asked.experiments] = self.twin(asked, [])
+        if self.asked is not None:
+            found[self.asked.experiments] = replace(self, learnt=self.asked).twin()
         # Of today it is where flights were told that nobody has learnt yet.
-        found[latest.experiments] = self.twin(latest, [])
+        found[latest.experiments] = self.twin()
         return tuple(
             TwinBefore(learnt, found[learnt])
             for learnt in sorted(found)
             if learnt < len(self.book.experiments)
         )
 
-    def innovations(self, learnt: Learnt, workers: _core.Workers) -> tuple[Floats, ...] | None:
+    def innovations(self, workers: _core.Workers) -> tuple[Floats, ...] | None:
         """Whitened prediction errors of the twin's own filter; None of exact readings, which leave rounding alone.
 
         Args:
-            learnt: from the first experiments.
             workers: how the work is carried out.
         """
+        learnt = self.learnt
         if learnt.identified.exact:
             return None
         flights, limits = self.book.experiments[: learnt.experiments], self.setup.limits
         found = observed(learnt.identified, flights, self.setup.signals, limits, workers)
         return None if found is None else tuple(errors for errors, _, _ in found)
 
-    def rivals(self, learnt: Learnt) -> tuple[Rival, ...]:
-        """Subsets of terms that annealing has found nearly as good.
-
-        Args:
-            learnt: from the first experiments.
-        """
-        identified, signals = learnt.identified, self.setup.signals
+    def rivals(self) -> tuple[Rival, ...]:
+        """Subsets of terms that annealing has found nearly as good."""
+        identified, signals = self.learnt.identified, self.setup.signals
         symbols = symbols_of(signals, identified.pool, identified.sums)
         return tuple(
             Rival(

@@ -15,7 +15,7 @@ from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.levels import levels_of, levels_said
-from twinloop.campaign.identify_and_plan.memory import Learnt
+from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
 from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from, shortened
 from twinloop.campaign.identify_and_plan.sent import other_commands
@@ -98,8 +98,8 @@ class Learner:
             under_way: the identification of the same experiments, as far as it had come; None: it begins.
             keep: called with the identification wherever it may go on from later.
         """
-        told, knowledge = len(book.experiments), Knowledge(self.setup, self.options, book)
-        needed = () if asked is None else knowledge.needed_factors(asked)
+        told = len(book.experiments)
+        needed = () if asked is None else Knowledge(self.setup, book, asked).needed_factors()
         selected = learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
         identify = self._identification(selected)
         flights = without_wrong_readings(book.experiments, self.setup.signals)
@@ -131,7 +131,9 @@ class Learner:
             two_laws=two.laws,
             rough=two.rough,
         )
-        return replace(learnt, ensembles=(*ensembles, knowledge.ensemble(learnt)))
+        return replace(
+            learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
+        )
 
     def _of_two(
         self,
@@ -271,8 +273,8 @@ def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
         foretold = "linear" if rough.worst < answer.worst else "nonlinear"
     if of_rough > rank or (of_rough == rank and rough.follows and foretold == "linear"):
         worth = answer.believable and answer.worst < rough.worst
-        return replace(rough, beside=answer.identified.model) if worth else rough
-    return replace(answer, beside=rough.identified.model) if rough.lasts else answer
+        return rough.beside(answer) if worth else rough
+    return answer.beside(rough) if rough.lasts else answer
 
 
 def is_rough(identified: Identified) -> bool:

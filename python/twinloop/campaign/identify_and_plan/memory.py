@@ -13,6 +13,7 @@ from twinloop.campaign.identify_and_plan.two_laws import TwoLaws
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay
 from twinloop.law.noise import Noise
+from twinloop.law.twin import Twin
 from twinloop.records import Recorded
 from twinloop.test import Test
 
@@ -30,6 +31,12 @@ class Ensemble(Recorded, kind="ensemble"):
     members: tuple[_core.Model, ...]
     noise: Noise
     inflation: float
+
+    @staticmethod
+    def of(twin: Twin) -> Ensemble:
+        """What the band of a twin is made of."""
+        assert twin.noise is not None
+        return Ensemble(twin.members, twin.noise, twin.inflation)
 
     @classmethod
     def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Ensemble:

@@ -15,8 +15,6 @@ from twinloop._ground.elementary import log
 from twinloop._ground.steps import STEPS, Step
 from twinloop._ground.streams import Unit
 from twinloop.campaign import standing
-from twinloop.campaign.examination.rivals import Rival
-from twinloop.campaign.examination.unseen import TwinBefore
 from twinloop.campaign.history import Lesson, Planned, Progress
 from twinloop.campaign.identify_and_plan.alone import best_alone
 from twinloop.campaign.identify_and_plan.calibration import calibrated
@@ -29,11 +27,9 @@ from twinloop.campaign.identify_and_plan.track_record import nearly_confirmed_in
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
-from twinloop.campaign.twin_errors import errors_of
 from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
 from twinloop.law.actuation import delayed
-from twinloop.law.twin import Twin
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -114,35 +110,33 @@ class IdentifyAndPlan:
 
     def learn(self, book: Logbook, at_once: bool = False) -> None:
         """Identifies from all that was told, beginning with what was known at the last `ask`."""
+
+        def from_all_in(book: Logbook) -> None:
+            latest, told = self.memory.latest, len(book.experiments)
+            if latest is not None and (at_once or latest.experiments == told):
+                return
+            self._tests = tuple(run.number for run in book.experiments)
+            asked, begun = self.memory.asked, self.memory.under_way
+            under_way = begun[1] if begun is not None and begun[0] == told else None
+            learnt = self.learner.learnt(book, asked, under_way, partial(self._keep, told))
+            self.memory = Memory(asked=asked, latest=learnt)
+
         asked = self.memory.asked
         again = [] if at_once else book.to_learn_again(0 if asked is None else asked.experiments)
         for past in again:
-            self._learn_again(past)
+            # What was learnt when a test was asked for, from what is left.
+            from_all_in(past)
+            gains = self._gains(past) if self.options.tests == "ask" else None
+            self.memory = replace(self.memory, asked=replace(self._latest(), gains=gains), under_way=None)
         if again:
             self._keep_gains(book, again[-1])
-        self._learn(book, at_once)
-
-    def _learn_again(self, past: Logbook) -> None:
-        """What was learnt when a test was asked for, from what is left."""
-        self._learn(past)
-        gains = self._gains(past) if self.options.tests == "ask" else None
-        self.memory = replace(self.memory, asked=replace(self._latest(), gains=gains), under_way=None)
+        from_all_in(book)
 
     def _keep_gains(self, book: Logbook, asked: Logbook) -> None:
         """The gains of the last `ask` are those of now if nothing was told since."""
         known = self.memory.asked
         if known is not None and known.gains is not None and book.same_flights(asked):
             self.memory = replace(self.memory, gains=(book.outcomes, known.gains))
-
-    def _learn(self, book: Logbook, at_once: bool = False) -> None:
-        latest = self.memory.latest
-        if latest is not None and (at_once or latest.experiments == len(book.experiments)):
-            return
-        self._tests = tuple(run.number for run in book.experiments)
-        told, asked, begun = len(book.experiments), self.memory.asked, self.memory.under_way
-        under_way = begun[1] if begun is not None and begun[0] == told else None
-        learnt = self.learner.learnt(book, asked, under_way, partial(self._keep, told))
-        self.memory = Memory(asked=asked, latest=learnt)
 
     def _keep(self, told: int, under_way: UnderWay) -> None:
         self.memory = replace(self.memory, under_way=(told, under_way))
@@ -274,29 +268,15 @@ class IdentifyAndPlan:
         """A gentle chirp that fades out, held back by what the states do."""
         return self.planner.first_excitation(number, genes)
 
-    def twin(self, book: Logbook) -> Twin:
-        """The best model, with the committee and the sensors' noise for its band."""
-        latest = self._latest()
-        identified = latest.identified
-        errors = errors_of(identified.model, book, self.workers, identified.noise(self.setup.signals))
-        return Knowledge(self.setup, self.options, book).twin(latest, errors)
+    def knowledge(self, book: Logbook) -> Knowledge:
+        """What was learnt last, beside all that was told."""
+        assert self.memory.latest is not None
+        return Knowledge(self.setup, book, self.memory.latest, self.memory.asked)
 
     @property
     def asked_model(self) -> _core.Model | None:
         """The best model when the last test was asked for."""
         return None if self.memory.asked is None else self.memory.asked.identified.model
-
-    def twins_before(self, book: Logbook) -> tuple[TwinBefore, ...]:
-        """Twins that have not learnt all, with bands; without where an older version has not kept what they need."""
-        return Knowledge(self.setup, self.options, book).twins_before(self._latest(), self.memory.asked)
-
-    def innovations(self, book: Logbook) -> tuple[Floats, ...] | None:
-        """Whitened prediction errors of the twin's own filter; None of exact readings, which leave rounding alone."""
-        return Knowledge(self.setup, self.options, book).innovations(self._latest(), self.workers)
-
-    def rivals(self, book: Logbook) -> tuple[Rival, ...]:
-        """Subsets of terms that annealing has found nearly as good."""
-        return Knowledge(self.setup, self.options, book).rivals(self._latest())
 
     def history(self, book: Logbook) -> tuple[Lesson, ...]:
         """One record for each identification."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
-from twinloop.identification.fit.innovations import described
+from twinloop.identification.fit.innovations import Described
 from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
 
@@ -24,7 +24,7 @@ def by_innovations(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     Returns:
         The same terms, with the constants inside them that tuning has found, and without those that are nothing then.
     """
-    best, latest = hypothesis, described(context, hypothesis).under_noise
+    best, latest = hypothesis, Described(context, hypothesis).under_noise
     for _ in range(TURNS):
         # Fitting estimates the noise behind what it has tuned.
         latest = fitted(context, settled(latest))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.models import model_of
 from twinloop.identification.fit.tuning import tune
 from twinloop.identification.hypothesis import Fit, Hypothesis
-from twinloop.identification.search.selection import posed
+from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import exact
@@ -27,22 +27,7 @@ SEATS = 4
 """One of this many members comes from a part of the only run."""
 
 
-@dataclass(frozen=True, eq=False)
-class Seated:
-    """A committee as identification leaves it.
-
-    Args:
-        members: models, the best first.
-        observer: all chains with noise that explains what is left.
-        of_parts: whether there are members that parts of the only run have led to.
-    """
-
-    members: list[_core.Model]
-    observer: tuple[Chain, ...]
-    of_parts: bool
-
-
-def committee(context: Context, hypothesis: Hypothesis, fit: Fit, rivals: Sequence[Hypothesis]) -> Seated:
+class Committee:
     """The best model, draws from what the runs leave open of it, and other structures that are nearly as good.
 
     Args:
@@ -51,32 +36,38 @@ def committee(context: Context, hypothesis: Hypothesis, fit: Fit, rivals: Sequen
         fit: of it.
         rivals: that were proposed on the way to it; those of parts of the only run have seats.
 
-    Returns:
-        At most as many models as the options ask for.
+    Attributes:
+        members: models, the best first; at most as many as the options ask for.
+        observer: all chains with noise that explains what is left.
+        of_parts: whether there are members that parts of the only run have led to.
     """
-    observer = _rescaled(hypothesis, fit)
-    seats = context.options.committee_size // SEATS
-    others = [rival.fit.model for rival in rivals if rival.of_part and rival.fit is not None][:seats]
-    size = context.options.committee_size - len(others)
-    base, draws = tune(context, hypothesis, fit.model, observer, 0, size)
-    members = [fit.model, *_structures(context, hypothesis, base, draws, size)]
-    while len(members) < size and draws:
-        members.append(draws.pop())
-    # The others first: gains are tuned on the first few members, and should suit laws that differ, not their constants.
-    members = [members[0], *others, *members[1:]]
-    if hypothesis.offsets.any():
-        # What flies them from here on is read as the runs were.
-        members = [member.with_offsets(hypothesis.offsets.tolist()) for member in members]
-    if context.levels:
-        members = [member.with_levels(context.levels) for member in members]
-    return Seated(members, observer, bool(others))
+
+    def __init__(
+        self, context: Context, hypothesis: Hypothesis, fit: Fit, rivals: Sequence[Hypothesis]
+    ) -> None:
+        observer = _rescaled(hypothesis, fit)
+        seats = context.options.committee_size // SEATS
+        others = [rival.fit.model for rival in rivals if rival.of_part and rival.fit is not None][:seats]
+        size = context.options.committee_size - len(others)
+        base, draws = tune(context, hypothesis, fit.model, observer, 0, size)
+        members = [fit.model, *_structures(context, hypothesis, base, draws, size)]
+        while len(members) < size and draws:
+            members.append(draws.pop())
+        # The others first: gains are tuned on the first few members, and should suit laws that differ.
+        members = [members[0], *others, *members[1:]]
+        if hypothesis.offsets.any():
+            # What flies them from here on is read as the runs were.
+            members = [member.with_offsets(hypothesis.offsets.tolist()) for member in members]
+        if context.levels:
+            members = [member.with_levels(context.levels) for member in members]
+        self.members, self.observer, self.of_parts = members, observer, bool(others)
 
 
 def _structures(
     context: Context, hypothesis: Hypothesis, base: Fit, draws: list[_core.Model], size: int
 ) -> list[_core.Model]:
     """Members of subsets drawn by how likely they are; where the best one's is drawn, its next constants."""
-    problem, draw = posed(context, hypothesis), context.unit.stream("structures")
+    problem, draw = Problem(context, hypothesis), context.unit.stream("structures")
     plausible = PLAUSIBLE * max(base.chi_squared, base.readings)
     members: list[_core.Model] = []
     grams: dict[tuple[int, tuple[int, ...]], _core.Gram] = {}
@@ -98,11 +89,12 @@ def _structures(
                 regression = problem.regression(found.chain, problem.values(terms))
                 grams[i, subset] = regression.gram(found.chain.sensors, found.chain.motion, context.workers)
             limits = problem.limits(found.chain, terms)
-            solved = bounded_solution(grams[i, subset], range(len(terms)), limits)
+            solved = grams[i, subset].solve(list(range(len(terms))))
             if solved is None:
                 varied.append(found)
             else:
-                weights = dict(zip(terms, solved[0].tolist(), strict=True))
+                coefficients, _ = bounded_solution(solved, range(len(terms)), limits)
+                weights = dict(zip(terms, coefficients.tolist(), strict=True))
                 varied.append(replace(found, weights=weights))
         other = replace(hypothesis, sums=tuple(varied), fit=None)
         fit, drawn = tune(context, other, model_of(context, other), base.observer, 4, 1, number=attempt + 1)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop.identification.context import Context
-from twinloop.identification.fit.innovations import described
+from twinloop.identification.fit.innovations import Described
 from twinloop.identification.fit.models import bounds_of, layout, model_of
 from twinloop.identification.fit.predictions import without_outliers
 from twinloop.identification.fit.support import supported
@@ -33,11 +33,11 @@ def fitted(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     The noise that its innovations say takes the place of the one that it had, for the model is tuned by noise and the
     noise estimated behind the model.
     """
-    best = described(context, _pruned(context, hypothesis))
+    best = Described(context, _pruned(context, hypothesis))
     for _ in range(TURNS):
         if best.gained <= GAIN:
             break
-        other = described(context, _tuned(context, best.under_noise)[0])
+        other = Described(context, _tuned(context, best.under_noise)[0])
         evidence = other.hypothesis.evidence
         if not evidence.stable or best.hypothesis.evidence.length < evidence.length - GAIN:
             break

@@ -7,21 +7,18 @@ compare where those are the same. An observer sees the law through what it belie
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import CORRELATED
 from twinloop.identification.fit.predictions import predictions
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.description import shortest
-from twinloop.identification.search.selection import posed
+from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import priced
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import floor_of
@@ -34,19 +31,41 @@ MOVE = 0.1
 """What a move of the noise must gain."""
 
 
-@dataclass(frozen=True, eq=False)
 class Described:
-    """What the innovations of a fitted hypothesis say for it.
+    """How briefly a fitted hypothesis describes the readings, each driven chain under its most likely noise.
 
     Args:
-        hypothesis: with its length, of all readings, with terms and correlated disturbances paid for.
+        context: of the identification.
+        hypothesis: with a fit; nothing is known of one that is not stable.
+
+    Attributes:
+        hypothesis: with its length, of all readings, with terms and correlated disturbances paid for: −2 log of their
+            likelihood, up to what is the same for all hypotheses of the same readings.
         chains: those that outputs drive, each under its most likely noise; none where the model diverges.
         gained: by how much the description is shorter than under the noise that the hypothesis had.
     """
 
-    hypothesis: Hypothesis
-    chains: tuple[Chain, ...] = ()
-    gained: float = 0.0
+    def __init__(self, context: Context, hypothesis: Hypothesis) -> None:
+        self.hypothesis, self.gained = hypothesis, 0.0
+        self.chains: list[Chain] = []
+        fit, length = hypothesis.fit, 0.0
+        if fit is None or not fit.stable:
+            return
+        problem = Problem(context, hypothesis)
+        for i, found in enumerate(hypothesis.sums):
+            chain = found.chain
+            likelihood = _Likelihood(context, hypothesis, i, problem.integration(chain))
+            period = context.signals.dt if chain.integrated else 1.0
+            white = max(1e-3 * float(chain.sensors[0]), likelihood.integration) / period
+            quiet = chain.with_noise(chain.sensors, (white, 0.0, chain.motion.correlation_time))
+            begun = [quiet, chain] if chain.motion.correlated else [quiet]
+            likely, least = shortest([likelihood.climbed(one) for one in begun], lambda pair: pair[1])
+            self.chains.append(likely)
+            length += least + priced(
+                hypothesis.pool, list(found.weights), likelihood.readings, len(hypothesis.runs)
+            )
+            self.gained += likelihood(chain) - least
+        self.hypothesis = replace(hypothesis, fit=replace(fit, length=length))
 
     @property
     def under_noise(self) -> Hypothesis:
@@ -55,38 +74,6 @@ class Described:
         return replace(self.hypothesis, sums=tuple(replace(sum_, chain=chain) for sum_, chain in pairs))
 
 
-def described(context: Context, hypothesis: Hypothesis) -> Described:
-    """How briefly a fitted hypothesis describes the readings, each driven chain under its most likely noise.
-
-    Args:
-        context: of the identification.
-        hypothesis: with a fit; nothing is known of one that is not stable.
-
-    Returns:
-        Lengths of −2 log likelihood, up to what is the same for all hypotheses of the same readings.
-    """
-    fit = hypothesis.fit
-    if fit is None or not fit.stable:
-        return Described(hypothesis)
-    chains, length, before = [], 0.0, 0.0
-    problem = posed(context, hypothesis)
-    for i, found in enumerate(hypothesis.sums):
-        chain = found.chain
-        likelihood = _Likelihood(context, hypothesis, i, problem.integration(chain))
-        period = context.signals.dt if chain.integrated else 1.0
-        white = max(1e-3 * float(chain.sensors[0]), likelihood.integration) / period
-        quiet = chain.with_noise(chain.sensors, (white, 0.0, chain.motion.correlation_time))
-        begun = [quiet, chain] if chain.motion.correlated else [quiet]
-        likely, least = shortest([likelihood.climbed(one) for one in begun], lambda pair: pair[1])
-        chains.append(likely)
-        length += least + priced(
-            hypothesis.pool, list(found.weights), likelihood.readings, len(hypothesis.runs)
-        )
-        before += likelihood(chain) - least
-    return Described(replace(hypothesis, fit=replace(fit, length=length)), tuple(chains), before)
-
-
-@dataclass(frozen=True, eq=False)
 class _Likelihood:
     """−2 log of the likelihood of one driven chain's innovations, with what a correlated disturbance must gain.
 
@@ -98,45 +85,25 @@ class _Likelihood:
             told from that.
     """
 
-    context: Context
-    hypothesis: Hypothesis
-    i: int
-    integration: float
-
-    @property
-    def states(self) -> list[int]:
-        """Of the chain."""
-        return list(self.hypothesis.sums[self.i].chain.states)
-
-    @cached_property
-    def counted(self) -> Sequence[Floats]:
+    def __init__(self, context: Context, hypothesis: Hypothesis, i: int, integration: float) -> None:
+        self.context, self.hypothesis, self.i, self.integration = context, hypothesis, i, integration
+        chain, dt = hypothesis.sums[i].chain, context.signals.dt
+        self.states = list(chain.states)
+        self.counted = [run.weights[:, self.states] for run in hypothesis.runs]
         """Weights of the chain's readings, of each run."""
-        return [run.weights[:, self.states] for run in self.hypothesis.runs]
-
-    @cached_property
-    def bounds(self) -> tuple[Floats, Floats]:
+        self.readings = int(sum(weights.sum() for weights in self.counted))
+        sensors, motion = floor_of(chain, dt, integration)
+        longest = dt * max(len(weights) for weights in self.counted) / FORGOTTEN
+        most = np.array([*[np.inf] * (len(sensors) + 2), longest])
+        self.bounds = np.concatenate([sensors, motion]), most
         """Least and greatest numbers of the chain's noise that are believed: its sensors', then what disturbs it."""
-        sensors, motion = floor_of(
-            self.hypothesis.sums[self.i].chain, self.context.signals.dt, self.integration
-        )
-        longest = self.context.signals.dt * max(len(weights) for weights in self.counted) / FORGOTTEN
-        return np.concatenate([sensors, motion]), np.array([*[np.inf] * (len(sensors) + 2), longest])
-
-    @property
-    def readings(self) -> int:
-        """That count."""
-        return int(sum(weights.sum() for weights in self.counted))
-
-    @cached_property
-    def readings_alone(self) -> _core.Regression:
-        """The readings alone: of a likelihood they know the determinant, which is that of the kinematics."""
-        states, chain = self.states, self.hypothesis.sums[self.i].chain
         records = []
-        for run, weights in zip(self.hypothesis.runs, self.counted, strict=True):
+        for run, weights in zip(hypothesis.runs, self.counted, strict=True):
             nothing = np.zeros((len(weights) - 1, 1))
-            records.append((run.states[:, states], weights, nothing, nothing, nothing))
+            records.append((run.states[:, self.states], weights, nothing, nothing, nothing))
         with engine_input():
-            return _core.Regression(len(states), self.context.signals.dt, chain.form, records)
+            self.readings_alone = _core.Regression(len(self.states), dt, chain.form, records)
+        """The readings alone: of a likelihood they know the determinant, which is that of the kinematics."""
 
     def __call__(self, chain: Chain) -> float:
         fit = self.hypothesis.fit
@@ -154,20 +121,7 @@ class _Likelihood:
         return squares + determinant + disturbance * (chain.motion.correlated > 0.0)
 
     def climbed(self, chain: Chain) -> tuple[Chain, float]:
-        """The most likely noise that is reached from a chain's by changing one number at a time."""
-        best, length = chain, self(chain)
-        numbers = range(len(self.states) + (3 if chain.motion.correlated else 1))
-        for step in STEPS:
-            while True:
-                before = length
-                for number in numbers:
-                    best, length = self._along(best, length, number, step)
-                if not length < before:
-                    break
-        return best, length
-
-    def _along(self, chain: Chain, length: float, number: int, step: float) -> tuple[Chain, float]:
-        """A chain with one number of its noise, first of its sensors, changed by a factor for as long as that gains.
+        """The most likely noise that is reached from a chain's by changing one number at a time.
 
         It stays above what is believed, and a disturbance lasts no longer than records show.
 
@@ -175,18 +129,32 @@ class _Likelihood:
             The chain, and its length.
         """
         sensors, (low, high) = len(self.states), self.bounds
-        for factor in (1.0 / step, step):
-            best, least, numbers = chain, length, np.concatenate([chain.sensors, chain.motion])
+
+        def along(chain: Chain, length: float, number: int, step: float) -> tuple[Chain, float]:
+            """One number of the noise, first of its sensors, changed by a factor for as long as that gains."""
+            for factor in (1.0 / step, step):
+                best, least, numbers = chain, length, np.concatenate([chain.sensors, chain.motion])
+                while True:
+                    numbers[number] *= factor
+                    if not low[number] <= numbers[number] <= high[number]:
+                        break
+                    white, correlated, time = numbers[sensors:].tolist()
+                    variant = chain.with_noise(numbers[:sensors].copy(), (white, correlated, time))
+                    other = self(variant)
+                    if not other < least - MOVE:
+                        break
+                    best, least = variant, other
+                if least < length:
+                    return best, least
+            return chain, length
+
+        best, length = chain, self(chain)
+        numbers = range(sensors + (3 if chain.motion.correlated else 1))
+        for step in STEPS:
             while True:
-                numbers[number] *= factor
-                if not low[number] <= numbers[number] <= high[number]:
+                before = length
+                for number in numbers:
+                    best, length = along(best, length, number, step)
+                if not length < before:
                     break
-                white, correlated, time = numbers[sensors:].tolist()
-                variant = chain.with_noise(numbers[:sensors].copy(), (white, correlated, time))
-                other = self(variant)
-                if not other < least - MOVE:
-                    break
-                best, least = variant, other
-            if least < length:
-                return best, least
-        return chain, length
+        return best, length

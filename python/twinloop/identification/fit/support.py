@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
 from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.description import shortest
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.bounds import bounded_solution, excludes_zero
 
@@ -39,7 +39,7 @@ def supported(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     if hypothesis.form == "absolute" or not any(pool[node].operation == "max" for node in used):
         return hypothesis
     placed = settled(hypothesis)
-    problem = posed(context, placed)
+    problem = Problem(context, placed)
     sums = tuple(borne(problem, found) for found in placed.sums)
     if all(new is old for new, old in zip(sums, placed.sums, strict=True)):
         return hypothesis
@@ -64,11 +64,15 @@ def borne(problem: Problem, found: Sum) -> Sum:
     limits = problem.limits(found.chain, terms)
     must = {i for i, bounds in limits.items() if excludes_zero(bounds)}
     kept, weights = list(range(len(terms))), None
+
+    def without(i: int) -> tuple[Floats, float] | None:
+        subset = [j for j in kept if j != i]
+        solved = gram.solve(subset)
+        return None if solved is None else bounded_solution(solved, subset, limits)
+
     while len(rare) > _bearable(rows, rare) and (droppable := [i for i in rare if i not in must]):
         # Where the readings cannot even tell apart what is left, the last goes.
-        fewer = [
-            (i, bounded_solution(gram, [j for j in kept if j != i], limits)) for i in reversed(droppable)
-        ]
+        fewer = [(i, without(i)) for i in reversed(droppable)]
         dropped, weights = shortest(fewer, lambda one: np.inf if one[1] is None else one[1][1])
         kept, rare = [j for j in kept if j != dropped], [j for j in rare if j != dropped]
     if weights is None:

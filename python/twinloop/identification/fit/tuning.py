@@ -13,7 +13,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.models import layout, limits_of
 from twinloop.identification.hypothesis import Fit, Hypothesis
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.terms.bounds import bounded_model
+from twinloop.identification.terms.bounds import beyond, bounded_model
 from twinloop.law.actuation import Actuation
 from twinloop.signals import Signals
 
@@ -66,19 +66,20 @@ def tune(
                 unit=context.unit.part(number, turn).named("members") if draws else None,
                 workers=context.workers,
             )
-        model, beyond = bounded_model(tuned, limits)
+        outside = beyond(tuned, limits)
+        model = bounded_model(tuned, limits) if outside else tuned
         endless: set[int] = set()
         if actuation.hidden:
             model, endless = _forgetting(model, signals, longest)
-        if not beyond and not endless:
+        if not outside and not endless:
             break
-        held |= beyond
+        held |= outside
         lags = [group for group in lags if endless.isdisjoint(group)]
     if covariance.size:
         for place in (place for place, constant in enumerate(free) if constant in held):
             covariance = np.insert(np.insert(covariance, place, 0.0, axis=0), place, 0.0, axis=1)
     fit = Fit(tuned, tuple(observer), chi_squared, readings, covariance)
-    return fit, [bounded_model(one, limits)[0] for one in drawn]
+    return fit, [bounded_model(one, limits) for one in drawn] if limits else drawn
 
 
 def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals) -> list[list[int]]:

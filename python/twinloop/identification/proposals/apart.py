@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
+from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import climbed, from_both_sides
@@ -30,8 +30,8 @@ def apart(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     for group in lagging:
         split = replace(hypothesis, alike=one_by_one(hypothesis.alike, group), fit=None)
         found = [fitted(context, each) for each in (split, *_undelayed(context, split, group))]
-        own = strongest(found)
-        if own.evidence.beats(hypothesis.evidence):
+        own = max(found, key=by_evidence)
+        if own.evidence > hypothesis.evidence:
             again = replace(own, fit=None)
             yield fitted(context, climbed(context, from_both_sides(context, again, again.sums)))
 

@@ -8,8 +8,10 @@ from dataclasses import replace
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.selection import from_below, from_both_sides, posed
-from twinloop.identification.sensors.noise import still
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.search.structure import search
+from twinloop.identification.sensors.noise import first_noise, still
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, entered, hinges
 from twinloop.law.actuation import Actuation
@@ -23,7 +25,7 @@ def contacts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     options = context.options
     if not (options.contacts and options.libraries) or hypothesis.fit is None:
         return
-    problem = posed(context, hypothesis)
+    problem = Problem(context, hypothesis)
     quiet = still(problem, (found.chain for found in hypothesis.sums))
     # A hinge would evade the bounds of what it is made of.
     if problem.priors.bounds or (quiet and hypothesis.fit.stable):
@@ -51,10 +53,10 @@ def _screened(context: Context, hypothesis: Hypothesis, every: Sequence[Hinge]) 
     grown = hypothesis.candidates.growing()
     places = {entered(grown.pool, hinge, len(every)): hinge for hinge in every}
     tried = replace(hypothesis, candidates=grown.with_terms(places), fit=None)
-    driven = [found.chain for found in tried.sums]
-    sums = from_below(
-        context, tried, posed(context, tried), driven, tried.sums, moves=context.options.moves // 4, starts=1
-    )
+    problem, options, first = Problem(context, tried), context.options, tried.candidates.ladder[0]
+    below = [first_noise(problem, found.chain, first, options.gusts) for found in tried.sums]
+    walks = context.walks(tried.next_unit(context.unit), options.moves // 4)
+    sums = search(problem, below, first, tried.sums, walks)
     near = (subset for found in sums for subset, above in found.subsets if above < NEAR)
     return [
         places[term] for term in dict.fromkeys(term for subset in near for term in subset) if term in places

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
+from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.alternation import by_innovations
 from twinloop.identification.fit.fitting import fitted, with_fit
 from twinloop.identification.fit.models import model_of
@@ -21,7 +21,6 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.second_look import looked_again
 from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import posed
 from twinloop.identification.search.structure import Sum, priced, prices
 from twinloop.identification.sensors.noise import RIDGE, calm, still
 from twinloop.identification.terms.friction import entered, frictions, frictions_in
@@ -41,7 +40,7 @@ def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     options, fit = context.options, hypothesis.fit
     if not (options.friction and options.libraries) or fit is None or not fit.stable:
         return
-    problem = posed(context, hypothesis)
+    problem = Problem(context, hypothesis)
     # Friction would evade the bounds of the speed that it is made of.
     if problem.priors.bounds or hypothesis.form == "absolute":
         return
@@ -58,7 +57,7 @@ def friction(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     found = [other for other in (_with_friction(context, base) for base in bases) if _rubs(other)]
     if not found:
         return
-    best = strongest(found)
+    best = max(found, key=by_evidence)
     if not _rubs(hypothesis):
         given = by_innovations(context, hypothesis)
         if not shorter(best.evidence.length + WORTH, given.evidence.length):
@@ -101,7 +100,7 @@ def _with_one_more(context: Context, hypothesis: Hypothesis) -> Hypothesis:
     best = hypothesis
     for i, known in enumerate(hypothesis.sums):
         grown = replace(best, candidates=best.candidates.growing())
-        problem = posed(context, grown)
+        problem = Problem(context, grown)
         if calm(problem, known.chain) is not known.chain:
             nodes = _promising(context, grown, i, _offered(context, problem, known))
             tuned = [_tuned(context, problem, grown, i, node) for node in nodes]

@@ -16,9 +16,10 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
+from twinloop.identification.evidence import by_evidence
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import Sum, search
 from twinloop.identification.terms.candidates import Candidates
 from twinloop.identification.terms.directions import Direction, directions, together
@@ -39,7 +40,7 @@ def hidden(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     context.watch("hidden")
     found = filled_by_commands(context, hypothesis, hypothesis.sums)
     # Looking anew at the noise behind it is dear: only where it is believed.
-    if found.evidence.beats(hypothesis.evidence):
+    if found.evidence > hypothesis.evidence:
         yield from_both_sides(context, found, found.sums)
 
 
@@ -53,7 +54,7 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
     """
     signals, options = context.signals, context.options
     candidates = hypothesis.candidates.growing()
-    enter_directions(candidates.pool, directions(posed(context, hypothesis), start, signals))
+    enter_directions(candidates.pool, directions(Problem(context, hypothesis), start, signals))
     base = replace(hypothesis, candidates=candidates)
     driven = [found.chain for found in start]
     own = [term for found in start for term in found.weights]
@@ -63,7 +64,7 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
     def tried(state: HiddenState) -> Hypothesis:
         behind = replace(base, actuation=replace(base.actuation, hidden=(state,)), fit=None)
         walks = context.walks(unit.part(next(number)), options.moves // 10, purpose="hidden_subsets")
-        sums = search(posed(context, behind), driven, few, start, walks)
+        sums = search(Problem(context, behind), driven, few, start, walks)
         return replace(behind, sums=tuple(sums))
 
     longest = signals.dt * max(len(run.commands) for run in hypothesis.runs)
@@ -75,12 +76,12 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
         for rest in rests
     ]
     found = [tried(state) for state in (*states, *_known(context, hypothesis))]
-    (state,) = strongest(found).actuation.hidden
+    (state,) = max(found, key=by_evidence).actuation.hidden
     found += [tried(state._replace(time=time * longest)) for time in (TIMES[0], TIMES[2])]
-    best = strongest(found)
+    best = max(found, key=by_evidence)
     # Which one shows on the terms that there are; whether there is one, when all may change.
     walks = context.walks(unit.part(0), options.moves, max(1, options.starts // 2), "hidden_subsets")
-    sums = search(posed(context, best), driven, many, best.sums, walks)
+    sums = search(Problem(context, best), driven, many, best.sums, walks)
     return replace(best, sums=tuple(sums), candidates=with_hidden(context, best.candidates))
 
 

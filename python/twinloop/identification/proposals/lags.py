@@ -11,9 +11,10 @@ from dataclasses import replace
 
 from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
+from twinloop.identification.evidence import by_evidence
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search
 from twinloop.identification.sensors.noise import still
 from twinloop.law.actuation import Actuation, Actuator, one_by_one
@@ -64,14 +65,14 @@ def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothes
     """
     for group in best.alike:
         several = context.options.apart and 1 < len(group) <= FEW
-        if not several or still(posed(context, best), (found.chain for found in best.sums)):
+        if not several or still(Problem(context, best), (found.chain for found in best.sums)):
             continue
         split = replace(best, alike=one_by_one(best.alike, group))
         trial = _trials(context, split, number)
         own = trial(best.actuation)
         for i in group:
             own = _searched(context, trial, own, (i,))
-        best = strongest([best, own])
+        best = max([best, own], key=by_evidence)
     return best
 
 
@@ -84,7 +85,7 @@ def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int]) -> 
         behind = replace(hypothesis, actuation=actuation)
         walks = context.walks(unit.part(next(number)), context.options.moves // 4)
         terms, nothing = behind.candidates.ladder[0], [None] * len(driven)
-        sums = search(posed(context, behind), driven, terms, nothing, walks)
+        sums = search(Problem(context, behind), driven, terms, nothing, walks)
         return replace(behind, sums=tuple(sums))
 
     return trial
@@ -102,7 +103,7 @@ def _best_lag(
     lag, worse = None if delay else 0.0, 0
     for tried in LAGS if delay else LAGS[1:]:
         other = _at(context, trial, best, group, delay, tried)
-        if other.evidence.beats(found.evidence):
+        if other.evidence > found.evidence:
             found, lag, worse = other, tried, 0
         else:
             worse += lag != 0.0
@@ -113,7 +114,7 @@ def _best_lag(
     if lag:
         # Of the steps of the grid one is larger than a period of delay, which would stand in for a lag between them.
         several += [_at(context, trial, best, group, delay, lag * by) for by in (1.0 / FINER, FINER)]
-    return strongest(several)
+    return max(several, key=by_evidence)
 
 
 def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[int]) -> Hypothesis:
@@ -122,11 +123,11 @@ def _longer(context: Context, trial: Trial, best: Hypothesis, group: Sequence[in
         at_it: Hypothesis | None = None
         for lag in (lag for lag in reversed(LAGS) if lag * context.signals.dt <= now.lag):
             tried = _at(context, trial, best, group, now.delay + 1, lag)
-            if at_it is not None and strongest([at_it, tried]) is at_it:
+            if at_it is not None and max([at_it, tried], key=by_evidence) is at_it:
                 break
             at_it = tried
         assert at_it is not None  # a lag of 0 is always tried
-        found = strongest([best, at_it])
+        found = max([best, at_it], key=by_evidence)
         if found is best:
             return best
         best = found
@@ -137,7 +138,7 @@ def _without(trial: Trial, best: Hypothesis) -> Hypothesis:
     """The best so far, or a better one in which groups act at once that stood in for those searched after them."""
     lagging = [group for group in best.alike if not best.actuation.actuators[group[0]].direct]
     for group in lagging if len(lagging) > 1 else ():
-        best = strongest([best, trial(best.actuation.at_once(group))])
+        best = max([best, trial(best.actuation.at_once(group))], key=by_evidence)
     return best
 
 
@@ -145,10 +146,11 @@ def _at(
     context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], delay: int, lag: float
 ) -> Hypothesis:
     """The hypothesis behind the best actuators so far, those of a group with this delay and lag: the better rest."""
-    return strongest(
+    several = (
         trial(_with(best.actuation, group, lag, delay, rest, context.signals))
         for rest in (None, *context.rests)
     )
+    return max(several, key=by_evidence)
 
 
 def _with(

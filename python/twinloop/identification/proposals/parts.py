@@ -13,7 +13,8 @@ from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Run
 from twinloop.identification.search.description import shortest
-from twinloop.identification.search.selection import climbed, from_both_sides, posed
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import climbed, from_both_sides
 from twinloop.identification.search.structure import search
 from twinloop.identification.starts import PARTS, begun
 from twinloop.law.actuation import Actuation
@@ -44,7 +45,7 @@ def parts(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         own = [term for sum_ in part.sums for term in sum_.weights]
         walks = context.walks(whole.next_unit(context.unit), brief.options.moves // 4)
         driven = [sum_.chain for sum_ in part.sums]
-        sums = search(posed(context, whole), driven, own, part.sums, walks)
+        sums = search(Problem(context, whole), driven, own, part.sums, walks)
         tried = whole.searched(sums)
         whole = replace(whole, searches=tried.searches)
         answer = replace(fitted(context, tried), of_part=True)

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator
 
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
+from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
@@ -29,7 +29,7 @@ def second_look(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis
         context.watch("smoothed")
         again = climbed(context, again, brief=True)
         if look == 1 and context.may_hide and not again.actuation.stored:
-            again = strongest([again, filled_by_commands(context, again, latest.sums)])
+            again = max([again, filled_by_commands(context, again, latest.sums)], key=by_evidence)
         latest = fitted(context, again)
         yield latest
         if not latest.evidence.stable:

@@ -16,13 +16,14 @@ import numpy as np
 from twinloop._ground.elementary import power
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import strongest
+from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.hidden import filled, with_hidden, without_hidden
 from twinloop.identification.records import Stages, stages
-from twinloop.identification.search.selection import from_both_sides, posed
+from twinloop.identification.search.problem import Problem
+from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search
 from twinloop.identification.sensors.noise import still
 from twinloop.law.actuation import Actuation, HiddenState, alike_commands
@@ -57,7 +58,7 @@ def storage(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with the best hidden states that motion fills, fitted; none where only noise is left."""
     if not context.may_store or hypothesis.fit is None or hypothesis.form not in DERIVATIVES:
         return
-    problem = posed(context, hypothesis)
+    problem = Problem(context, hypothesis)
     quiet = still(problem, (found.chain for found in hypothesis.sums))
     # A storage would evade the bounds of what fills it.
     if problem.priors.bounds or (quiet and hypothesis.fit.stable) or hypothesis.actuation.stored:
@@ -101,11 +102,12 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
     times = [share * longest for share in TIMES]
     singles = {
         begins: [
-            strongest([screen(one) for one in _single(place, begins, times)]) for place in _sources(context)
+            max([screen(one) for one in _single(place, begins, times)], key=by_evidence)
+            for place in _sources(context)
         ]
         for begins in (False, True)
     }
-    best = [strongest(pair) for pair in zip(*singles.values(), strict=True)]
+    best = [max(pair, key=by_evidence) for pair in zip(*singles.values(), strict=True)]
     near, without = sorted(best, key=lambda one: one.evidence.length)[:NEAR], screen(())
     others = [one.actuation.hidden[0].states[0] for one in near]
     kinds: list[tuple[_Screen, list[Hypothesis], Sequence[float]]]
@@ -124,15 +126,15 @@ def filled_by_motion(context: Context, hypothesis: Hypothesis) -> Iterator[Hypot
     showing = [
         (of_kind, found, factors)
         for of_kind, found, factors in (
-            (each, strongest(several), factors) for each, several, factors in kinds if several
+            (each, max(several, key=by_evidence), factors) for each, several, factors in kinds if several
         )
-        if found.evidence.beats(without.evidence)
+        if found.evidence > without.evidence
     ]
     # Which one shows on the terms that there are; whether there is one, when all may change.
     bare = _with_all_terms(context, screen, without) if showing else without
     for of_kind, found, factors in showing:
         grown = _with_all_terms(context, of_kind, _timed(of_kind, found, factors))
-        if grown.evidence.beats(bare.evidence):
+        if grown.evidence > bare.evidence:
             yield grown
 
 
@@ -154,7 +156,7 @@ def _timed(screen: _Screen, best: Hypothesis, factors: Sequence[float]) -> Hypot
                 beside += [
                     screen(tuple(one._replace(turns=one.turns * share) for one in hidden)) for share in by
                 ]
-            found = strongest([best, *beside])
+            found = max([best, *beside], key=by_evidence)
             if found is best:
                 break
             best = found
@@ -169,7 +171,7 @@ def _with_all_terms(context: Context, screen: _Screen, found: Hypothesis) -> Hyp
     walks = context.walks(unit, context.options.moves, starts, "hidden_subsets")
     grown = replace(found, candidates=candidates)
     driven = [one.chain for one in found.sums]
-    sums = search(posed(context, grown), driven, candidates.ladder[0], found.sums, walks)
+    sums = search(Problem(context, grown), driven, candidates.ladder[0], found.sums, walks)
     return replace(grown, sums=tuple(sums))
 
 
@@ -229,7 +231,7 @@ class _Screen:
             self.unit.part(next(self.numbers)), context.options.moves // 25, purpose="hidden_subsets"
         )
         driven = [found.chain for found in bare.sums]
-        problem = posed(context, tried, inputs)
+        problem = Problem(context, tried, inputs)
         sums = search(problem, driven, terms, list(bare.sums), walks, fixed_noise=True)
         return replace(tried, sums=tuple(sums))
 

@@ -3,57 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
-from twinloop.identification.records import Run, Stages
+from twinloop.identification.records import Stages, stages
+from twinloop.identification.search.poles import room
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.terms.pool import Pool
-from twinloop.identification.terms.priors import Priors
 from twinloop.signals import Bounds
+
+if TYPE_CHECKING:
+    from twinloop.identification.context import Context
+    from twinloop.identification.hypothesis import Hypothesis
 
 Columns = Floats
 """Values at the start, the middle and the end of each period (3, rows, p)."""
 
 
 class Problem:
-    """Readings of all runs and the inputs within each period; makes regressions of terms.
+    """The regressions that a hypothesis poses: readings of its runs, and what its law sees within each period.
 
     Args:
-        pool: of all expressions.
-        runs: recorded.
-        stages: their inputs within each period.
-        dt: period, s.
-        workers: how the work is carried out.
-        priors: what is known of the law.
-        as_integrated: whether chains that step bear what integration leaves, too: where forms are compared, what a
-            derivative could not show is no evidence for them.
-        room: bounds of each state within which a denominator must not vanish; empty: wherever the runs were.
+        context: of the identification.
+        hypothesis: whose pool the terms are of.
+        inputs: the same for another hypothesis of the same runs and actuation, if they are there already.
     """
 
-    def __init__(
-        self,
-        pool: Pool,
-        runs: Sequence[Run],
-        stages: Stages,
-        dt: float,
-        workers: _core.Workers,
-        priors: Priors,
-        as_integrated: bool = False,
-        room: Sequence[Bounds] = (),
-    ) -> None:
-        self.priors = priors
-        self.as_integrated = as_integrated
-        self.room = room
-        self.pool = pool
-        self.runs = runs
-        self.stages = stages
-        self.dt = dt
-        self.workers = workers
-        self._values: dict[int, tuple[Floats, Floats, Floats]] = {}
+    def __init__(self, context: Context, hypothesis: Hypothesis, inputs: Stages | None = None) -> None:
+        signals = context.signals
+        self.pool, self.runs = hypothesis.pool, hypothesis.runs
+        self.stages = stages(self.runs, signals, hypothesis.actuation) if inputs is None else inputs
+        self.dt, self.workers = signals.dt, context.workers
+        self.priors = hypothesis.candidates.priors
+        self.as_integrated = context.as_integrated
+        self.room = room(signals, self.stages.start[:, : signals.n_x])
+        """Bounds of each state within which a denominator must not vanish."""
+        self._values: dict[int, Floats] = {}
         self._feedthrough: dict[tuple[int, int], Floats] = {}
         self._usable: set[int] = set()
 
@@ -67,18 +55,18 @@ class Problem:
                 self.pool.values(new, s) for s in (self.stages.start, self.stages.middle, self.stages.end)
             ]
             for i, term in enumerate(new):
-                columns = tuple(np.ascontiguousarray(stage[:, i]) for stage in stages)
-                self._values[term] = columns  # type: ignore[assignment]
-                if all(np.abs(column).max() < 1e100 for column in columns):
+                self._values[term] = np.array([stage[:, i] for stage in stages])
+                if np.abs(self._values[term]).max() < 1e100:
                     self._usable.add(term)
         return [term for term in terms if term in self._usable]
 
     def values(self, terms: Sequence[int]) -> Columns:
         """Of terms that were found usable, at the start, the middle and the end of each period (3, rows, terms)."""
-        found = np.empty((3, len(self.stages.start), len(terms)))
-        for place, term in enumerate(terms):
-            found[:, :, place] = self._values[term]
-        return found
+        return (
+            np.stack([self._values[term] for term in terms], axis=-1)
+            if terms
+            else np.empty((3, len(self.stages.start), 0))
+        )
 
     def regression(self, chain: Chain, columns: Columns, taken: Columns | None = None) -> _core.Regression:
         """Of one chain on features, once what is known is taken out of its readings.

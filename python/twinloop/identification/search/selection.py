@@ -13,61 +13,12 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.joints import with_joints
-from twinloop.identification.search.poles import room
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.structure import Sum, search
-from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import calm, first_noise, unexplained
 from twinloop.identification.terms.directions import directions
 from twinloop.identification.terms.evolution import evolve
-
-
-def posed(context: Context, hypothesis: Hypothesis, inputs: Stages | None = None) -> Problem:
-    """The regressions that a hypothesis poses: its runs, and what its law sees within each period.
-
-    Args:
-        context: of the identification.
-        hypothesis: whose pool the terms are of.
-        inputs: the same for another hypothesis of the same runs and actuation, if they are there already.
-    """
-    if inputs is None:
-        inputs = stages(hypothesis.runs, context.signals, hypothesis.actuation)
-    return Problem(
-        hypothesis.pool, hypothesis.runs, inputs, context.signals.dt, context.workers, hypothesis.candidates.priors,
-        context.as_integrated, room(context.signals, inputs.start[:, : context.signals.n_x]),
-    )  # fmt: skip
-
-
-def from_below(
-    context: Context,
-    hypothesis: Hypothesis,
-    problem: Problem,
-    driven: Sequence[Chain],
-    known: Sequence[Sum | None],
-    *,
-    moves: int,
-    starts: int,
-) -> list[Sum]:
-    """Sums of the first rung's terms, begun with the noise that a fit of all of them leaves.
-
-    Args:
-        context: of the identification.
-        hypothesis: whose terms of the first rung are searched.
-        problem: that it poses.
-        driven: chains, each with a guess of its sensors' noise.
-        known: for each chain a sum that is already known, or None; the answer is never worse.
-        moves: of each walk.
-        starts: walks for each chain.
-
-    Returns:
-        A sum for each chain.
-    """
-    terms = hypothesis.candidates.ladder[0]
-    usable = problem.usable(terms)
-    below = [first_noise(problem, chain, usable, context.options.gusts) for chain in driven]
-    walks = context.walks(hypothesis.next_unit(context.unit), moves, starts)
-    return search(problem, below, terms, known, walks)
 
 
 def from_both_sides(
@@ -83,13 +34,11 @@ def from_both_sides(
         hypothesis: whose terms of the first rung are searched.
         known: sums that are known, from which only the search from below begins; None: none are.
     """
-    options, problem = context.options, posed(context, hypothesis)
+    options, problem = context.options, Problem(context, hypothesis)
     terms, nothing = hypothesis.candidates.ladder[0], [None] * len(hypothesis.driven)
-    low = hypothesis.searched(
-        from_below(
-            context, hypothesis, problem, hypothesis.driven, known or nothing, moves=options.moves, starts=2
-        )
-    )
+    below = [first_noise(problem, chain, terms, options.gusts) for chain in hypothesis.driven]
+    walks = context.walks(hypothesis.next_unit(context.unit), options.moves, starts=2)
+    low = hypothesis.searched(search(problem, below, terms, known or nothing, walks))
     if not options.noise_from_above:
         return replace(low, from_above=low.sums)
     above = [unexplained(problem, chain, options.gusts) for chain in hypothesis.driven]
@@ -111,11 +60,11 @@ def climbed(context: Context, hypothesis: Hypothesis, brief: bool = False) -> Hy
     options, climber = context.options, hypothesis
     inputs = stages(climber.runs, context.signals, climber.actuation)
     if options.libraries and options.directions and not brief:
-        found = directions(posed(context, climber, inputs), climber.sums, context.signals)
+        found = directions(Problem(context, climber, inputs), climber.sums, context.signals)
         states = range(context.signals.n_x)
         climber = replace(climber, candidates=climber.candidates.with_directions(found, states))
     climber = replace(climber, candidates=climber.candidates.growing())
-    problem, ladder = posed(context, climber, inputs), climber.candidates.ladder
+    problem, ladder = Problem(context, climber, inputs), climber.candidates.ladder
     for number, terms in enumerate((ladder[:1] if brief else ladder) if options.libraries else ()):
         starts = options.starts if number == 0 and not brief else max(1, options.starts // 2)
         walks = context.walks(climber.next_unit(context.unit), options.moves, starts)
@@ -149,7 +98,7 @@ def _with_implicit_laws(context: Context, hypothesis: Hypothesis, inputs: Stages
     if not (options.implicit and options.libraries) or compared:
         return hypothesis
     grown = replace(hypothesis, candidates=hypothesis.candidates.growing())
-    problem, signals = posed(context, grown, inputs), context.signals
+    problem, signals = Problem(context, grown, inputs), context.signals
     walks = context.walks(grown.next_unit(context.unit), options.moves // 2)
     sums = with_joints(problem, signals, grown.sums, walks) if context.may_couple else list(grown.sums)
     if again:
@@ -177,7 +126,7 @@ def undisturbed(context: Context, hypothesis: Hypothesis, least: float) -> Itera
     options, latest = context.options, hypothesis
     own = list(dict.fromkeys(node for found in hypothesis.sums for node in found.weights))
     for terms, moves in ((own, options.moves // 20), (hypothesis.candidates.ladder[-1], options.moves // 2)):
-        problem = posed(context, latest)
+        problem = Problem(context, latest)
         driven = [calm(problem, found.chain) for found in latest.sums]
         if all(quiet is found.chain for quiet, found in zip(driven, latest.sums, strict=True)):
             return

@@ -14,9 +14,9 @@ from twinloop._ground.elementary import log, power
 from twinloop.errors import engine_input
 from twinloop.identification.search.moderation import precisions
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.subsets import Judged, all_judged
+from twinloop.identification.search.subsets import Judge, Judged
 from twinloop.identification.search.walks import Subsets, Walks
-from twinloop.identification.sensors.chains import Chain
+from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.identification.sensors.noise import floor_of
 from twinloop.identification.terms.pool import Pool
 from twinloop.records import Record, Recorded, with_names
@@ -169,8 +169,12 @@ def search(
         if fixed_noise:
             break
         before = [one.chain for one in unsettled]
-        for one, chain in zip(unsettled, _noisy(problem, unsettled, len(usable)), strict=True):
-            one.chain = chain
+        with engine_input():
+            noises = _core.most_likely_noises([one.posed(problem) for one in unsettled], problem.workers)
+        for one, (sensors, motion, _) in zip(unsettled, noises, strict=True):
+            # Corrected for the degrees of freedom that were used.
+            readings, used = problem.readings(one.chain), len(one.subsets[0].features)
+            one.chain = one.chain.with_noise(sensors * readings / max(1.0, readings - used), motion)
         # Chains share nothing but their features: one whose noise has settled waits for no other.
         pairs = zip(unsettled, before, strict=True)
         unsettled = [one for one, chain in pairs if _differ(one.chain, chain, problem)]
@@ -202,6 +206,13 @@ class _Searched:
     def gram(self, workers: _core.Workers) -> _core.Gram:
         """Inner products under its noise."""
         return self.regression.gram(self.chain.sensors, self.chain.motion, workers).with_prior(self.prior)
+
+    def posed(self, problem: Problem) -> tuple[_core.Regression, Floats, Floats, Motion, Floats, Motion]:
+        """The noise under which what its best subset leaves is most likely, as a problem for the engine."""
+        chain = self.chain
+        coefficients = self.subsets[0].spread(len(self.costs))
+        floor = floor_of(chain, problem.dt, problem.integration(chain))
+        return self.regression, coefficients, chain.sensors, chain.motion, *floor
 
 
 def _walk_of(walks: Walks, round_: int, problem: Problem) -> Walk:
@@ -249,7 +260,7 @@ def _chosen(
         if one.known is not None and all(term in place for term in one.known.weights):
             subsets.append(tuple(sorted(place[term] for term in one.known.weights)))
         return sorted(
-            all_judged(gram, subsets, one.costs, problem.limits(one.chain, usable)),
+            Judge(gram, one.costs, problem.limits(one.chain, usable))(subsets),
             key=lambda found: (
                 found.length + RUNG * problem.pool.rung(usable[j] for j in found.features),
                 found.features,
@@ -290,27 +301,6 @@ def _feedthrough(problem: Problem, chain: Chain, usable: Sequence[int], judged: 
         return 0.0
     shares = problem.feedthrough(chain, [usable[j] for j in judged.features]).mean(axis=0)
     return float((shares * judged.weights).sum())
-
-
-def _noisy(problem: Problem, searched: Sequence[_Searched], terms: int) -> list[Chain]:
-    """The chains with the noise under which residuals are most likely, corrected for the degrees of freedom used."""
-    posed = [
-        (
-            one.regression,
-            one.subsets[0].spread(terms),
-            one.chain.sensors,
-            one.chain.motion,
-            *floor_of(one.chain, problem.dt, problem.integration(one.chain)),
-        )
-        for one in searched
-    ]
-    with engine_input():
-        noises = _core.most_likely_noises(posed, problem.workers)
-    noisy = []
-    for one, (sensors, motion, _) in zip(searched, noises, strict=True):
-        readings, used = problem.readings(one.chain), len(one.subsets[0].features)
-        noisy.append(one.chain.with_noise(sensors * readings / max(1.0, readings - used), motion))
-    return noisy
 
 
 def _differ(new: Chain, old: Chain, problem: Problem) -> bool:

@@ -33,43 +33,55 @@ class Judged:
         return coefficients
 
 
-def all_judged(
-    gram: _core.Gram, subsets: Sequence[tuple[int, ...]], costs: Floats, limits: Limits
-) -> list[Judged]:
-    """Least squares on subsets; where rounding leaves none of them a solution, on the largest parts that have one.
-
-    Terms whose bounds exclude 0 are in every subset, as far as the runs can tell those terms apart.
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Least squares on subsets of features.
 
     Args:
         gram: of the features.
-        subsets: of them.
         costs: of each feature, in units of χ².
         limits: bounds of coefficients, by feature.
-
-    Returns:
-        Those that have a solution.
     """
 
-    def judged(subset: tuple[int, ...]) -> Judged | None:
-        solved = bounded_solution(gram, subset, limits)
-        if solved is None:
-            return None
-        weights, chi_squared = solved
-        nothing = [j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in limits]
-        if nothing and len(nothing) < len(subset):
-            # A term that is held at 0 is no term.
-            return judged(tuple(j for j in subset if j not in nothing))
-        return Judged(subset, chi_squared + float(costs[list(subset)].sum()), weights)
+    gram: _core.Gram
+    costs: Floats
+    limits: Limits
 
-    bounded = [i for i, bounds in limits.items() if excludes_zero(bounds) and np.isfinite(costs[i])]
-    if must := _distinguishable(gram, bounded):
-        subsets = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
-        if all(gram.solve(list(subset)) is None for subset in subsets):
-            subsets.append(tuple(sorted(must)))
-    found = [judged(subset) for subset in dict.fromkeys(subsets)]
-    if not any(found):
-        found = [judged(part) for part in dict.fromkeys(_distinguishable(gram, each) for each in subsets)]
-    return [each for each in found if each]
+    def __call__(self, subsets: Sequence[tuple[int, ...]]) -> list[Judged]:
+        """Subsets as judged; where rounding leaves none of them a solution, the largest parts that have one.
+
+        Terms whose bounds exclude 0 are in every subset, as far as the runs can tell those terms apart.
+
+        Returns:
+            Those that have a solution.
+        """
+
+        def judged(subset: tuple[int, ...]) -> Judged | None:
+            solved = self.gram.solve(list(subset))
+            if solved is None:
+                return None
+            weights, _, chi_squared = solved
+            if self.limits:
+                weights, chi_squared = bounded_solution(solved, subset, self.limits)
+            held = [
+                j for j, weight in zip(subset, weights, strict=True) if weight == 0.0 and j in self.limits
+            ]
+            if held and len(held) < len(subset):
+                # A term that is held at 0 is no term.
+                return judged(tuple(j for j in subset if j not in held))
+            return Judged(subset, chi_squared + float(self.costs[list(subset)].sum()), weights)
+
+        bounds = self.limits.items()
+        needed = [i for i, each in bounds if excludes_zero(each) and np.isfinite(self.costs[i])]
+        if must := _distinguishable(self.gram, needed):
+            subsets = [s if set(must) <= set(s) else tuple(sorted({*s, *must})) for s in subsets]
+            if all(self.gram.solve(list(subset)) is None for subset in subsets):
+                subsets.append(tuple(sorted(must)))
+        found = [judged(subset) for subset in dict.fromkeys(subsets)]
+        if not any(found):
+            parts = dict.fromkeys(_distinguishable(self.gram, each) for each in subsets)
+            found = [judged(part) for part in parts]
+        return [each for each in found if each]
 
 
 def _distinguishable(gram: _core.Gram, subset: Iterable[int]) -> tuple[int, ...]:

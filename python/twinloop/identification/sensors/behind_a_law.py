@@ -18,7 +18,6 @@ from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.problem import Problem
-from twinloop.identification.search.selection import posed
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import RIDGE, floor_of
 from twinloop.identification.sensors.offsets import PRICE, moved
@@ -48,7 +47,7 @@ def that_hold(context: Context, hypothesis: Hypothesis, offsets: Floats) -> Floa
         lengths = []
         for tried in (held, without):
             runs = tuple(moved(context.runs, context.signals, tried))
-            problem = posed(context, replace(hypothesis, runs=runs))
+            problem = Problem(context, replace(hypothesis, runs=runs))
             lengths.append(sum(_length(problem, chain) for chain in touched))
         if not lengths[0] < lengths[1] - PRICE:
             held = without

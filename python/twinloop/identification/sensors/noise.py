@@ -200,19 +200,20 @@ def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: boo
     Args:
         problem: of the chain.
         chain: with a first guess of its sensors' noise.
-        terms: usable ones.
+        terms: of which the usable ones are fitted.
         gusts: whether disturbances may last.
 
     Returns:
         The chain with its noise estimated.
     """
-    regression = problem.regression(chain, problem.values(terms))
+    usable = problem.usable(terms)
+    regression = problem.regression(chain, problem.values(usable))
     low, slow = floor_of(chain, problem.dt, problem.integration(chain))
     sensors, motion = _begun(chain, low, slow, problem.dt, GUST if gusts else 0.0)
     readings = problem.readings(chain)
     for _ in range(2):
         gram = regression.gram(sensors, motion, problem.workers)
-        solved = gram.solve(list(range(len(terms))), RIDGE)
+        solved = gram.solve(list(range(len(usable))), RIDGE)
         if solved is None:
             break
         with engine_input():
@@ -220,7 +221,7 @@ def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: boo
                 [(regression, solved[0], sensors, motion, low, slow)], problem.workers
             )
         motion = Motion(*found)
-        used = min(len(terms), 0.7 * readings)
+        used = min(len(usable), 0.7 * readings)
         sensors = sensors * readings / (readings - used)
     return chain.with_noise(sensors, motion)
 

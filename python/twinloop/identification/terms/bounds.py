@@ -28,23 +28,22 @@ def within(value: float, bounds: Bounds) -> float:
     return min(max(value, bounds[0]), bounds[1])
 
 
-def bounded_solution(gram: _core.Gram, subset: Sequence[int], limits: Limits) -> tuple[Floats, float] | None:
+def bounded_solution(
+    solved: tuple[Floats, Floats, float], subset: Sequence[int], limits: Limits
+) -> tuple[Floats, float]:
     """Least squares on a subset of features, with some of the coefficients kept within bounds.
 
     Where a coefficient is moved to its bound, the others follow it along their covariance. The forces that hold
     coefficients there are the dual of a small quadratic program, found one after another (Hildreth 1957).
 
     Args:
-        gram: inner products.
+        solved: the least squares without bounds: coefficients, their covariance, χ².
         subset: features.
         limits: bounds of coefficients, by feature.
 
     Returns:
-        Coefficients and χ²; None where the features are collinear.
+        Coefficients and χ².
     """
-    solved = gram.solve(list(subset))
-    if solved is None:
-        return None
     weights, covariance, chi_squared = solved
     boxed = [(i, limits[j]) for i, j in enumerate(subset) if j in limits]
     if all(low <= weights[i] <= high for i, (low, high) in boxed):
@@ -99,22 +98,25 @@ def _held(solved: tuple[Floats, Floats, float], boxed: Limits, at: dict[int, flo
     return weights, chi_squared
 
 
-def bounded_model(model: _core.Model, limits: Limits) -> tuple[_core.Model, set[int]]:
-    """A model whose constants are within bounds, and which of them were not.
+def beyond(model: _core.Model, limits: Limits) -> set[int]:
+    """Places of the constants of a model that are not within their bounds.
 
     Args:
         model: any.
         limits: bounds by place among its constants.
-
-    Returns:
-        The model itself where nothing is beyond.
     """
     constants = model.constants.tolist()
-    beyond = {
-        place for place, bounds in limits.items() if constants[place] != within(constants[place], bounds)
-    }
-    if not beyond:
-        return model, beyond
-    for place in beyond:
+    return {place for place, bounds in limits.items() if constants[place] != within(constants[place], bounds)}
+
+
+def bounded_model(model: _core.Model, limits: Limits) -> _core.Model:
+    """A model whose constants are within bounds; the model itself where none is beyond.
+
+    Args:
+        model: any.
+        limits: bounds by place among its constants.
+    """
+    constants, outside = model.constants.tolist(), beyond(model, limits)
+    for place in outside:
         constants[place] = within(constants[place], limits[place])
-    return model.with_constants(constants, None), beyond
+    return model.with_constants(constants, None) if outside else model

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from twinloop._core import __version__
 from twinloop._ground.texts import one_line
-from twinloop.law.equations import equations
+from twinloop.law.equations import Equations
 from twinloop.law.expansion import Expansion, written
 from twinloop.law.exports.python_source import equation_roots, joined
 from twinloop.law.expressions import Expressions
@@ -135,7 +135,7 @@ def latex_source(law: Law, digits: int = 6) -> str:
     for place in range(law.inputs):
         target.input(place)
     expansion = Expansion(law.expressions, target)
-    roots = [written(target, expansion.polynomial(root)) for root in law.outputs]
+    roots = [written(target, expansion[root]) for root in law.outputs]
     writer = Writer(target, roots, [latex_name(symbol) for symbol in law.symbols], digits, "t_", False, LATEX)
     lines = [
         rf"  {name} &= {joined(writer.terms(number, define=True), ' ')}"
@@ -172,7 +172,7 @@ def latex_source(law: Law, digits: int = 6) -> str:
 
 def _notes(law: Law, digits: int) -> list[str]:
     """What belongs to the equations: conventions, actuators, hidden states."""
-    lines = equations(law, digits=digits).splitlines()
+    lines = str(Equations(law, digits=digits)).splitlines()
     filled = [
         line for line in lines if line.startswith(tuple(f"d {name} / dt" for name in law.hidden_symbols))
     ]
