@@ -53,21 +53,20 @@ impl Code {
         let shape = program.shape();
         let effect = program.effect();
         let mut constants = Vec::new();
-        let steps = program.instructions().zip(&effect.effective).filter(|(_, effective)| **effective);
-        let steps = steps.map(|(instruction, _)| Step {
-            operation: instruction.operation,
-            destination: instruction.destination,
-            first: instruction.first,
-            second: match instruction.second {
+        let mut steps: Vec<Step> = Vec::with_capacity(program.len());
+        let effective = program.instructions().zip(&effect.effective).filter(|(_, effective)| **effective);
+        for (instruction, _) in effective {
+            let second = match instruction.second {
                 None => instruction.first,
                 Some(Operand::Register(register)) => register,
                 Some(Operand::Constant(constant)) => {
                     constants.push(constant);
                     (shape.registers + constants.len() - 1) as u16
                 }
-            },
-        });
-        let steps = steps.collect();
+            };
+            let operands = [instruction.first, second];
+            steps.push(Step::new(instruction.operation, instruction.destination, operands, steps.last()));
+        }
         let live = |range: std::ops::Range<usize>| {
             range.filter(|&register| effect.live_at_start[register]).map(|register| register as u16).collect()
         };
@@ -112,7 +111,8 @@ impl Code {
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn run<'b, V: Vector>(&self, bank: &'b mut Bank<V>, inputs: &impl Inputs<V>) -> &'b [V] {
-        let Bank(registers) = bank;
+        // A slice: what is written to it cannot change where it lies.
+        let registers = &mut bank.0[..];
         for &register in &self.zeroed {
             registers[usize::from(register)] = V::splat(0.0);
         }
