@@ -85,8 +85,8 @@ impl Operation {
             Self::Add => a + b,
             Self::Sub => a - b,
             Self::Mul => a * b,
-            // Dividing by one keeps the bits of the dividend.
-            Self::Div => a / V::splat(SMALLEST_DIVISOR).select_less(b.abs(), b, V::splat(1.0)),
+            // The division does not wait for the answer whether it counts.
+            Self::Div => V::splat(SMALLEST_DIVISOR).select_less(b.abs(), a / b, a),
             Self::Min => a.select_less(b, a, b),
             Self::Max => b.select_less(a, a, b),
             Self::Sin => a.map(libm::sin),
