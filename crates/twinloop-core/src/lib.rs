@@ -91,7 +91,7 @@ pub use actuators::{Actuation, Actuator, checked_effects};
 pub use any_dynamics::{AnyDynamics, AnyWorkspace};
 pub use dynamics::{Dynamics, state_of};
 pub use hidden::Hidden;
-pub use integrator::{Field, Stages, rk4};
+pub use integrator::{Field, Slopes, Stages, rk4};
 pub use levels::Levels;
 pub use model::{Form, Frame, Model, OwnedModel, views};
 pub use plants::{Gyroscopic, Quadrotor};

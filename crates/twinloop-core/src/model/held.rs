@@ -3,7 +3,7 @@
 use super::Model;
 use super::frame::Slope;
 use crate::hidden::Storage;
-use crate::integrator::Field;
+use crate::integrator::{Field, Slopes};
 use crate::lanes::Vector;
 use crate::lgp::Bank;
 
@@ -21,17 +21,18 @@ const STAGES: [usize; 4] = [0, 1, 1, 2];
 
 impl<V: Vector> Field<V> for Held<'_, V> {
     #[inline(always)]
-    fn slope(&mut self, states: &[V], slope: &mut [V]) {
+    fn slope(&mut self, states: &[V], slopes: &mut Slopes<'_, V>) {
         let outputs = self.model.outputs(self.bank, self.storage, states, self.effects[STAGES[self.stage]]);
         self.stage += 1;
         let still = V::splat(0.0);
-        for (slope, source) in slope.iter_mut().zip(&self.model.frame.slopes) {
+        for (j, source) in self.model.frame.slopes.iter().enumerate() {
             // A place and not a value, which would go by way of the stack.
-            *slope = *match *source {
+            let slope = match *source {
                 Slope::State(rate) => &states[rate],
                 Slope::Output(output) => &outputs[output],
                 Slope::Turn => &still,
             };
+            slopes.put(j, *slope);
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::frame::Frame;
 use super::held::Held;
 use crate::attitude::{angles, quaternion, turning};
-use crate::integrator::{Field, Stages, rk4};
+use crate::integrator::{Field, Slopes, Stages, rk4};
 use crate::lanes::Vector;
 use crate::signals::RigidBody;
 
@@ -67,13 +67,15 @@ struct Turning<'a, V> {
 
 impl<V: Vector> Field<V> for Turning<'_, V> {
     #[inline(always)]
-    fn slope(&mut self, point: &[V], slope: &mut [V]) {
+    fn slope(&mut self, point: &[V], slopes: &mut Slopes<'_, V>) {
         let (states, attitude) = point.split_at(self.seen.len());
         self.seen.copy_from_slice(states);
         set_angles(self.seen, self.body, attitude, self.before);
-        self.field.slope(self.seen, slope);
+        self.field.slope(self.seen, slopes);
         let rates = self.body.rates.map(|rate| states[rate]);
-        set_turning(&mut slope[states.len()..], attitude, rates);
+        let mut turned = [V::splat(0.0); 4];
+        set_turning(&mut turned, attitude, rates);
+        slopes.put_all(states.len(), &turned);
     }
 }
 

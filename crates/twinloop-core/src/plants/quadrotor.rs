@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use crate::dynamics::Dynamics;
 use crate::error::{Error, Result, invalid};
-use crate::integrator::{Field, Stages, rk4};
+use crate::integrator::{Field, Slopes, Stages, rk4};
 use crate::lanes::{Scalar, Vector, scalars, zeros};
 use crate::signals::Signals;
 
@@ -178,8 +178,10 @@ struct Held<'a, V: Vector> {
 
 impl<V: Vector> Field<V> for Held<'_, V> {
     #[inline(always)]
-    fn slope(&mut self, point: &[V], slope: &mut [V]) {
-        self.plant.derivative(point, self.command, slope);
+    fn slope(&mut self, point: &[V], slopes: &mut Slopes<'_, V>) {
+        let mut slope = [V::splat(0.0); 6];
+        self.plant.derivative(point, self.command, &mut slope);
+        slopes.put_all(0, &slope);
     }
 }
 
@@ -192,10 +194,12 @@ struct Lagging<'a, V: Vector> {
 
 impl<V: Vector> Field<V> for Lagging<'_, V> {
     #[inline(always)]
-    fn slope(&mut self, point: &[V], slope: &mut [V]) {
+    fn slope(&mut self, point: &[V], slopes: &mut Slopes<'_, V>) {
+        let mut slope = [V::splat(0.0); 6];
         // Runge and Kutta look at the start, twice at the middle, and at the end of the step.
         let moment = [0, 1, 1, 2][self.stage];
         self.stage += 1;
-        self.plant.derivative(point, &self.speeds[moment], slope);
+        self.plant.derivative(point, &self.speeds[moment], &mut slope);
+        slopes.put_all(0, &slope);
     }
 }

@@ -1,6 +1,6 @@
 //! The integrator against solutions that are known.
 
-use twinloop_core::{Field, Scalar, Stages, Vector, rk4};
+use twinloop_core::{Field, Scalar, Slopes, Stages, Vector, rk4};
 
 /// x' = −x; a rotation; and time with the integral of a cubic of it.
 struct Decay;
@@ -8,22 +8,22 @@ struct Rotation;
 struct Cubic;
 
 impl Field<Scalar> for &Decay {
-    fn slope(&mut self, point: &[Scalar], slope: &mut [Scalar]) {
-        slope[0] = point[0] * -1.0;
+    fn slope(&mut self, point: &[Scalar], slopes: &mut Slopes<'_, Scalar>) {
+        slopes.put(0, point[0] * -1.0);
     }
 }
 
 impl Field<Scalar> for &Rotation {
-    fn slope(&mut self, point: &[Scalar], slope: &mut [Scalar]) {
-        (slope[0], slope[1]) = (point[1] * -1.0, point[0]);
+    fn slope(&mut self, point: &[Scalar], slopes: &mut Slopes<'_, Scalar>) {
+        slopes.put_all(0, &[point[1] * -1.0, point[0]]);
     }
 }
 
 impl Field<Scalar> for &Cubic {
-    fn slope(&mut self, point: &[Scalar], slope: &mut [Scalar]) {
+    fn slope(&mut self, point: &[Scalar], slopes: &mut Slopes<'_, Scalar>) {
         let t = point[0];
-        slope[0] = Scalar::splat(1.0);
-        slope[1] = t * t * t * 4.0 - t * t * 3.0 + t * 2.0 - Scalar::splat(5.0);
+        slopes.put(0, Scalar::splat(1.0));
+        slopes.put(1, t * t * t * 4.0 - t * t * 3.0 + t * 2.0 - Scalar::splat(5.0));
     }
 }
 
