@@ -110,7 +110,8 @@ mod x86 {
     impl Isa for Avx512 {
         type Of1 = Scalar;
         type Of4 = Wide<__m256d, 1>;
-        type Of8 = Wide<__m512d, 1>;
+        // Two registers and not one of 512 bits: what the next step waits for is there sooner, and the code is that of AVX2.
+        type Of8 = Wide<__m256d, 2>;
         type Of32 = Wide<__m512d, 4>;
         type Of64 = Wide<__m512d, 8>;
     }
