@@ -9,7 +9,7 @@ import pytest
 import twinloop as tl
 from conftest import PENDULUM_GAINS
 from twinloop.campaign.examination.log_check import against
-from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of, distinct
+from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of, distinct
 from twinloop.campaign.identify_and_plan.misses import Miss, unexplained
 from twinloop.campaign.identify_and_plan.readings import derived, froze, ratio, repeats
 from twinloop.campaign.identify_and_plan.sent import exchanged, other_commands
@@ -39,7 +39,7 @@ def flown(seed=0, size=0.5, noise=0.003, change=lambda x: x, cut=False, commands
 
 
 def said(*runs, follows=True):
-    return [remark.sentence for remark in diagnostics_of(runs, SIGNALS, follows, STEPS)]
+    return [remark.sentence for remark in diagnostics_of(runs, SIGNALS, STEPS, Findings(follows))]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003, 0.1])
@@ -92,7 +92,10 @@ def test_where_the_records_show_no_wrong_sign_none_is_looked_for():
 
 
 def remarked(*runs, **found):
-    return [(remark.code, remark.serious) for remark in diagnostics_of(runs, SIGNALS, True, STEPS, **found)]
+    return [
+        (remark.code, remark.serious)
+        for remark in diagnostics_of(runs, SIGNALS, STEPS, Findings(True, **found))
+    ]
 
 
 def test_a_free_run_that_noise_does_not_explain_is_a_serious_remark():
@@ -106,7 +109,7 @@ def test_a_free_run_that_noise_does_not_explain_is_a_serious_remark():
 
 def test_the_states_that_a_free_run_misses_are_named():
     angle, rate = Miss(1, 1, 0.25, 4.5, False), Miss(2, 2, 0.04, 9.0, True)
-    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, True, STEPS, misses=[angle, rate])
+    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, STEPS, Findings(True, misses=[angle, rate]))
     assert (
         "over the 2 runs so far" in remark.sentence  # a twin of before has not learnt the last
         and "There is an effect that no term describes." in remark.sentence
@@ -115,11 +118,15 @@ def test_the_states_that_a_free_run_misses_are_named():
         "rate on 2 (up to 4 % of its range, 9 times what noise and disturbances explain), angle on 1 (up to 25 %"
         in remark.sentence
     )
-    (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[rate])
+    (remark,) = diagnostics_of([flown()], SIGNALS, STEPS, Findings(True, misses=[rate]))
     assert "may be an external disturbance or a model error" in remark.sentence
-    (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(2, 1, 11.2, 9.0, True)])
+    (remark,) = diagnostics_of(
+        [flown()], SIGNALS, STEPS, Findings(True, misses=[Miss(2, 1, 11.2, 9.0, True)])
+    )
     assert "rate on 1 (up to 11 times its range, 9 times what" in remark.sentence
-    (remark,) = diagnostics_of([flown()], SIGNALS, True, STEPS, misses=[Miss(0, 1, np.inf, np.inf, False)])
+    (remark,) = diagnostics_of(
+        [flown()], SIGNALS, STEPS, Findings(True, misses=[Miss(0, 1, np.inf, np.inf, False)])
+    )
     assert "the twin diverges on 1." in remark.sentence
 
 
@@ -176,7 +183,7 @@ def test_two_commands_exchanged_among_four_are_found_and_named():
 
 
 def codes(*runs):
-    return [remark.code for remark in diagnostics_of(runs, SIGNALS, True, STEPS)]
+    return [remark.code for remark in diagnostics_of(runs, SIGNALS, STEPS, Findings(True))]
 
 
 def frozen(x, i=1, row=STEPS // 2):
@@ -187,7 +194,7 @@ def frozen(x, i=1, row=STEPS // 2):
 
 @pytest.mark.parametrize("noise", [0.0, 0.003])
 def test_a_sensor_that_freezes_half_way_is_a_serious_remark(noise):
-    found = diagnostics_of([flown(noise=noise, change=frozen)], SIGNALS, True, STEPS)
+    found = diagnostics_of([flown(noise=noise, change=frozen)], SIGNALS, STEPS, Findings(True))
     assert ("frozen", True) in [(remark.code, remark.serious) for remark in found]
     assert "angle is constant over" in " ".join(remark.sentence for remark in found)
     back = flown(noise=noise, change=lambda x: np.concatenate([frozen(x, row=60)[:100], x[100:]]))
@@ -230,14 +237,14 @@ def test_readings_of_nothing_but_noise_are_a_serious_remark():
 
 
 def test_what_no_controller_corrects_is_held_against_no_effect_alone():
-    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, False, STEPS, without_test=True)
+    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, STEPS, Findings(False, without_test=True))
     assert remark.code == "does-not-follow" and remark.serious
     assert "a right model of its stability" in remark.sentence and "backlash" not in remark.sentence
 
 
 def test_logs_that_disturbances_take_a_replay_away_from_accuse_no_law():
     found = {"without_test": True, "disturbed": ["rate"]}
-    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, False, STEPS, **found)
+    (remark,) = diagnostics_of([flown(), flown(1)], SIGNALS, STEPS, Findings(False, **found))
     assert remark.code == "does-not-follow" and remark.serious
     assert "What seems to disturb rate would take a replay of the right law as far." in remark.sentence
     assert "Fly a test" in remark.sentence and "no term describes" not in remark.sentence
@@ -245,13 +252,13 @@ def test_logs_that_disturbances_take_a_replay_away_from_accuse_no_law():
 
 def test_flights_that_were_followed_in_pieces_are_named():
     runs, whole = [flown(), flown(1)], flown().trajectory.steps
-    (remark,) = diagnostics_of(runs, SIGNALS, True, STEPS, pieces=[whole, whole // 2])
+    (remark,) = diagnostics_of(runs, SIGNALS, STEPS, Findings(True, pieces=[whole, whole // 2]))
     assert (
         remark.code == "in-pieces"
         and not remark.serious
         and "1 of the runs without a test was" in remark.sentence
     )
-    assert diagnostics_of(runs, SIGNALS, True, STEPS, pieces=[whole, whole]) == []
+    assert diagnostics_of(runs, SIGNALS, STEPS, Findings(True, pieces=[whole, whole])) == []
 
 
 def test_a_bias_that_outgrows_a_fast_swing_is_no_contradiction_and_a_small_swing_is_enough_for_a_unit():
@@ -289,7 +296,11 @@ def judged(number, predicted, spread, measured):
 )
 def test_two_predictions_in_a_row_that_missed_to_one_side_are_named(flights, severity):
     runs = [judged(number, *flight) for number, flight in enumerate(flights)]
-    found = [one for one in diagnostics_of(runs, SIGNALS, True, STEPS) if one.code == "missed-predictions"]
+    found = [
+        one
+        for one in diagnostics_of(runs, SIGNALS, STEPS, Findings(True))
+        if one.code == "missed-predictions"
+    ]
     assert [one.severity for one in found] == ([] if severity is None else [severity])
     for one in found:
         (first, *_, last) = (
@@ -316,7 +327,9 @@ def every(periods, start=3):
 @pytest.mark.parametrize("periods", [2, 10])
 def test_a_slow_sensor_is_named_with_its_period(periods):
     runs = [flown(seed, change=every(periods)) for seed in range(2)]
-    (said,) = [one for one in diagnostics_of(runs, SIGNALS, True, STEPS) if one.code == "repeated-readings"]
+    (said,) = [
+        one for one in diagnostics_of(runs, SIGNALS, STEPS, Findings(True)) if one.code == "repeated-readings"
+    ]
     assert said.sentence.startswith(
         f"height repeats every reading: it gives a new one each {periods} periods"
     )
@@ -341,7 +354,9 @@ def test_a_rate_that_is_computed_from_an_angle_is_named(keeps):
         return states
 
     runs = [flown(seed, change=change) for seed in range(2)]
-    (said,) = [one for one in diagnostics_of(runs, SIGNALS, True, STEPS) if one.code == "derived-rate"]
+    (said,) = [
+        one for one in diagnostics_of(runs, SIGNALS, STEPS, Findings(True)) if one.code == "derived-rate"
+    ]
     assert said.sentence.startswith("rate is computed from the readings of angle")
 
 

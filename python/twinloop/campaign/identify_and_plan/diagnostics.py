@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from twinloop.campaign.excited import Excited
 from twinloop.campaign.history import Experiment
@@ -18,33 +19,41 @@ NAMED = 3
 """States that are named of those that a free run misses, those that it misses most."""
 
 
+@dataclass(frozen=True)
+class Findings:
+    """What a twin is beside the flights that it was learnt from.
+
+    Args:
+        follows: whether the twin follows them when it is flown by itself.
+        misses: states that its free runs miss by more than noise and known disturbances explain.
+        others: numbers of the tests whose recorded commands are none that their controllers give.
+        recurring: states whose disturbance comes again in flight after flight.
+        unmoved: states that move though their equations say that nothing moves them.
+        without_test: whether the flights that it does not follow are all without a test, replayed without a controller.
+        pieces: steps of those in which each flight is followed; empty: all in whole.
+        disturbed: states with disturbances that would take free runs of a right twin as far; empty: none would.
+    """
+
+    follows: bool
+    misses: Sequence[Miss] = ()
+    others: Sequence[int] = ()
+    recurring: tuple[str, ...] = ()
+    unmoved: Sequence[str] = ()
+    without_test: bool = False
+    pieces: Sequence[int] = ()
+    disturbed: Sequence[str] = ()
+
+
 def diagnostics_of(
-    experiments: Sequence[Experiment],
-    signals: Signals,
-    follows: bool,
-    steps: int,
-    misses: Sequence[Miss] = (),
-    others: Sequence[int] = (),
-    recurring: Sequence[str] = (),
-    unmoved: Sequence[str] = (),
-    without_test: bool = False,
-    pieces: Sequence[int] = (),
-    disturbed: Sequence[str] = (),
+    experiments: Sequence[Experiment], signals: Signals, steps: int, found: Findings
 ) -> list[Remark]:
     """What speaks against the data or the twin.
 
     Args:
         experiments: that were learnt from.
         signals: of the system.
-        follows: whether the twin follows them when it is flown by itself.
         steps: of a whole run.
-        misses: states that its free runs miss by more than noise and known disturbances explain.
-        others: numbers of the tests whose recorded commands are none that their controllers give.
-        recurring: states whose disturbance comes again in flight after flight.
-        unmoved: states that move though their equations say that nothing moves them.
-        without_test: whether the flights that it does not follow are all without a test, replayed without a controller.
-        pieces: steps of those in which each experiment is followed; empty: all in whole.
-        disturbed: states with disturbances that would take free runs of a right twin as far; empty: none would.
+        found: of the twin.
 
     Returns:
         Remarks, none where nothing does.
@@ -53,15 +62,16 @@ def diagnostics_of(
     said = [
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
-        *from_other_controllers(others),
-        *_unmoved(unmoved),
+        *from_other_controllers(found.others),
+        *_unmoved(found.unmoved),
     ]
-    said += _in_pieces(experiments, pieces, signals.dt)
-    if not follows:
-        said += _does_not_follow(any(remark.serious for remark in said), without_test, disturbed)
-    elif misses:
-        said += _free_run(misses, len(experiments), signals)
-    said += [*_model_error(recurring), *_copies(experiments), *_none_complete(experiments, steps)]
+    said += _in_pieces(experiments, found.pieces, signals.dt)
+    if not found.follows:
+        explained = any(remark.serious for remark in said)
+        said += _does_not_follow(explained, found.without_test, found.disturbed)
+    elif found.misses:
+        said += _free_run(found.misses, len(experiments), signals)
+    said += [*_model_error(found.recurring), *_copies(experiments), *_none_complete(experiments, steps)]
     return [*said, *_missed_predictions(experiments)]
 
 

@@ -6,25 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from twinloop import _core
 from twinloop._ground.steps import Watch
-from twinloop.campaign.history import Experiment, Lesson
+from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.answer import Answer
-from twinloop.campaign.identify_and_plan.diagnostics import diagnostics_of
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
-from twinloop.campaign.identify_and_plan.levels import levels_of, levels_said
+from twinloop.campaign.identify_and_plan.lessons import lesson_of
+from twinloop.campaign.identify_and_plan.levels import levels_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
-from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from, shortened
-from twinloop.campaign.identify_and_plan.sent import other_commands
-from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
+from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from
 from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
 from twinloop.campaign.identify_and_plan.wrong_readings import without_wrong_readings
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.presets import DefaultOptions
-from twinloop.campaign.replaying import free_errors
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.identify import UnderWay, identify_runs
@@ -116,7 +111,8 @@ class Learner:
         if not answer.explained and self.options.plain != self.options:
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + told), ROUGH)
             answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
-        identified, lesson = answer.identified, self._lesson(answer, book, flights, selected)
+        identified = answer.identified
+        lesson = lesson_of(answer, is_rough(identified), book, flights, selected, self.workers)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
         )
@@ -169,63 +165,6 @@ class Learner:
         """Directions in which the controller's axes move alike commands, as its mixer says."""
         mixer = self.setup.mixer
         return [] if mixer is None else of_mixer(mixer.matrix, self.setup.signals)
-
-    def _lesson(
-        self, answer: Answer, book: Logbook, flights: Sequence[Experiment], selected: Sequence[Selected]
-    ) -> Lesson:
-        identified, follows = answer.identified, answer.follows
-        noise = identified.noise(self.setup.signals)
-        free = free_errors(identified.members[0], book, self.workers, noise)
-        names = self.setup.signals.state_names
-        recurring, undecided = (
-            tuple(names[state] for state, cause in answer.causes.items() if cause == kind)
-            for kind in ("law", "undecided")
-        )
-        lost = [book.experiments[place] for place in answer.lost]
-        blown = () if answer.missed else [names[gust.states[0]] for gust in noise.correlated]
-        misses = answer.misses(flights, self.setup, self.workers)
-        explained = follows and not misses and not is_rough(identified)
-        actuation, signals = identified.actuation, self.setup.signals
-        actuators = claimed(actuation, signals, explained)
-        return Lesson(
-            iteration=len(book.experiments),
-            tests=tuple(run.number for run in book.experiments),
-            form=identified.model.form,
-            terms=identified.terms,
-            misfit=identified.misfit,
-            readings=identified.readings,
-            ignored=identified.outliers,
-            sensors=tuple(identified.sensors(self.setup.signals.n_x).tolist()),
-            lags=tuple(actuator.lag for actuator in actuators),
-            delays=tuple(actuator.delay for actuator in actuators),
-            hidden=identified.actuation.hidden,
-            offsets=tuple(identified.offsets.tolist()),
-            closed_loop=tuple(found.error for found in free),
-            normalised=tuple(found.normalised for found in free),
-            follows=follows,
-            remarks=(
-                *identified.remarks,
-                *shortened(selected, signals.dt),
-                *stand_ins(actuation, signals, explained),
-                *levels_said(identified.model, signals),
-                *diagnostics_of(
-                    book.experiments,
-                    self.setup.signals,
-                    follows
-                    or not np.isfinite(identified.chi_squared),  # of one that diverges it is said already
-                    self.setup.steps,
-                    misses,
-                    () if follows else other_commands(book.experiments),
-                    recurring,
-                    [names[state] for state in answer.unmoved],
-                    without_test=bool(lost) and all(run.test is None for run in lost),
-                    pieces=[found.length for found in free],
-                    disturbed=blown,
-                ),
-            ),
-            recurring=recurring,
-            undecided=undecided,
-        )
 
 
 def or_known_before(answer: Answer, earlier: Identified, answered: Callable[..., Answer]) -> Answer:

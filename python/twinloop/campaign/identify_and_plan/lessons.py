@@ -1,0 +1,102 @@
+"""Lessons: the record of an identification, with what speaks against its data or its twin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinloop import _core
+from twinloop.campaign.history import Experiment, Lesson
+from twinloop.campaign.identify_and_plan.answer import Answer
+from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of
+from twinloop.campaign.identify_and_plan.levels import levels_said
+from twinloop.campaign.identify_and_plan.selection import Selected, shortened
+from twinloop.campaign.identify_and_plan.sent import other_commands
+from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
+from twinloop.campaign.logbook import Logbook
+from twinloop.campaign.replaying import free_errors
+
+
+def lesson_of(
+    answer: Answer,
+    rough: bool,
+    book: Logbook,
+    flights: Sequence[Experiment],
+    selected: Sequence[Selected],
+    workers: _core.Workers,
+) -> Lesson:
+    """The record of what was learnt.
+
+    Args:
+        answer: what was identified, beside the flights.
+        rough: whether it is a law of linear terms beside one that does not explain the flights.
+        book: of the campaign.
+        flights: of the book, without single readings that are wrong.
+        selected: what was learnt from.
+        workers: how the work is carried out.
+    """
+    identified, signals = answer.identified, book.setup.signals
+    free = free_errors(identified.members[0], book, workers, identified.noise(signals))
+    found = findings(answer, book, flights, [each.length for each in free], workers)
+    explained = answer.follows and not found.misses and not rough
+    actuators = claimed(identified.actuation, signals, explained)
+    return Lesson(
+        iteration=len(book.experiments),
+        tests=tuple(run.number for run in book.experiments),
+        form=identified.model.form,
+        terms=identified.terms,
+        misfit=identified.misfit,
+        readings=identified.readings,
+        ignored=identified.outliers,
+        sensors=tuple(identified.sensors(signals.n_x).tolist()),
+        lags=tuple(actuator.lag for actuator in actuators),
+        delays=tuple(actuator.delay for actuator in actuators),
+        hidden=identified.actuation.hidden,
+        offsets=tuple(identified.offsets.tolist()),
+        closed_loop=tuple(each.error for each in free),
+        normalised=tuple(each.normalised for each in free),
+        follows=answer.follows,
+        remarks=(
+            *identified.remarks,
+            *shortened(selected, signals.dt),
+            *stand_ins(identified.actuation, signals, explained),
+            *levels_said(identified.model, signals),
+            *diagnostics_of(book.experiments, signals, book.setup.steps, found),
+        ),
+        recurring=found.recurring,
+        undecided=tuple(signals.state_names[i] for i, cause in answer.causes.items() if cause == "undecided"),
+    )
+
+
+def findings(
+    answer: Answer,
+    book: Logbook,
+    flights: Sequence[Experiment],
+    pieces: Sequence[int],
+    workers: _core.Workers,
+) -> Findings:
+    """What an answer is beside the flights that it was learnt from.
+
+    Args:
+        answer: to be looked at.
+        book: of the campaign.
+        flights: of the book, without single readings that are wrong.
+        pieces: steps of those in which each experiment is followed.
+        workers: how the work is carried out.
+    """
+    identified, setup = answer.identified, book.setup
+    names = setup.signals.state_names
+    lost = [book.experiments[place] for place in answer.lost]
+    gusts = () if answer.missed else identified.noise(setup.signals).correlated
+    return Findings(
+        # Of a model that diverges it is said already.
+        follows=answer.follows or not np.isfinite(identified.chi_squared),
+        misses=answer.misses(flights, setup, workers),
+        others=() if answer.follows else other_commands(book.experiments),
+        recurring=tuple(names[state] for state, cause in answer.causes.items() if cause == "law"),
+        unmoved=[names[state] for state in answer.unmoved],
+        without_test=bool(lost) and all(run.test is None for run in lost),
+        pieces=pieces,
+        disturbed=[names[gust.states[0]] for gust in gusts],
+    )
