@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinloop._ground.elementary import cos, exp, log, power, sin, tanh
+from twinloop._ground.elementary import cos, exp, log, power, product, sin, tanh
 
 
 @given(st.lists(st.floats(1e-300, 1e300), min_size=1, max_size=20))
@@ -29,3 +29,11 @@ def test_powers_are_those_of_python_but_for_the_last_bit(x, y):
 def test_shapes_are_kept_and_a_number_stays_one():
     assert exp(np.zeros((2, 3, 4))).shape == (2, 3, 4)
     assert float(log(1.0)) == 0.0
+
+
+@given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 5), st.integers(0, 2**32 - 1))
+def test_products_of_matrices_are_those_of_numpy_but_for_the_last_bits(n, k, m, seed):
+    left, right = (
+        np.random.default_rng(seed + i).normal(size=size) for i, size in enumerate(((n, k), (k, m)))
+    )
+    np.testing.assert_allclose(product(left, right), left @ right, rtol=1e-13, atol=1e-13)

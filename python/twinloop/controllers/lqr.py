@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop._ground.arrays import Floats, floats, number
+from twinloop._ground.elementary import product
 from twinloop.controllers.family import Family
-from twinloop.controllers.riccati import product, solve_linear, solve_riccati
+from twinloop.controllers.riccati import solve_linear, solve_riccati
 from twinloop.controllers.state_feedback import FeedbackFamily
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 

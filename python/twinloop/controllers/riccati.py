@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.elementary import product
 
 DOUBLINGS = 24
 """Periods are looked ahead by powers of two; what has not settled after 2^24 of them will not settle."""
@@ -48,22 +49,6 @@ def solve_riccati(a: Floats, b: Floats, q: Floats, r: Floats) -> Floats | None:
             # `ahead` squares from step to step, so that what is left is far below a rounding of the cost.
             return cost
     return None
-
-
-def product(left: Floats, right: Floats) -> Floats:
-    """The product of two matrices, summed in a fixed order.
-
-    Args:
-        left: (n, k).
-        right: (k, m).
-
-    Returns:
-        (n, m).
-    """
-    total = np.zeros((left.shape[0], right.shape[1]))
-    for i in range(left.shape[1]):
-        total = total + left[:, i : i + 1] * right[i : i + 1]
-    return total
 
 
 def solve_linear(matrix: Floats, right: Floats) -> Floats | None:

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop._ground.elementary import cos, sin
+from twinloop._ground.elementary import cos, product, sin
 from twinloop.campaign.identify_and_plan.integrated import (
     BENT,
     WALKED,
@@ -130,9 +130,12 @@ def cures(flown: Sequence[Turned], angles: Floats, rates: Floats, body: RigidBod
     """
     found = []
     for words, mix_angles, mix_rates in _changes(body):
-        changed = [Turned(run.angles @ mix_angles.T, run.rates @ mix_rates.T, run.dt) for run in flown]
-        noises = (np.square(mix_angles) @ angles, np.square(mix_rates) @ rates)
-        said = contradictions(changed, *noises)
+        changed = [
+            Turned(product(run.angles, mix_angles.T), product(run.rates, mix_rates.T), run.dt)
+            for run in flown
+        ]
+        noises = (np.square(mix_angles) * angles, np.square(mix_rates) * rates)
+        said = contradictions(changed, *(noise.sum(axis=1) for noise in noises))
         if not any(said) and "" in said:
             found.append(words)
     return found if len(found) <= MOST_CURES else []
