@@ -1,4 +1,4 @@
-"""No file that decides multiplies by BLAS: of that the lint, which knows functions by name, sees nothing."""
+"""No file that decides uses an operator that rounds differently elsewhere: the lint knows functions, not operators."""
 
 import ast
 import sys
@@ -36,14 +36,32 @@ def multiplied_by_blas(source):
     ]
 
 
-def test_no_file_that_decides_multiplies_by_blas():
+def squared_by_the_c_library(source):
+    """Lines of a source with a power of a fixed exponent, such as `x**2`; `2.0**-47` is exact."""
+    powers = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.BinOp)]
+    return [
+        node.lineno
+        for node in powers
+        if isinstance(node.op, ast.Pow)
+        and is_number(node.right)
+        and not (is_number(node.left) and float(ast.unparse(node.right)).is_integer())
+    ]
+
+
+def is_number(node):
+    """Whether it is written as a number, with a sign or without."""
+    return isinstance(node.operand if isinstance(node, ast.UnaryOp) else node, ast.Constant)
+
+
+@pytest.mark.parametrize("lines_of", [multiplied_by_blas, squared_by_the_c_library])
+def test_no_file_that_decides_uses_an_operator_with_other_bits_elsewhere(lines_of):
     excused = set().union(*decides_nothing().values())
     deciding = set((ROOT / "python/twinloop").rglob("*.py")) - excused
     assert len(deciding) > 200
     found = {
         str(file.relative_to(ROOT)): lines
         for file in sorted(deciding)
-        if (lines := multiplied_by_blas(file.read_text(encoding="utf-8")))
+        if (lines := lines_of(file.read_text(encoding="utf-8")))
     }
     assert found == {}
 
@@ -57,3 +75,10 @@ def test_files_are_excused_by_their_whole_path_and_each_is_there():
 @pytest.mark.parametrize("source", ["a @ b", "a @= b", "np.dot(a, b)", "a.dot(b)", "np.linalg.inv(a)"])
 def test_a_product_by_blas_is_seen(source):
     assert multiplied_by_blas(source) == [1]
+
+
+@pytest.mark.parametrize(
+    "source, seen", [("x**2", True), ("2.0**0.5", True), ("2.0**-47", False), ("x**n", False)]
+)
+def test_a_power_of_a_fixed_exponent_is_seen(source, seen):
+    assert bool(squared_by_the_c_library(source)) == seen

@@ -151,7 +151,7 @@ def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:
         differences = [np.diff(run.states, n=order, axis=0) for run in runs if len(run.states) > order]
         if sum(len(found) for found in differences) < (1 if order == ORDERS[0] else FEWEST):
             break
-        squares = np.sort(np.concatenate(differences) ** 2, axis=0)
+        squares = np.sort(np.square(np.concatenate(differences)), axis=0)
         # The median of a squared normal number is 0.4549.
         found = squares[len(squares) // 2] / (0.4549 * math.comb(2 * order, order))
         guess = np.where(found < FALLS * guess, found, guess)

@@ -42,9 +42,12 @@ def stored(
 
     first, half, last = (filling(inputs) for inputs in stages)
     z = dt * fades if turning else dt / time
-    kept = 1.0 - z + z**2 / 2.0 - z**3 / 6.0 + z**4 / 24.0
+    square = z * z
+    kept = 1.0 - z + square / 2.0 - square * z / 6.0 + square * square / 24.0
     added = (
-        dt / 6.0 * (first * (1.0 - z + z**2 / 2.0 - z**3 / 4.0) + half * (4.0 - 2.0 * z + z**2 / 2.0) + last)
+        dt
+        / 6.0
+        * (first * (1.0 - z + square / 2.0 - square * z / 4.0) + half * (4.0 - 2.0 * z + square / 2.0) + last)
     )
     start, end = np.empty_like(first), np.empty_like(first)
     for rows in runs:

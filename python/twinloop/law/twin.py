@@ -258,7 +258,9 @@ class Twin(Shown, Recorded, kind="twin"):
         if spread is None or self.noise is None:
             return run
         mean, variance = (values[: len(run.states)] for values in spread)
-        half = NINE_OF_TEN * np.sqrt(self.inflation * self.inflation * variance + self.noise.sensors**2)
+        half = NINE_OF_TEN * np.sqrt(
+            self.inflation * self.inflation * variance + np.square(self.noise.sensors)
+        )
         return dataclasses.replace(run, band=np.stack([mean - half, mean + half]))
 
     def as_flown(self, test: Test | Replay, flown: Trajectory) -> Test | Replay:

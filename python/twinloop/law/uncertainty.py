@@ -65,5 +65,5 @@ def spread_of(states: Floats, signals: Signals) -> tuple[Floats, Floats]:
     origin = np.where(lasted[0], states[0], 0.0)
     off = np.where(lasted, signals.difference(states, origin), 0.0)
     middle = off.sum(axis=0) / count
-    variance = np.where(lasted, (off - middle) ** 2, 0.0).sum(axis=0) / count
+    variance = np.where(lasted, np.square(off - middle), 0.0).sum(axis=0) / count
     return origin + middle, variance

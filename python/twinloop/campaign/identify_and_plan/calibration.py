@@ -51,7 +51,7 @@ def needed_factor(twin: Twin, test: Test | Replay, flown: Trajectory) -> float |
     if rows < 2:
         return LARGEST
     errors = twin.signals.difference(flown.states[1:rows], mean[1:rows])
-    squares = (errors / NINE_OF_TEN) ** 2 - twin.noise.sensors**2
+    squares = np.square(errors / NINE_OF_TEN) - np.square(twin.noise.sensors)
     smallest = 1e-12 * np.square([state.scale for state in twin.signals.states])
     factors = np.sqrt(np.maximum(squares, 0.0) / np.maximum(variance[1:rows], smallest))
     return float(np.clip(np.quantile(factors, 0.9), SMALLEST, LARGEST))

@@ -254,7 +254,8 @@ def comes_at_moments(flights: Sequence[Floats]) -> bool:
     """
     series = np.concatenate([in_pieces(disturbed) for disturbed in flights])
     about = np.square(series - series.mean())
-    return bool(np.square(about).mean() > PEAKED * float(about.mean()) ** 2)
+    mean = float(about.mean())
+    return bool(np.square(about).mean() > PEAKED * (mean * mean))
 
 
 def acts_in_motion(flights: Sequence[tuple[Floats, Floats]]) -> bool:

@@ -65,8 +65,8 @@ def _of_derivative(
     pairs = [moved(states[:, j], states[:, i], dt) for states in cut]
     walks = sum(float(walk(noise[i], dt, len(states) - 1)) for states in cut)
     bent = [tuple(map(without_line, pair)) for pair in pairs]
-    how = contradiction(bent, BENT**2 * noise[j], WALKED**2 * walks)
-    return [contradiction(pairs, MOVED**2 * noise[j], 0.0) if how is None else how]
+    how = contradiction(bent, BENT * BENT * noise[j], WALKED * WALKED * walks)
+    return [contradiction(pairs, MOVED * MOVED * noise[j], 0.0) if how is None else how]
 
 
 def _as_a_body(runs: Sequence[Run], signals: Signals, noise: Floats) -> RigidBody | None:
@@ -87,7 +87,7 @@ def _as_a_body(runs: Sequence[Run], signals: Signals, noise: Floats) -> RigidBod
         permutations(pairs, 3), key=lambda three: float(_off(runs, three, signals.dt, noise, True).sum())
     )
     declared, turned = (_off(runs, best, signals.dt, noise, body) for body in (False, True))
-    if not (declared > BENT**2).any() or turned.sum() > AS_A_BODY * declared.sum():
+    if not (declared > BENT * BENT).any() or turned.sum() > AS_A_BODY * declared.sum():
         return None
     names = signals.state_names
     return RigidBody([names[angle] for angle, _ in best], [names[rate] for _, rate in best])

@@ -36,7 +36,7 @@ def shows(flights: Sequence[tuple[Floats, Floats]], chain: Chain, limits: Limits
     missed = [
         np.square(limits.signals.difference(free, read)[:, states]).mean(axis=0) for read, free in flights
     ]
-    return not missed or bool((np.mean(missed, axis=0) > SEEN**2 * chain.sensors).any())
+    return not missed or bool((np.mean(missed, axis=0) > SEEN * SEEN * chain.sensors).any())
 
 
 def may_be_inexactness(chain: Chain, drives: Floats) -> bool:
@@ -46,7 +46,7 @@ def may_be_inexactness(chain: Chain, drives: Floats) -> bool:
         chain: with what disturbs it.
         drives: variances of each output of the law over the flights.
     """
-    return chain.output is not None and bool(chain.motion.correlated < EXACT**2 * drives[chain.output])
+    return chain.output is not None and bool(chain.motion.correlated < EXACT * EXACT * drives[chain.output])
 
 
 def driven(model: _core.Model, runs: Sequence[Run], signals: Signals) -> Floats:

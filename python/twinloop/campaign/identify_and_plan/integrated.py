@@ -83,7 +83,8 @@ def walk(variance: Floats, dt: float, steps: int) -> Floats:
         dt: period.
         steps: of the record.
     """
-    return np.asarray(variance * (dt * steps) ** 2 / 15.0)
+    duration = dt * steps
+    return np.asarray(variance * (duration * duration) / 15.0)
 
 
 def moved(state: Floats, rate: Floats, dt: float) -> tuple[Floats, Floats]:

@@ -114,7 +114,9 @@ def _in_pieces(flown: Sequence[Turned], angles: Floats, rates: Floats, pieces: i
     pairs = [run.pairs() for run in cut]
     walks = np.sum([run.walks(rates) for run in cut], axis=0)
     return [
-        contradiction([run[k] for run in pairs], BENT**2 * float(angles[k]), WALKED**2 * float(walks[k]))
+        contradiction(
+            [run[k] for run in pairs], BENT * BENT * float(angles[k]), WALKED * WALKED * float(walks[k])
+        )
         for k in range(3)
     ]
 
@@ -179,7 +181,7 @@ def _without(causes: Floats, values: Floats) -> Floats:
         for other in others:
             own = own - other * float((other * own).sum())
         left = float(np.square(own).sum())
-        if left > LEAST_REST**2 * size:
+        if left > LEAST_REST * LEAST_REST * size:
             own = own / np.sqrt(left)
             others.append(own)
             rest = rest - own * float((own * rest).sum())

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from math import sqrt
 
 from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
@@ -22,7 +23,7 @@ from twinloop.signals import Signals
 
 LAGS = (0.0, 0.35, 0.7, 1.4, 2.8, 5.6, 11.0)
 """Time constants that are tried, in periods."""
-FINER = 2.0**0.5
+FINER = sqrt(2.0)
 """Ratio of the lags that are tried beside the best of them."""
 FEW = 3
 """Commands that are alike up to which each is tried with a lag and a delay of its own."""

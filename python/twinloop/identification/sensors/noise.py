@@ -92,7 +92,7 @@ def kinematic_noise(chain: Chain, runs: Sequence[Run], signals: Signals, rates: 
     found = min(-float(products.mean()), rough)
     sensors = np.array([max(BEST_SENSOR * BEST_SENSOR * rough, found)])
     quiet = chain.with_noise(sensors, (KINEMATIC * float(sensors[0]) / signals.dt, 0.0, 1.0))
-    known = signals.dt**2 * (rates + _bent(runs, signals))
+    known = signals.dt * signals.dt * (rates + _bent(runs, signals))
     return _drifting(quiet, clipped, [run.weights[:, [angle]] for run in runs], signals.dt, known)
 
 
