@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from twinloop.identification.description import TIE
 from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, STORING, Evidence, by_evidence, price
-from twinloop.identification.search.description import TIE
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
 LENGTHS = st.one_of(st.floats(-1e4, 1e4), st.sampled_from([0.0, 0.5 * TIE, 2.0 * TIE, -0.5 * TIE]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 
 from twinloop._ground.elementary import log
-from twinloop.identification.search.description import shorter
+from twinloop.identification.description import shorter
 from twinloop.law.actuation import Actuation
 from twinloop.law.forms import EULER
 

@@ -15,12 +15,12 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.elementary import log
 from twinloop.identification.context import Context
+from twinloop.identification.description import shorter, shortest
 from twinloop.identification.evidence import STEPPING
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
 from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import Run
-from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
 from twinloop.identification.sensors.euler_steps import euler_form

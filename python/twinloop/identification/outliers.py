@@ -15,9 +15,9 @@ import numpy as np
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop.identification.context import Context
+from twinloop.identification.description import shorter
 from twinloop.identification.forms import first_form
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.search.description import shorter
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.starts import begun
 from twinloop.signals import Signals

@@ -14,10 +14,10 @@ from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
 from twinloop.identification.proposals.hidden import with_hidden, without_hidden
 from twinloop.identification.records import guessed_noise
+from twinloop.identification.search.behind_a_law import that_hold
 from twinloop.identification.search.moderation import with_moved
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import Sum
-from twinloop.identification.sensors.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.sensors.noise import declared_noise, given_noise, kinematic_noise
 from twinloop.identification.sensors.offsets import moved, search_offsets

@@ -13,7 +13,7 @@ from twinloop.campaign.presets import options_of
 from twinloop.identification.context import Context
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.sensors.behind_a_law import that_hold
+from twinloop.identification.search.behind_a_law import that_hold
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.sensors.offsets import late_groups, moved, search_offsets
 from twinloop.identification.starts import ANEW, begun

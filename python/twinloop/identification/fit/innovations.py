@@ -14,10 +14,10 @@ import numpy as np
 from twinloop import _core
 from twinloop.errors import engine_input
 from twinloop.identification.context import Context
+from twinloop.identification.description import shortest
 from twinloop.identification.evidence import CORRELATED
 from twinloop.identification.fit.predictions import predictions
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.description import shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import priced
 from twinloop.identification.sensors.chains import Chain

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
+from twinloop.identification.description import shortest
 from twinloop.identification.fit.settling import settled
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.search.description import shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.terms.bounds import bounded_solution, excludes_zero

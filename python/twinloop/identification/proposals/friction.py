@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from twinloop.identification.context import Context
+from twinloop.identification.description import shorter, shortest
 from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.alternation import by_innovations
 from twinloop.identification.fit.fitting import fitted, with_fit
@@ -19,7 +20,6 @@ from twinloop.identification.fit.promises import promises
 from twinloop.identification.fit.tuning import tune
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.second_look import looked_again
-from twinloop.identification.search.description import shorter, shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, priced, prices
 from twinloop.identification.sensors.noise import RIDGE, calm, still

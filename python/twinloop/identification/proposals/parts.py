@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from twinloop.identification.context import Context
+from twinloop.identification.description import shortest
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Run
-from twinloop.identification.search.description import shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import climbed, from_both_sides
 from twinloop.identification.search.structure import search

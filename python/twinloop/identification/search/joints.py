@@ -19,7 +19,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
-from twinloop.identification.search.description import shorter, shortest
+from twinloop.identification.description import shorter, shortest
 from twinloop.identification.search.implicit import (
     NEAREST,
     NOISE_ROUNDS,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from twinloop._ground.elementary import log
-from twinloop.identification.search.description import shorter, shortest
+from twinloop.identification.description import shorter, shortest
 from twinloop.identification.search.implicit import Quotient, bounded, implicit, matters
 from twinloop.identification.search.newton import refined
 from twinloop.identification.search.problem import Problem

@@ -12,8 +12,8 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
+from twinloop.identification.description import shortest
 from twinloop.identification.records import Run
-from twinloop.identification.search.description import shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.identification.sensors.kinematic_steps import kinematic_step

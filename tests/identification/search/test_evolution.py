@@ -10,8 +10,8 @@ from twinloop._ground.streams import Unit
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
 from twinloop.identification.search import selection
+from twinloop.identification.search.evolution import _drawn, _whole
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.identification.terms.evolution import _drawn, _whole
 from twinloop.identification.terms.pool import Pool
 
 SIGNALS = tl.Signals(
