@@ -19,8 +19,8 @@ from twinloop.identification.description import shorter, shortest
 from twinloop.identification.evidence import STEPPING
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
-from twinloop.identification.proposals.hidden import with_hidden
 from twinloop.identification.records import Run
+from twinloop.identification.search.hidden import with_hidden
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import climbed, from_both_sides, undisturbed
 from twinloop.identification.sensors.euler_steps import euler_form

@@ -12,9 +12,9 @@ from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.identified import Identified
-from twinloop.identification.proposals.hidden import with_hidden, without_hidden
 from twinloop.identification.records import guessed_noise
 from twinloop.identification.search.behind_a_law import that_hold
+from twinloop.identification.search.hidden import with_hidden, without_hidden
 from twinloop.identification.search.moderation import with_moved
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import Sum

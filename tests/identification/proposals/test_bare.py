@@ -12,7 +12,7 @@ from twinloop.identification.context import Context
 from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.proposals.bare import bare
-from twinloop.identification.proposals.hidden import with_hidden
+from twinloop.identification.search.hidden import with_hidden
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.starts import ANEW, begun
 from twinloop.law.actuation import HiddenState

@@ -13,10 +13,11 @@ from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.identification.identify import identify_runs
 from twinloop.identification.records import Run
+from twinloop.identification.search.directions import directions
 from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import chains
 from twinloop.identification.terms.candidates import Candidates
-from twinloop.identification.terms.directions import directions, of_mixer, terms_of, together, unequal
+from twinloop.identification.terms.directions import of_mixer, terms_of, together, unequal
 from twinloop.identification.terms.pool import Pool
 
 WORKERS = _core.Workers()

@@ -15,7 +15,7 @@ from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.sensors.chains import driven_states
+from twinloop.law.forms import driven_states
 from twinloop.law.law import Law
 from twinloop.planning.excitation import slopes
 from twinloop.signals import Signals

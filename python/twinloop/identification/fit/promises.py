@@ -13,7 +13,7 @@ from twinloop.identification.fit.models import inner, layout, model_of
 from twinloop.identification.fit.settling import settled
 from twinloop.identification.fit.tuning import moving_together
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.sensors.noise import RIDGE
+from twinloop.identification.search.noise import RIDGE
 
 
 def promises(context: Context, hypothesis: Hypothesis, i: int, nodes: Sequence[int]) -> list[float]:

@@ -12,8 +12,8 @@ from dataclasses import replace
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.proposals.hidden import without_hidden
 from twinloop.identification.proposals.second_look import looked_again
+from twinloop.identification.search.hidden import without_hidden
 from twinloop.identification.search.selection import climbed
 
 FAR = 200.0

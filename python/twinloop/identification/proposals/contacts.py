@@ -8,10 +8,10 @@ from dataclasses import replace
 from twinloop.identification.context import Context
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.noise import first_noise, still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search
-from twinloop.identification.sensors.noise import first_noise, still
 from twinloop.identification.starts import CONTACTS
 from twinloop.identification.terms.hinges import Hinge, entered, hinges
 from twinloop.law.actuation import Actuation

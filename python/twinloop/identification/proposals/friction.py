@@ -20,9 +20,9 @@ from twinloop.identification.fit.promises import promises
 from twinloop.identification.fit.tuning import tune
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.proposals.second_look import looked_again
+from twinloop.identification.search.noise import RIDGE, calm, still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.structure import Sum, priced, prices
-from twinloop.identification.sensors.noise import RIDGE, calm, still
 from twinloop.identification.terms.friction import entered, frictions, frictions_in
 
 WORTH = 20.0

@@ -18,11 +18,12 @@ from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import by_evidence
 from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.directions import directions
+from twinloop.identification.search.hidden import filled, with_hidden
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import Sum, search
-from twinloop.identification.terms.candidates import Candidates
-from twinloop.identification.terms.directions import Direction, directions, together
+from twinloop.identification.terms.directions import Direction, together
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.actuation import HiddenState, alike_commands
 from twinloop.signals import Signals
@@ -83,36 +84,6 @@ def filled_by_commands(context: Context, hypothesis: Hypothesis, start: Sequence
     walks = context.walks(unit.part(0), options.moves, max(1, options.starts // 2), "hidden_subsets")
     sums = search(Problem(context, best), driven, many, best.sums, walks)
     return replace(best, sums=tuple(sums), candidates=with_hidden(context, best.candidates))
-
-
-def with_hidden(context: Context, candidates: Candidates, count: int = 1) -> Candidates:
-    """The candidates with terms of so many hidden states on the first rung, and with those that were known of them."""
-    grown = candidates.growing()
-    known = [node for node in context.known_terms if grown.pool.is_hidden(node)]
-    return grown.with_terms([*filled(grown.pool, count), *known])
-
-
-def filled(pool: Pool, count: int = 1) -> list[int]:
-    """Terms of hidden states, on the first rung: each alone, times every input, and what moves an output together."""
-    states = [pool.hidden(number) for number in range(count)]
-    found = [node for node in pool.found if pool.is_hidden(node)]
-    terms = [
-        term for state in states for term in (state, *(pool.product(i, state) for i in range(pool.inputs)))
-    ]
-    terms += found
-    pool.rungs.update(dict.fromkeys(terms, 0))
-    return terms
-
-
-def without_hidden(found: Sum, pool: Pool) -> Sum:
-    """A sum without terms of hidden states.
-
-    Args:
-        found: the sum.
-        pool: of its terms.
-    """
-    weights = {term: weight for term, weight in found.weights.items() if not pool.is_hidden(term)}
-    return replace(found, weights=weights, others=[])
 
 
 def enter_directions(pool: Pool, found: Sequence[Direction]) -> None:

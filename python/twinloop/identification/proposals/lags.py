@@ -14,10 +14,10 @@ from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import by_evidence
 from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.noise import still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search
-from twinloop.identification.sensors.noise import still
 from twinloop.law.actuation import Actuation, Actuator, one_by_one
 from twinloop.signals import Signals
 

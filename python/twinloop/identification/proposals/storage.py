@@ -20,12 +20,12 @@ from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.fit.predictions import smoothed
 from twinloop.identification.hypothesis import Hypothesis
-from twinloop.identification.proposals.hidden import filled, with_hidden, without_hidden
 from twinloop.identification.records import Stages, stages
+from twinloop.identification.search.hidden import filled, with_hidden, without_hidden
+from twinloop.identification.search.noise import still
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.selection import from_both_sides
 from twinloop.identification.search.structure import search
-from twinloop.identification.sensors.noise import still
 from twinloop.law.actuation import Actuation, HiddenState, alike_commands
 from twinloop.law.forms import DERIVATIVES
 

@@ -17,9 +17,10 @@ from twinloop._ground.arrays import Floats
 from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
+from twinloop.identification.search.noise import RIDGE
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.sensors.chains import Chain
-from twinloop.identification.sensors.noise import RIDGE, floor_of
+from twinloop.identification.sensors.noise import floor_of
 from twinloop.identification.sensors.offsets import PRICE, moved
 
 ROUNDS = 3

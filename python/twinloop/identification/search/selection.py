@@ -12,13 +12,13 @@ from twinloop.identification.context import Context
 from twinloop.identification.description import shorter, shortest
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.records import Stages, stages
+from twinloop.identification.search.directions import directions
 from twinloop.identification.search.evolution import evolve
 from twinloop.identification.search.joints import with_joints
+from twinloop.identification.search.noise import calm, first_noise, unexplained
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.quotients import renewed, with_quotients
 from twinloop.identification.search.structure import Sum, search
-from twinloop.identification.sensors.noise import calm, first_noise, unexplained
-from twinloop.identification.terms.directions import directions
 
 
 def from_both_sides(

@@ -97,11 +97,6 @@ class Chain(Recorded, kind="chain"):
         return list(self.states), self.sensors.tolist(), self.motion, self.form
 
 
-def driven_states(signals: Signals, form: str) -> tuple[int, ...]:
-    """The states that a program's outputs drive under a form, in the order of the outputs."""
-    return signals.driven if form in DERIVATIVES else tuple(range(signals.n_x))
-
-
 def chains(signals: Signals, form: str, sensors: Floats) -> list[Chain]:
     """Chains of a form, those without an output last.
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from twinloop.errors import InvalidInput
-from twinloop.identification.sensors.chains import driven_states
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.bounds import Limits
 from twinloop.identification.terms.formulas import bare_term, bounded_term, fixed_term
 from twinloop.identification.terms.pool import Pool
+from twinloop.law.forms import driven_states
 from twinloop.records import Recorded
 from twinloop.signals import Bounds, Signals
 
