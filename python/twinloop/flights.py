@@ -53,7 +53,7 @@ def candidates(
     rows = floats("Flights, genes (candidates, gains)", genes, (None, family.size))
     with engine_input():
         return _core.Flights(
-            (limits or Limits(family.signals)).setting(family),
+            (limits or Limits(family.signals)).setting(family.engine),
             rows,
             _states("Flights, initial states", initial_states, len(rows), n_x),
             _states("Flights, target states", target_states, len(rows), n_x, steps),

@@ -54,7 +54,7 @@ def selected_tests(
         )
     family = tests[0].family
     with engine_input():
-        selected = _core.SelectedTests((limits or Limits(family.signals)).setting(family))
+        selected = _core.SelectedTests((limits or Limits(family.signals)).setting(family.engine))
         for test, trajectory in zip(tests, trajectories, strict=True):
             selected = selected.with_test(
                 test.genes, test.target_state, trajectory.states, trajectory.commands, test.excitation,
@@ -217,7 +217,7 @@ def final_distances(
     """
     with engine_input():
         return _core.final_distances(
-            models, (limits or Limits(family.signals)).setting(family), genes, task, workers=workers
+            models, (limits or Limits(family.signals)).setting(family.engine), genes, task, workers=workers
         )  # fmt: skip
 
 

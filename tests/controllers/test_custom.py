@@ -79,7 +79,7 @@ def test_roll_outs_of_many_lanes_have_the_engines_bits(custom, native, pendulum_
     task = _core.Task([0.0, 0.0], [1.0, 0.0], 20)
     noise = np.random.default_rng(2).normal(0.0, 0.01, (43, 21, 2))
     runs = [
-        _core.rollout(model, Limits(pendulum_signals).setting(family), genes, task, noise=noise)
+        _core.rollout(model, Limits(pendulum_signals).setting(family.engine), genes, task, noise=noise)
         for family in (custom, native)
     ]
     for name in ("states", "measured", "commands", "lasted"):

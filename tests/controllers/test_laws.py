@@ -114,7 +114,9 @@ def test_a_real_run_has_the_bits_of_a_roll_out_of_many_lanes(name):
     plant = SYSTEM.dynamics
     for width in _core.vector_widths():
         workers = _core.Workers(1, width)
-        runs = _core.rollout(plant, Limits(SYSTEM.signals, 1e6).setting(family), genes, task, workers=workers)
+        runs = _core.rollout(
+            plant, Limits(SYSTEM.signals, 1e6).setting(family.engine), genes, task, workers=workers
+        )
         for row in (0, 33, 69):
             controller, state = family.controller(genes[row]), np.zeros(6)
             for k in range(40):

@@ -149,7 +149,7 @@ def test_every_width_flies_the_same_bits_with_rotors_that_lag():
     genes = np.random.default_rng(0).uniform(-0.1, 0.3, (70, family.size))
     task = _core.Task(np.zeros(6), system.target_state, 40)
 
-    setting = Limits(system.signals).setting(family)
+    setting = Limits(system.signals).setting(family.engine)
 
     def flown(width):
         workers = _core.Workers(1, width)

@@ -79,7 +79,7 @@ def test_the_engine_judges_flights_as_their_records_are_judged(seed, kind):
         run = fly(plant, test)
         assert found[0, 0, i] == pytest.approx(quality.flown(run, test.target_state), rel=1e-12)
         distance = _core.final_distances(
-            [plant], Limits(signals).setting(family), genes[i : i + 1], test.task
+            [plant], Limits(signals).setting(family.engine), genes[i : i + 1], test.task
         )
         assert distance[0, 0] == pytest.approx(final_distance(run.states[-1], targets[i, -1]), rel=1e-12)
 
@@ -212,7 +212,7 @@ def test_commands_of_another_shape_are_refused(model, pendulum_signals):
 def test_records_and_tests_are_judged_side_by_side_as_one_by_one(kinds, seed):
     signals, draw = PLANT.signals, np.random.default_rng(seed)
     model, family = pendulum_of(signals), CONTROLLER.bind(signals)
-    none = _core.SelectedTests(Limits(signals).setting(family))
+    none = _core.SelectedTests(Limits(signals).setting(family.engine))
     selected, alone, oracle = none, [], []
     for recorded, steps in kinds:
         states, commands = draw.normal(size=(steps + 1, 2)), draw.uniform(-4.0, 4.0, (steps, 1))

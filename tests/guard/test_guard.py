@@ -114,7 +114,7 @@ def test_looking_ahead_is_the_flight_that_the_members_would_make_of_it(
     test = tl.Test(FAMILY, genes, np.zeros(2), target, steps, excitation, hold_back=hold_back)
     limits = tl.Twin(MEMBERS[0], SIGNALS).limits
     ahead = _core.LookAhead(
-        MEMBERS, limits.setting(FAMILY), genes, target, steps, envelope, excitation=excitation,
+        MEMBERS, limits.setting(FAMILY.engine), genes, target, steps, envelope, excitation=excitation,
         hold_back=None if hold_back is None else hold_back.engine,
     )  # fmt: skip
     for _ in range(2):
@@ -139,7 +139,7 @@ def test_looking_ahead_is_the_flight_that_the_members_would_make_of_it(
 def test_a_member_that_blows_up_leaves_any_envelope():
     program = _core.Program(3, 1, 4, [[("*", 3, 1, 1000.0)]])
     wild = _core.Model(program, "acceleration", SIGNALS.engine)
-    setting, nowhere = tl.Twin(wild, SIGNALS).limits.setting(FAMILY), np.array([[-np.inf, np.inf]] * 2)
+    setting, nowhere = tl.Twin(wild, SIGNALS).limits.setting(FAMILY.engine), np.array([[-np.inf, np.inf]] * 2)
     ahead = _core.LookAhead([wild], setting, [0.0] * 3, [0.0, 0.0], 30, nowhere)
     assert ahead.leaving([0.0, 0.0], 30) is None
     periods, _, member = ahead.leaving([0.0, 1.0], 30)
@@ -158,7 +158,8 @@ def test_a_member_that_blows_up_leaves_any_envelope():
 )
 def test_a_look_ahead_that_fits_no_flight_is_refused(changes):
     arguments = {
-        "members": MEMBERS, "setting": tl.Twin(MEMBERS[0], SIGNALS).limits.setting(FAMILY), "parameters": [0.0] * 3,
+        "members": MEMBERS, "setting": tl.Twin(MEMBERS[0], SIGNALS).limits.setting(FAMILY.engine),
+        "parameters": [0.0] * 3,
         "target": [0.0, 0.0], "steps": 30, "envelope": [[-1.0, 1.0]] * 2, **changes,
     }  # fmt: skip
     with pytest.raises(ValueError, match="expected"):

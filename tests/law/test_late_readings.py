@@ -92,7 +92,7 @@ def test_lanes_read_their_own_pasts():
     genes = test.genes * np.random.default_rng(0).uniform(0.5, 1.5, (37, len(test.genes)))
 
     def flown_by(rows):
-        setting = Limits(signals).setting(test.family)
+        setting = Limits(signals).setting(test.family.engine)
         return _core.rollout(model, setting, rows, test.task)
 
     together = flown_by(genes)

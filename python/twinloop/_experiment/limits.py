@@ -9,7 +9,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.controllers import Family
 from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
@@ -47,14 +46,14 @@ class Limits:
         scales = [np.inf if state.periodic else state.scale for state in self.signals.states]
         return self.divergence_factor * np.array(scales)
 
-    def setting(self, family: Family) -> _core.Setting:
+    def setting(self, family: _core.Family) -> _core.Setting:
         """What the native engine flies controllers in.
 
         Args:
-            family: of the controllers.
+            family: of the controllers, as the engine knows it.
 
         Raises:
             InvalidInput: it is for other signals.
         """
         with engine_input():
-            return _core.Setting(self.engine, family.engine)
+            return _core.Setting(self.engine, family)

@@ -85,7 +85,7 @@ class Setup(Recorded, kind="setup"):
     @cached_property
     def setting(self) -> _core.Setting:
         """What tests are flown in, for the native engine."""
-        return self.limits.setting(self.family)
+        return self.limits.setting(self.family.engine)
 
     @property
     def mixer(self) -> Mixer | None:

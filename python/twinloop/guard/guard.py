@@ -247,7 +247,7 @@ def _look_ahead(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> _c
     try:
         return _core.LookAhead(
             list(members),
-            twin.limits.setting(test.family),
+            twin.limits.setting(test.family.engine),
             test.genes,
             test.target_state,
             test.steps,

@@ -84,7 +84,7 @@ def drawn_runs(
         count = _count(noise, disturbance)
         excitation = None if test.excitation is None else np.tile(test.excitation, (count, 1, 1))
         return _core.rollout(
-            dynamics, limits.setting(test.family), np.tile(test.genes, (count, 1)), test.task,
+            dynamics, limits.setting(test.family.engine), np.tile(test.genes, (count, 1)), test.task,
             noise=noise, excitation=excitation, disturbance=disturbance, workers=workers,
             hold_back=None if test.hold_back is None else test.hold_back.engine,
         )  # fmt: skip

@@ -54,7 +54,7 @@ def learnt(told, workers, form="absolute", seed=7, cuts=(17,)):
 
 def asked(told, models, workers, seed=7, iteration=1, cuts=(7,)):
     family, task, _, _ = told
-    setting = Limits(family.signals).setting(family)
+    setting = Limits(family.signals).setting(family.engine)
     search = start_tests(models, setting, task, OPTIONS, seed=seed, iteration=iteration, workers=workers)
     for generations in cuts:
         search = search.advance(generations, workers)

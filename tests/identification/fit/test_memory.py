@@ -45,7 +45,7 @@ def run(seed, steps):
 
 
 def selected(runs):
-    empty = _core.SelectedTests(Limits(SIGNALS).setting(FAMILY))
+    empty = _core.SelectedTests(Limits(SIGNALS).setting(FAMILY.engine))
     for states, commands in runs:
         empty = empty.with_test([0.5, 0.5, 0.5], [0.0, 0.0], states, commands)
     return empty
@@ -156,7 +156,7 @@ def test_lagging_rotors_remember_what_was_commanded():
     start = np.array([0.3, -0.2, 0.1, 0.0, 0.0, 0.0])
     task = _core.Task(start, np.zeros(6), 6)
     gains = family.genes(system.default_gains)[np.newaxis]
-    flown = _core.rollout(plant, Limits(system.signals).setting(family), gains, task)
+    flown = _core.rollout(plant, Limits(system.signals).setting(family.engine), gains, task)
     commands, states = flown.commands[0], [start]
     for k in range(6):
         states.append(plant.step([states[-1]], commands[[k]], past=commands[np.newaxis, :k])[0])
