@@ -8,11 +8,11 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
+from twinloop.campaign.data.readings import derived, froze, ratio, repeats
+from twinloop.campaign.data.sent import exchanged, other_commands
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of, distinct
 from twinloop.campaign.identify_and_plan.misses import Miss, unexplained
-from twinloop.campaign.identify_and_plan.readings import derived, froze, ratio, repeats
-from twinloop.campaign.identify_and_plan.sent import exchanged, other_commands
 
 DT, STEPS = 0.02, 200
 SIGNALS = tl.Signals(

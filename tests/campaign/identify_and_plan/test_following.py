@@ -10,8 +10,8 @@ from conftest import PENDULUM_GAINS
 from strategies import program_text
 from twinloop import _core
 from twinloop._experiment.limits import Limits
+from twinloop.campaign.data.sent import in_pulses, other_commands
 from twinloop.campaign.identify_and_plan.following import in_pieces
-from twinloop.campaign.identify_and_plan.sent import in_pulses, other_commands
 
 DT, STEPS = 0.02, 250
 SIGNALS = tl.Signals(

@@ -13,11 +13,11 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.streams import Unit
+from twinloop.campaign.data.sent import in_pulses
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.causes import causes_of
 from twinloop.campaign.identify_and_plan.following import WRONG, Following, following, in_pieces
 from twinloop.campaign.identify_and_plan.misses import Miss, misses_any, misses_of, of_each_state
-from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from twinloop.campaign.data.declared import against_derivatives
+from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.excited import Excited
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.identify_and_plan.declared import against_derivatives
 from twinloop.campaign.identify_and_plan.misses import Miss
-from twinloop.campaign.identify_and_plan.readings import suspicious
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.campaign.identify_and_plan.track_record import NEARLY, missed_in_a_row
 from twinloop.remarks import Remark, note, serious

@@ -8,11 +8,11 @@ from functools import partial
 
 from twinloop import _core
 from twinloop._ground.steps import Watch
+from twinloop.campaign.data.levels import levels_of
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.lessons import lesson_of
-from twinloop.campaign.identify_and_plan.levels import levels_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
 from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
+from twinloop.campaign.data.levels import levels_said
+from twinloop.campaign.data.sent import other_commands
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of
-from twinloop.campaign.identify_and_plan.levels import levels_said
 from twinloop.campaign.identify_and_plan.selection import Selected, shortened
-from twinloop.campaign.identify_and_plan.sent import other_commands
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
 from twinloop.campaign.logbook import Logbook
 from twinloop.campaign.replaying import free_errors

@@ -14,9 +14,9 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop._ground.streams import Unit
+from twinloop.campaign.data.sent import in_pulses
 from twinloop.campaign.history import Cause, Experiment
 from twinloop.campaign.identify_and_plan.following import Following, missed_by, squares
-from twinloop.campaign.identify_and_plan.sent import in_pulses
 from twinloop.campaign.replaying import as_flown, lengths_of
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise

@@ -8,9 +8,9 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop.campaign.data.sent import LITTLE, sent_and_asked
 from twinloop.campaign.excited import apart
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.identify_and_plan.sent import LITTLE, sent_and_asked
 from twinloop.law.levels import Levels, in_words, nearest
 from twinloop.remarks import Remark, note
 from twinloop.signals import Bounds, Signals

@@ -12,7 +12,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import cos, product, sin
-from twinloop.campaign.identify_and_plan.integrated import (
+from twinloop.campaign.data.integrated import (
     BENT,
     WALKED,
     contradiction,

@@ -7,7 +7,7 @@ import pytest
 
 import twinloop as tl
 from lives import THOROUGH
-from twinloop.campaign.identify_and_plan.levels import levels_of
+from twinloop.campaign.data.levels import levels_of
 
 DT, STEPS = 0.5, 120
 SIGNALS = tl.Signals([tl.State("warmth", "K", 20.0)], [tl.Command("heat", "1", (0.0, 1.0))], DT)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import twinloop as tl
-from twinloop.campaign.identify_and_plan.declared import against_derivatives
+from twinloop.campaign.data.declared import against_derivatives
 
 DT, STEPS, NOISE = 0.01, 300, 2e-3
 ANGLES, RATES = ("roll", "pitch", "yaw"), ("p", "q", "r")

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import twinloop as tl
+from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.examination.log_check import check_log
-from twinloop.campaign.identify_and_plan.declared import against_derivatives
 
 ANGLES, RATES = ("roll", "pitch", "yaw"), ("p", "q", "r")
 WITHIN = 3

@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.identify_and_plan.integrated import (
+from twinloop.campaign.data.integrated import (
     BENT,
     MOVED,
     WALKED,
@@ -20,7 +20,7 @@ from twinloop.campaign.identify_and_plan.integrated import (
     walk,
     without_line,
 )
-from twinloop.campaign.identify_and_plan.turning import Turned, contradictions, cures, turning
+from twinloop.campaign.data.turning import Turned, contradictions, cures, turning
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, serious
 from twinloop.signals import RigidBody, Signals
