@@ -11,10 +11,14 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
-from twinloop.campaign.data.sent import exchanged, other_commands
+from twinloop.campaign.data.sent import (
+    exchanged,
+    from_another_excitation,
+    from_other_controllers,
+    other_commands,
+)
 from twinloop.campaign.excited import excited
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.identify_and_plan.diagnostics import from_another_excitation, from_other_controllers
 from twinloop.errors import InvalidInput
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious

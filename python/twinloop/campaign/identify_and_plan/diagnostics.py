@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
-from twinloop.campaign.excited import Excited
+from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.misses import Miss
 from twinloop.campaign.identify_and_plan.selection import distinct
@@ -73,51 +73,6 @@ def diagnostics_of(
         said += _free_run(found.misses, len(experiments), signals)
     said += [*_model_error(found.recurring), *_copies(experiments), *_none_complete(experiments, steps)]
     return [*said, *_missed_predictions(experiments)]
-
-
-def from_other_controllers(tests: Sequence[int], exchanged: Sequence[str] = ()) -> Iterator[Remark]:
-    """Tests whose recorded commands are none that their controllers give.
-
-    Args:
-        tests: their numbers.
-        exchanged: names of two commands with which they would be, once exchanged; empty: there are none.
-    """
-    if tests:
-        hint = f" They would be with {' and '.join(exchanged)} exchanged." if exchanged else ""
-        yield serious(
-            "other-commands",
-            f"The commands recorded of test{'s' if len(tests) > 1 else ''} {', '.join(map(str, tests))} are"
-            " none that its controller gives for the recorded states: check the signs, units and order of states"
-            f" and commands, and that the recorded controller is the one that the test names.{hint}",
-        )
-
-
-def from_another_excitation(test: int, how: Excited) -> Iterator[Remark]:
-    """That the excitation of a test was not flown, not held back, or flown twice.
-
-    Args:
-        test: its number.
-        how: its excitation was flown, by the recorded commands.
-    """
-    if how is Excited.NOT:
-        yield note(
-            "excitation",
-            f"The excitation of test {test} was not added to the commands: this flight tells less. The test sheet says"
-            " where it is and how to add it.",
-        )
-    elif how is Excited.WHOLE:
-        yield serious(
-            "excitation",
-            f"The excitation of test {test} was flown without holding it back: such a flight may lead further than its"
-            " sheet says. Scale it by the readings, as the sheet tells; for a program that cannot do this, set"
-            " hold_back = false under [options] and begin a new campaign: then the excitation stays small.",
-        )
-    elif how is Excited.TWICE:
-        yield serious(
-            "excitation",
-            f"The excitation of test {test} was flown twice as strong: such a flight may lead further than its sheet"
-            " says. The commands of test.controller() have it already: send them as they are.",
-        )
 
 
 def _unmoved(states: Sequence[str]) -> Iterator[Remark]:
