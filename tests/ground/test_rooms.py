@@ -1,0 +1,92 @@
+"""Each room has a front: the files that others import. All of its other files are its own affair, and stay so."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "python/twinloop"
+MODULES = {
+    ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts): file
+    for file in PACKAGE.rglob("*.py")
+    if file.name != "__init__.py"
+}
+
+# A file that is added here may be imported from outside its room; a file that no one imports any more leaves the list.
+FRONTS = {
+    "_experiment": "envelope hold_back limits replay",
+    "_ground": "arrays elementary showing steps streams texts versions",
+    "autopilots": "declared files sweep",
+    "campaign": "assessment campaign_file certificate cost from_logs history keeping presets remaining setup",
+    "campaign/coevolution": "method search",
+    "campaign/data": "declared levels readings sent",
+    "campaign/examination": (
+        "beside check checking correlation data examination frequency learning log_check loops poles "
+        "rivals steps unseen use"
+    ),
+    "campaign/identify_and_plan": "method",
+    "controllers": "custom family gains state_feedback",
+    "faces": "cli console files notebook plots result run_info terminal",
+    "faces/dashboard": "command",
+    "faces/figures": "catalogue figure plots saving style svg units",
+    "faces/report": "command page source",
+    "faces/report/tables": "controller flights table twin",
+    "faces/text": "table twin verdict words",
+    "guard": "guarded",
+    "identification": "identified identify outliers records remarks settings",
+    "identification/fit": "alternation committee fitting models predictions promises tuning",
+    "identification/proposals": (
+        "apart at_once bare contacts friction hidden lags parts second_look storage terms undisturbed"
+    ),
+    "identification/search": (
+        "behind_a_law directions hidden moderation noise problem selection structure walks"
+    ),
+    "identification/sensors": "chains euler_steps noise offsets",
+    "identification/terms": (
+        "bounds candidates denominators directions formulas friction hinges joints libraries pool priors "
+        "sizes"
+    ),
+    "law": (
+        "accuracy actuation equations expressions flight flown forms law levels noise parsing pieces twin "
+        "uncertainty"
+    ),
+    "law/exports": "environment export gymnasium_source taking",
+    "law/exports/fmu": "running unit",
+    "law/linear": "margins plant state_space storage",
+    "planning": "excitation gains gusts judging leaving planner proposal quality scored seen settings",
+    "records": "reading",
+    "reproduce": "command",
+    "sweep": "command progress seeds workers",
+    "systems": "base named patience quadrotor stepped",
+}
+
+
+def imported(file):
+    """Modules of the package that a file imports, also by their names in a text."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+def fronts():
+    """By room the files that are imported from outside of it; what is in a room within a room is inside of both."""
+    found = defaultdict(set)
+    for importer in (*PACKAGE.rglob("*.py"), *(ROOT / "studies").rglob("*.py")):
+        for name in imported(importer):
+            file = MODULES.get(name)
+            if file is not None and file.parent not in (PACKAGE, *importer.parents):
+                found[file.parent.relative_to(PACKAGE).as_posix()].add(file.stem)
+    return dict(found)
+
+
+def test_only_the_front_of_a_room_is_imported_from_outside():
+    listed = {room: set(names.split()) for room, names in FRONTS.items()}
+    found = fronts()
+    entered = {room: sorted(names - listed.get(room, set())) for room, names in found.items()}
+    unused = {room: sorted(names - found.get(room, set())) for room, names in listed.items()}
+    assert not any(entered.values()), f"imported from outside, but not at the front: {entered}"
+    assert not any(unused.values()), f"at the front, but not imported from outside: {unused}"
