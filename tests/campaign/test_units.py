@@ -74,6 +74,17 @@ class Plant:
 
     def campaign(self, **changes):
         units = self.units
+        controller = self.controller()
+        self.default_gains = {name: 0.375 * high for name, (_, high) in controller.gains.items()}
+        options = {**QUICK, **changes.pop("options", {})}
+        return tl.Campaign(
+            self.signals, controller=controller, initial_state=np.array(self.start) * units.states,
+            target_state=np.array(self.target) * units.states, duration=24 * self.dt * units.time,
+            preset="default", threads=1, options=options, **changes,
+        )  # fmt: skip
+
+    def controller(self):
+        units = self.units
         first, second = (name for name, _, _ in self.names)
         # Gains are commands per state, per state and time, and commands times time per state.
         p = units.command / units.states[0]
@@ -82,14 +93,7 @@ class Plant:
             f"{first}.ki": (0.0, 1.0 * p / units.time),
             f"{first}.kd": (0.0, 2.0 * self.rate_gain()),
         }
-        self.default_gains = {name: 0.375 * high for name, (_, high) in gains.items()}
-        controller = tl.controllers.PID(axes=[(first, second if self.derivative else None)], gains=gains)
-        options = {**QUICK, **changes.pop("options", {})}
-        return tl.Campaign(
-            self.signals, controller=controller, initial_state=np.array(self.start) * units.states,
-            target_state=np.array(self.target) * units.states, duration=24 * self.dt * units.time,
-            preset="default", threads=1, options=options, **changes,
-        )  # fmt: skip
+        return tl.controllers.PID(axes=[(first, second if self.derivative else None)], gains=gains)
 
     def rate_gain(self):
         units = self.units
@@ -114,6 +118,20 @@ class Cart(Plant):
             speed = speed + 0.025 * (1.5 * u - 0.5 * speed * abs(speed) - 0.25 * place)
             place = place + 0.025 * speed
         return np.array([place, speed])
+
+
+class FedBackCart(Cart):
+    """The same under a feedback of its full state and of an integral, with gains by LQR among the starts."""
+
+    def controller(self):
+        units = self.units
+        per_place, per_speed = units.command / units.states
+        gains = {
+            "place->u": (0.0, 4.0 * per_place),
+            "speed->u": (0.0, 4.0 * per_speed),
+            "place.integral->u": (0.0, 2.0 * per_place / units.time),
+        }
+        return tl.controllers.StateFeedback(["place", "speed"], gains, integral=["place"])
 
 
 class Tanks(Plant):
@@ -208,12 +226,13 @@ LAWS = {"increments": {"form": "increment"}, "a form that is searched": {}}
 def in_si():
     one = Units([1.0, 1.0])
     tanks = {law: decisions(Tanks, one, options=options) for law, options in LAWS.items()}
-    return {Cart: decisions(Cart, one), **tanks}
+    return {Cart: decisions(Cart, one), FedBackCart: decisions(FedBackCart, one), **tanks}
 
 
+@pytest.mark.parametrize("cart", [Cart, FedBackCart])
 @pytest.mark.parametrize("units", CARTS.values(), ids=CARTS)
-def test_a_cart_is_learnt_and_flown_alike_in_any_units(in_si, units):
-    same(decisions(Cart, units), in_si[Cart])
+def test_a_cart_is_learnt_and_flown_alike_in_any_units(in_si, units, cart):
+    same(decisions(cart, units), in_si[cart])
 
 
 @pytest.mark.parametrize("law", LAWS)

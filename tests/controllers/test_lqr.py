@@ -77,6 +77,38 @@ def test_weights_and_integrals_reach_the_equation(pendulum_signals):
     np.testing.assert_allclose(list(found.values()), expected, rtol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "factors", [(2.0**40, 1.0, 1.0), (1.0, 2.0**-30, 2.0**20), (2.0**-50, 2.0**45, 2.0**30)]
+)
+def test_a_power_of_two_in_the_units_of_a_state_or_command_changes_no_bit(factors):
+    angle, rate, torque = factors
+    a, b = np.array([[1.0, 0.05], [0.1, 0.98]]), np.array([[0.01], [0.4]])
+
+    def gains(angle, rate, torque):
+        states, command = np.array([angle, rate]), np.array([torque])
+        signals = tl.Signals(
+            [tl.State("angle", "", np.pi * angle), tl.State("rate", "", 8.0 * rate)],
+            [tl.Command("torque", "", (-2.0 * torque, 2.0 * torque))],
+            dt=0.05,
+        )
+        family = StateFeedback(None, (-1e30, 1e30), integral=["angle"]).bind(signals)
+        found = lqr_gains(
+            lambda x, u: (a @ (x / states) + b @ (u / command)) * states, family, [0.25 * angle, 0.0]
+        )
+        return [found[f"{name}->torque"] for name in ("angle", "rate", "angle.integral")]
+
+    expected = np.array(gains(1.0, 1.0, 1.0)) * torque / np.array([angle, rate, angle])
+    assert gains(angle, rate, torque) == expected.tolist()
+
+
+def test_an_integrals_default_weight_is_that_of_an_error_for_a_second(pendulum_signals):
+    family = StateFeedback(None, WIDE, integral=["angle"]).bind(pendulum_signals)
+    a_second = {"angle.integral": 1.0 / np.pi**2}  # the angle's scale is π
+    assert lqr_gains(pendulum_step, family, [0.0, 0.0]) == lqr_gains(
+        pendulum_step, family, [0.0, 0.0], a_second
+    )
+
+
 def test_a_mixers_slope_at_rest_stands_between_output_and_command(pendulum_signals):
     """Through command = √(u + 1.44), a gain must undo the slope 1 / 2.4 at the rest of 1.2."""
     a, b = np.array([[1.0, 0.05], [0.1, 0.98]]), np.array([[0.01], [0.4]])

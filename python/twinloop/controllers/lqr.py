@@ -47,7 +47,8 @@ def lqr_gains(
         family: a bound `StateFeedback`.
         target_state: (n_x,), SI units, radians.
         state_weights: cost of a squared error by the name of its state, or "<state>.integral"; by default
-            1 / scale² of the state, and the same for its integral over seconds.
+            1 / scale², and 1 / (scale · 1 s)² for an integral: an error of one scale that lasted a second costs as
+            much as one that is there.
         command_weights: cost of a command's squared deviation from its rest, by name; by default 1 / scale².
 
     Returns:
@@ -82,6 +83,15 @@ def lqr_gains(
     a, b = _with_integrals(a[np.ix_(fed_back, fed_back)], product(b[fed_back], mixing), family)
     q = np.diag(state_costs)
     r = product(mixing.T * np.array(command_costs), mixing)
+    # Each state in its scale, each integral in what one scale fills in a period, each output in what costs 1: which
+    # pivot is the largest, and whether a deviation has settled, then depends on no unit.
+    sizes_in = np.array(
+        [*(scales[name] for name in family.states), *(scales[name] * signals.dt for name in family.integral)]
+    )
+    costs = np.diag(r)
+    sizes_out = 1.0 / np.sqrt(np.where(costs > 0.0, costs, 1.0))
+    a, b = a * sizes_in / sizes_in[:, np.newaxis], b * sizes_out / sizes_in[:, np.newaxis]
+    q, r = q * sizes_in * sizes_in[:, np.newaxis], r * sizes_out * sizes_out[:, np.newaxis]
     # No finite cost stands for "no gains": both the equation and the last solution must have one.
     x = solve_riccati(a, b, q, r)
     gains = None
@@ -93,6 +103,7 @@ def lqr_gains(
             " that no feedback stabilises there; learn from more tests, feed back other states, or give every"
             " state that drifts a weight."
         )
+    gains = gains * sizes_out[:, np.newaxis] / sizes_in
     best = {gain.name: value for gain, value in zip(family.law_gains, gains.ravel().tolist(), strict=True)}
     return family.parameters([np.clip(best[gain.name], gain.low, gain.high) for gain in family.gains])
 

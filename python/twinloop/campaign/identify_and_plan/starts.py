@@ -56,8 +56,16 @@ def linear_gains(setup: Setup, committee: Committee) -> list[Floats]:
     family = setup.family
     if not isinstance(family, FeedbackFamily) or not committee.trusted:
         return []
+    # An error of one scale that lasted the whole flight costs as much as one that is there: no second is special.
+    duration = setup.steps * setup.signals.dt
+    filled = {
+        f"{state.name}.integral": state.scale * duration
+        for state in setup.signals.states
+        if state.name in family.integral
+    }
+    weights = {name: 1.0 / (size * size) for name, size in filled.items()}
     try:
-        return [family.genes(lqr_gains(committee.members[0], family, setup.final_target))]
+        return [family.genes(lqr_gains(committee.members[0], family, setup.final_target, weights))]
     except (NotAvailable, InvalidInput):
         return []
 
