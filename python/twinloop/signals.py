@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats, number
+from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, engine_input, unknown
 from twinloop.records import Recorded
 
@@ -143,7 +144,7 @@ class RigidBody(Recorded, kind="rigid_body"):
 
 
 @dataclass(frozen=True)
-class Signals(Recorded, kind="signals"):
+class Signals(Value, Recorded, kind="signals"):
     """The states and commands of a system, and the period at which commands are sent.
 
     Args:

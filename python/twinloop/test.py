@@ -14,6 +14,7 @@ from twinloop._experiment.hold_back import HoldBack
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, floats, whole
 from twinloop._ground.showing import Shown
+from twinloop._ground.values import Value
 from twinloop.controllers.family import Controller, Family
 from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
@@ -21,7 +22,7 @@ from twinloop.signals import Signals
 
 
 @dataclass(frozen=True, eq=False)
-class Test(Shown, Recorded, kind="test", given=("family",)):
+class Test(Shown, Value, Recorded, kind="test", given=("family",)):
     """One candidate experiment; run it with `system.run(test)`, or by hand with `test.controller()`.
 
     Args:

@@ -9,6 +9,7 @@ import numpy as np
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats
 from twinloop._ground.showing import Shown
+from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
 from twinloop.signals import Signals
@@ -19,7 +20,7 @@ JITTER = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Shown, Recorded, kind="trajectory"):
+class Trajectory(Shown, Value, Recorded, kind="trajectory"):
     """A recorded or simulated run of n steps; `commands[k]` is held from `t[k]` to `t[k + 1]`.
 
     Args:

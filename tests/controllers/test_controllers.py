@@ -1,5 +1,7 @@
 """Controllers: the law of the PID, the mixer, the names and bounds of the gains."""
 
+import copy
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from oracles import Pid, same_bits
+from twinloop._experiment.hold_back import HoldBack
 from twinloop.systems.quadrotor import gains_from_backstepping, gains_from_frequency
 
 ROTORS = [(0.0, 300.0)] * 4
@@ -188,3 +191,74 @@ def test_commands_of_a_whole_run_are_those_that_a_loop_gets(pendulum_signals, pe
     for wrong in (states[:, :1], states[:-1], np.where(states > 1.0, np.nan, states)):
         with pytest.raises(tl.InvalidInput, match=r"Controller\.commands"):
             one.commands(wrong, targets)
+
+
+class Counting:
+    """A law in Python whose commands depend on all that it has heard."""
+
+    def __init__(self, kp):
+        self.kp = kp
+
+    def reset(self):
+        self.heard = 0.0
+
+    def command(self, state, target):
+        self.heard = 0.9 * self.heard + float(target[0] - state[0])
+        return [self.kp * self.heard]
+
+
+EXCITED = np.random.default_rng(3).normal(0.0, 0.2, (25, 1))
+HELD = HoldBack([[-0.5, 0.5], [-np.inf, np.inf]], [[-1.0, 1.0], [-np.inf, np.inf]])
+REMEMBERING = {
+    "a PID that winds up": tl.controllers.PID(
+        [("angle", None)],
+        {"angle.kp": (0.0, 6.0), "angle.ki": (0.0, 6.0), "angle.kd": (0.0, 1.0)},
+        derivative_filter=0.1,
+    ),
+    "a cascade": tl.controllers.Cascade(
+        [("angle", "rate")],
+        {"angle.kp": (0.0, 6.0), "rate.kp": (0.0, 6.0), "rate.ki": (0.0, 6.0), "rate.kd": (0.0, 1.0)},
+        anti_windup="clamping",
+    ),
+    "a state feedback with an integral": tl.controllers.StateFeedback(None, (0.0, 2.0), integral=["angle"]),
+    "a law in Python": tl.controllers.Custom(Counting, {"kp": (0.0, 2.0)}),
+}
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+@pytest.mark.parametrize("law", REMEMBERING)
+def test_a_copy_goes_on_in_the_midst_of_a_run_and_shares_no_memory(pendulum_signals, law, copied):
+    family = REMEMBERING[law].bind(pendulum_signals)
+    stream = np.random.default_rng(5)
+    rows = stream.uniform(-0.8, 0.8, (40, 2, 2))
+
+    def begun():
+        controller = family.controller(0.7 * np.array([g.high for g in family.gains]), EXCITED, HELD)
+        controller.commands(rows[:7, 0], rows[:7, 1])
+        for state, target in rows[7:15]:
+            controller.command(state, target)
+        return controller
+
+    def rest(controller):
+        return [controller.command(*row) for row in rows[15:]]
+
+    expected, original = rest(begun()), begun()
+    other = copied(original)
+    assert same_bits(rest(other), expected)  # the copy first, so that what it does would show in the original
+    assert same_bits(rest(original), expected)
+    other.reset()
+    afresh = family.controller(original.genes, EXCITED, HELD)
+    assert same_bits(copied(other).command(*rows[0]), afresh.command(*rows[0]))
+
+
+def test_a_run_that_is_too_long_to_repeat_is_not_copied(pendulum_signals, pendulum_controller, monkeypatch):
+    monkeypatch.setattr("twinloop.controllers.family.MOST_HEARD", 3)
+    controller = pendulum_controller.bind(pendulum_signals).controller([1.0, 1.0, 0.1])
+    for _ in range(3):
+        controller.command([0.1, 0.0], [1.0, 0.0])
+    copy.copy(controller)
+    controller.command([0.1, 0.0], [1.0, 0.0])
+    with pytest.raises(tl.NotAvailable, match=r"at most 3 periods .* found 4; copy it sooner"):
+        copy.deepcopy(controller)
+    controller.reset()
+    copy.copy(controller)

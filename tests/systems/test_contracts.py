@@ -1,10 +1,13 @@
 """The contract suites pass what keeps its promises and catch what does not."""
 
+import copy
+
 import numpy as np
 import pytest
 
 import twinloop as tl
-from conftest import PENDULUM_GAINS
+from conftest import PENDULUM_GAINS, PENDULUM_SIGNALS, pendulum_step
+from oracles import same_bits
 from twinloop.contracts import ContractBroken, check_controller, check_system
 
 
@@ -27,6 +30,40 @@ def test_controllers_without_a_rate_keep_to_the_contract(pendulum_signals, pendu
     check_controller(pendulum_controller, pendulum_signals)
     lazy = tl.controllers.PID(axes=[("angle", None)], gains=pendulum_controller.gains)
     check_controller(lazy, pendulum_signals, seed=3)
+
+
+def rotorpy():
+    pytest.importorskip("rotorpy", reason='needs pip install --no-deps "rotorpy>=3,<4"')
+    return tl.systems.RotorPy(noise=1e-3, seed=4)
+
+
+def gymnasium():
+    pytest.importorskip("gymnasium", reason="needs pip install 'twinloop[gymnasium]'")
+    return tl.systems.Gymnasium("Pendulum-v1", noise=1e-3, seed=4)
+
+
+SYSTEMS = {
+    "quadrotor": lambda: tl.systems.Quadrotor.harsh(seed=4),
+    "rotorpy": rotorpy,
+    "gymnasium": gymnasium,
+    "simulated": lambda: tl.systems.Simulated(PENDULUM_SIGNALS, pendulum_step, noise=1e-3, seed=4),
+}
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_copy_of_a_system_makes_the_runs_that_this_one_would(name, copied):
+    def flights(system, number):
+        law = tl.controllers.StateFeedback(None, (0.0, 0.5)).bind(system.signals)
+        still = np.zeros(system.signals.n_x)
+        test = tl.Test(law, np.full(law.size, 0.01), still, still, 10)
+        return [system.run(test).states for _ in range(number)]
+
+    system, expected = SYSTEMS[name](), flights(SYSTEMS[name](), 3)
+    flights(system, 1)
+    other = copied(system)
+    assert same_bits(flights(other, 2), expected[1:]) and not same_bits(*expected[1:])
+    assert system.runs == 1 and same_bits(flights(system, 2), expected[1:])
 
 
 class Broken(tl.System):

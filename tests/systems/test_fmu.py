@@ -1,5 +1,7 @@
 """An FMU as the plant: it moves as its source says, begins where it can, and is refused if it is something else."""
 
+import copy
+import gc
 import platform
 import shutil
 import subprocess
@@ -96,6 +98,17 @@ def test_it_keeps_to_the_contract_with_a_fresh_instance_each_run(make, test, pen
     one, two = system.run(test), system.run(test)
     assert not same_bits(one.states, two.states)
     np.testing.assert_array_equal(one.true_states[0], two.true_states[0])
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_flies_on_when_the_first_is_gone(make, test, copied):
+    system, expected = make(noise=0.01), make(noise=0.01)
+    for each in (system, expected):
+        each.run(test)
+    other = copied(system)
+    del system
+    gc.collect()
+    assert same_bits(other.run(test).states, expected.run(test).states)
 
 
 def test_a_step_that_fails_is_said_and_the_next_run_is_well(

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, engine_input
 from twinloop.records import Recorded
 from twinloop.signals import Signals, State
@@ -21,7 +22,7 @@ LEFT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class HoldBack(Recorded, kind="hold_back"):
+class HoldBack(Value, Recorded, kind="hold_back"):
     """The share of an excitation that is sent in a period, from the reading before it.
 
     The share is 1 while every state is within its inner range. It is 0 once a state has reached an end of its outer

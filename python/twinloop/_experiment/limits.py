@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
+from twinloop._ground.values import Value
 from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
@@ -17,7 +18,7 @@ DIVERGENCE_FACTOR = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class Limits(Value):
     """Signals, and how far from 0 their states may get in a simulated run.
 
     Args:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop._ground.arrays import Floats, floats
+from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput
 from twinloop.signals import Signals
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
+class Replay(Value):
     """Recorded commands, sent without a controller.
 
     Args:

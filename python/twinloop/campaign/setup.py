@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats, number, whole
+from twinloop._ground.values import Value
 from twinloop.campaign.coevolution.search import grammar, settings_of_tests, variation
 from twinloop.campaign.presets import AnyOptions, DefaultOptions, Options, options_of
 from twinloop.controllers import Family, Mixer, UnboundFamily
@@ -34,7 +35,7 @@ MOST_STEPS = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Setup(Recorded, kind="setup"):
+class Setup(Value, Recorded, kind="setup"):
     """The question of a campaign.
 
     Args:

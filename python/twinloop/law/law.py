@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from twinloop import _core
+from twinloop._ground.values import Value
 from twinloop.errors import engine_input
 from twinloop.law.actuation import Actuation
 from twinloop.law.expressions import UPRIGHT, Expressions, Node
@@ -15,7 +16,7 @@ from twinloop.signals import RigidBody, Signals
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class Law(Value):
     """Equations, kinematics, actuators, hidden states, sensors' offsets and the integrator of a twin.
 
     The inputs of the expressions are the states, the effects of the commands in units of their scales, and the hidden

@@ -17,6 +17,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop._ground.showing import Shown
+from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, NotAvailable, engine_input
 from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
 from twinloop.law.equations import Equations
@@ -41,7 +42,7 @@ STARTS = 5.0
 """Standard deviations of a sensor by which a flight's first reading may be off the state that its test asks for."""
 
 
-class Twin(Shown, Recorded, kind="twin"):
+class Twin(Shown, Value, Recorded, kind="twin"):
     """A model that replaces the system in simulations.
 
     Args:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop._ground.arrays import Floats, floats, number
+from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, NotAvailable, SystemFailure, unknown
 from twinloop.signals import Signals
 from twinloop.systems.stepped import Deviations, Episode, Stepped
@@ -69,9 +70,8 @@ class FMU(Stepped):
         default_gains: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(signals, noise=noise, seed=seed, default_gains=default_gains)
-        self._fmpy = _library()
         self.path = Path(path)
-        self._description = _described(self._fmpy, self.path)
+        self._description = _described(_library(), self.path)
         known = {variable.name: variable for variable in self._description.modelVariables}
         self._inputs = _references(known, "commands", signals.command_names, commands, ("input",))
         self._outputs = _references(known, "states", signals.state_names, states)
@@ -82,8 +82,7 @@ class FMU(Stepped):
             (reference, number(f"FMU, parameters: {name}", value))
             for reference, (name, value) in zip(named, given.items(), strict=True)
         ]
-        self._folder = _unpacked(self.path)
-        weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+        self._unpacked = _Unpacked(self.path)
 
     def _begin(self, test: Test) -> Episode:
         return _Run(self, test)
@@ -102,7 +101,7 @@ class _Run:
         try:
             simulation = importlib.import_module("fmpy.simulation")
             self.instance = simulation.instantiate_fmu(
-                system._folder, system._description, fmi_type="CoSimulation", require_functions=False
+                system._unpacked.folder, system._description, fmi_type="CoSimulation", require_functions=False
             )
             if self.second:
                 self.instance.setupExperiment(startTime=0.0)
@@ -204,11 +203,14 @@ def _check_members(path: Path, members: Iterable[zipfile.ZipInfo]) -> None:
         )
 
 
-def _unpacked(path: Path) -> str:
-    folder = tempfile.mkdtemp(prefix="twinloop-fmu-")
-    with zipfile.ZipFile(path) as packed:
-        packed.extractall(folder)
-    return folder
+class _Unpacked(Value):
+    """The files of an FMU in a folder that is there as long as a system, or a copy of it, is."""
+
+    def __init__(self, path: Path) -> None:
+        self.folder = tempfile.mkdtemp(prefix="twinloop-fmu-")
+        weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
+        with zipfile.ZipFile(path) as packed:
+            packed.extractall(self.folder)
 
 
 def _references(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 
@@ -198,6 +199,14 @@ class Quadrotor(Repeatable, System, kind="quadrotor"):
             disturbance = as_disturbance(gust_accelerations(stream, test.steps, self.gusts, dt), dt)
         self.runs += 1
         return fly(self._dynamics, test, noise=noise, disturbance=disturbance)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Quadrotor:
+        """A vehicle of its own, whose next run is the one that this would make."""
+        memo[id(self._dynamics)] = self._dynamics  # it never changes
+        copied = copy.copy(self)
+        memo[id(self)] = copied
+        vars(copied).update(copy.deepcopy(vars(self), memo))
+        return copied
 
     def _mixer(self) -> Mixer:
         """Squared speeds from torques at hover thrust (specification, section 5)."""
