@@ -47,10 +47,11 @@ def written(text):
         bare = line.split("#")[0].rstrip()
         if not bare:
             continue
-        if " = " in bare:
-            found.append(list(bare.split(" = ", 1)))
+        if " = " in bare or bare.endswith(" ="):
+            found.append([side.strip() for side in bare.split(" =", 1)])
         else:
-            assert bare.lstrip()[0] in "+-", "a line that goes on begins with a sign"
+            sign = bare.lstrip()[0] in "+-"
+            assert sign or not found[-1][1], "a line that goes on begins with a sign"
             found[-1][1] += " " + bare.lstrip()
     return found
 
@@ -317,13 +318,34 @@ def test_each_line_of_every_form_is_read_by_sympy_and_has_its_deviation(which, d
         assert part or not constants or "±" in said, f"{left} = {right}"
 
 
+ENDLESS = "n" * 72
+
+
+@pytest.mark.parametrize("committee", [False, True])
+@pytest.mark.parametrize("form", FORMS[:3])
+def test_a_line_breaks_behind_the_equals_sign_of_a_name_that_fills_it(form, committee):
+    signals = tl.Signals(
+        [tl.State(ENDLESS, "m", 1.0), tl.State("v", "m/s", 1.0, derivative_of=ENDLESS)],
+        [tl.Command("u", "V", (-1.0, 1.0))],
+        dt=0.1,
+    )
+    twin = twin_of(["r3 = r0 * -0.125", "r4 = r0 * r1", "r3 = r3 + r4", "r4 = r0 * 0.5"], form, signals, 3)
+    law = Law.of(twin.model, signals)
+    members = [law, perturbed(law, 0.01)] if committee else []
+    text = equations(law, members)
+    assert all(len(line) <= 100 for line in text.splitlines())
+    if form != "acceleration":
+        assert f"{ENDLESS}[k+1] =\n    " in text
+    assert all(right for _, right in written(text))
+
+
 def blocks(body):
     """Left side, right side and notes of each equation."""
     found = []
     for line in body.splitlines():
         bare, _, note = line.partition("#")
-        if " = " in bare:
-            found.append([*bare.split(" = ", 1), ""])
+        if " = " in bare or bare.endswith(" ="):
+            found.append([*bare.split(" =", 1), ""])
         else:
             found[-1][1] += bare
         found[-1][2] += note

@@ -43,7 +43,8 @@ class Equations:
     """A law as text that SymPy reads, too, with symbols for the names as its `locals`: `str(Equations(law))`.
 
     Sums are multiplied out and like terms collected, unless every bit is asked for. A line that goes on begins with the
-    sign of its first term. Lines have at most 100 columns, where the names of the signals allow it.
+    sign of its first term, or stands below the equals sign that ends a line. Lines have at most 100 columns, where the
+    names of the signals allow it.
 
     Args:
         law: to be written.
@@ -284,7 +285,9 @@ def _equation(left: str, pieces: Sequence[_Piece]) -> list[str]:
         for place, (sign, text) in enumerate(piece.terms):
             first = number == place == 0
             part = (text if sign == "+" else f"-{text}") if first else f"{sign} {text}"
-            if not first and row.strip() and len(row) + 1 + len(part) > room:
+            # Behind an equals sign nothing is gained where the next line begins as far to the right.
+            breaks = len(left) >= LONG_NAME if first else row.strip()
+            if breaks and len(row) + 1 + len(part) > room:
                 rows.append(row)
                 row = indent
             row = f"{row} {part}"
