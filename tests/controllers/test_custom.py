@@ -183,6 +183,12 @@ def test_a_law_that_cannot_be_made_is_refused(pendulum_signals):
 
     with pytest.raises(tl.InvalidInput, match="without reset"):
         Custom(lambda kp: NoReset(), {"kp": (0, 1)}).bind(pendulum_signals)
+    with pytest.raises(
+        tl.InvalidInput, match=r"kp, kq by name, found PlainPid\(kp, ki, kd\): .*'ki'; give its"
+    ):
+        Custom(PlainPid, {"kp": (0, 1), "kq": (0, 1)})
+    with pytest.raises(tl.InvalidInput, match=r"found NoReset\(\): got an unexpected keyword argument 'kp'"):
+        Custom(NoReset, {"kp": (0, 1)})
     with pytest.raises(tl.InvalidInput, match="a class of controllers"):
         Custom(None, GAINS)
     with pytest.raises(tl.InvalidInput, match="at least one gain with bounds"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -46,7 +47,7 @@ class Custom:
         units: of the gains, by name; without one "".
 
     Raises:
-        InvalidInput: a law that cannot be called, no gains, or bounds in the wrong order.
+        InvalidInput: a law that cannot be called with these gains by name, no gains, or bounds in the wrong order.
     """
 
     law: Callable[..., Law]
@@ -66,12 +67,28 @@ class Custom:
                     f"Custom, gains: expected names that can be arguments, found {name!r}; rename it."
                 )
         object.__setattr__(self, "gains", bounds_by_name("Custom", self.gains, names))
+        self._check_constructor(names)
         units = {} if self.units is None else self.units
         if not isinstance(units, Mapping) or not all(name in names for name in units):
             raise InvalidInput(
                 f"Custom, units: expected a dict of units by the names of gains, found {units!r}; correct it."
             )
         object.__setattr__(self, "units", dict(units))
+
+    def _check_constructor(self, names: list[str]) -> None:
+        """Refuses a law that cannot be made with these gains, before its own errors can be taken for that."""
+        try:
+            signature = inspect.signature(self.law)
+        except (TypeError, ValueError):  # what is not written in Python may have none
+            return
+        try:
+            signature.bind(**dict.fromkeys(names, 0.0))
+        except TypeError as reason:
+            raise InvalidInput(
+                f"Custom, law: expected one that is made with the gains {', '.join(names)} by name, found"
+                f" {getattr(self.law, '__name__', self.law)}{signature}: {reason}; give its constructor these names,"
+                " or correct the names of the gains."
+            ) from reason
 
     def bind(self, signals: Signals) -> Family:
         """The family over these signals; gains in the order of their names.
