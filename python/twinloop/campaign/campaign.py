@@ -675,8 +675,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
         return self.report() if self._book.experiments else repr(self)
 
     def __repr__(self) -> str:
-        told = len(self._book.experiments)
-        return f"Campaign(preset={self.setup.preset!r}, seed={self.setup.seed}, experiments={told})"
+        experiments = len(self._book.experiments)
+        return f"Campaign(preset={self.setup.preset!r}, seed={self.setup.seed}, experiments={experiments})"
 
     @property
     def history(self) -> tuple[Iteration, ...] | tuple[Lesson, ...]:

@@ -111,22 +111,22 @@ class Logbook(Recorded, kind="logbook"):
         book._recount()
         return book
 
-    def first(self, told: int) -> Logbook:
+    def first(self, experiments: int) -> Logbook:
         """The same tests with the first experiments only.
 
         Args:
-            told: how many.
+            experiments: how many.
 
         Raises:
             InvalidInput: there are fewer.
         """
-        if not 0 < told <= len(self.experiments):
+        if not 0 < experiments <= len(self.experiments):
             raise InvalidInput(
-                f"Logbook: expected 1 to {len(self.experiments)} experiments, found {told}; what was learnt belongs to"
-                " another campaign."
+                f"Logbook: expected 1 to {len(self.experiments)} experiments, found {experiments}; what was learnt"
+                " belongs to another campaign."
             )
         book = self.copied()
-        book.recorded, book.withdrawals = self.experiments[:told], []
+        book.recorded, book.withdrawals = self.experiments[:experiments], []
         book.reported = list(self.failures)
         book._recount()
         return book

@@ -103,11 +103,11 @@ class Coevolution:
         self._learn(book, at_once)
 
     def _learn(self, book: Logbook, at_once: bool = False) -> None:
-        self._experiments = told = len(book.experiments)
+        self._experiments = experiments = len(book.experiments)
         latest = self.memory.latest
         if at_once and latest is not None:
             return
-        if latest is None or len(latest.experiments) != told:
+        if latest is None or len(latest.experiments) != experiments:
             latest = self._begun(book)
         if at_once:
             self.memory = replace(self.memory, latest=latest, choosing=None)

@@ -142,10 +142,10 @@ def _of_a_body(runs: Sequence[Run], signals: Signals, noise: Floats) -> Iterator
         (angle, rate, how) for angle, rate, how in zip(body.angles, body.rates, hows, strict=True) if how
     ]
     if wrong:
-        told = "; ".join(f"{angle} {how} the body rates say, mainly {rate}" for angle, rate, how in wrong)
+        sentence = "; ".join(f"{angle} {how} the body rates say, mainly {rate}" for angle, rate, how in wrong)
         ways = cures(flown, noise[angles], noise[rates], body)
         yield serious(
             "kinematics",
-            f"{told}: check their signs and units, the order of the columns, and what the kinematics declare."
+            f"{sentence}: check their signs and units, the order of the columns, and what the kinematics declare."
             + (f" They would agree {', or '.join(ways)}." if ways else ""),
         )

@@ -29,7 +29,7 @@ LAST = 3
 FIRST_MISS = 0.02
 """Share of a quality by which its prediction is taken to miss before any was flown."""
 OF_A_MISS = 2.0
-"""Standard deviations to be told in units of such a miss: of normal misses 87 % are then within two of them."""
+"""Spread of a prediction over the usual miss of earlier ones: of normal misses 87 % are then within two spreads."""
 
 
 def needed_factor(twin: Twin, test: Test | Replay, flown: Trajectory) -> float | None:
@@ -75,10 +75,10 @@ def calibrated(spread: float, predicted: float, flights: Iterable[Experiment]) -
     Args:
         spread: standard deviation over members and noise.
         predicted: the quality.
-        flights: told so far, with the predictions that they were flown on.
+        flights: recorded so far, with the predictions that they were flown on.
 
     Returns:
-        The standard deviation to be told; infinite where the prediction is.
+        The standard deviation of the prediction; `spread` where the prediction is infinite.
     """
     return max(spread, OF_A_MISS * missed(flights) * abs(predicted)) if isfinite(predicted) else spread
 
@@ -87,7 +87,7 @@ def missed(flights: Iterable[Experiment]) -> float:
     """Share of a quality by which predictions have missed it of late.
 
     Args:
-        flights: told so far, with the predictions that they were flown on.
+        flights: recorded so far, with the predictions that they were flown on.
     """
     misses = [
         abs(run.test.predicted - run.quality) / abs(run.quality)

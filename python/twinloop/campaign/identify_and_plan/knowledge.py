@@ -84,13 +84,15 @@ class Knowledge:
     def twins_before(self) -> tuple[TwinBefore, ...]:
         """Twins that have not learnt all, with bands; models alone where an older version has not kept their parts."""
         limits, seed, latest = self.setup.limits, self.setup.seed, self.learnt
-        told = [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
+        experiments = (
+            [lesson.iteration for lesson in latest.lessons[-len(latest.models) :]] if latest.models else []
+        )
         found = {
             learnt: Twin(model, self.setup.signals, (), limits)
-            for learnt, model in zip(told, latest.models, strict=True)
+            for learnt, model in zip(experiments, latest.models, strict=True)
         }
         # Both end with what was learnt last.
-        for learnt, ensemble in zip(reversed(told), reversed(latest.ensembles), strict=False):
+        for learnt, ensemble in zip(reversed(experiments), reversed(latest.ensembles), strict=False):
             found[learnt] = Twin(
                 found[learnt].model, self.setup.signals, (), limits,
                 members=ensemble.members, noise=ensemble.noise, seed=seed, inflation=ensemble.inflation,

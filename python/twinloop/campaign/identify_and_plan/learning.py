@@ -93,7 +93,7 @@ class Learner:
             under_way: the identification of the same experiments, as far as it had come; None: it begins.
             keep: called with the identification wherever it may go on from later.
         """
-        told = len(book.experiments)
+        experiments = len(book.experiments)
         needed = () if asked is None else Knowledge(self.setup, book, asked).needed_factors()
         selected = learnt_from(book.experiments, self.options.most_readings, self.setup.signals)
         identify = self._identification(selected)
@@ -103,13 +103,13 @@ class Learner:
         )
         earlier = None if asked is None else asked.identified
         answer = answered(
-            identify(self.options, iteration=told, earlier=earlier, under_way=under_way, keep=keep)
+            identify(self.options, iteration=experiments, earlier=earlier, under_way=under_way, keep=keep)
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if not answer.explained and self.options.plain != self.options:
-            rough = with_remark(identify(self.options.plain, iteration=PLAIN + told), ROUGH)
+            rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
             answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
         identified = answer.identified
         lesson = lesson_of(answer, is_rough(identified), book, flights, selected, self.workers)
@@ -117,7 +117,7 @@ class Learner:
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
         )
         learnt = Learnt(
-            told,
+            experiments,
             identified,
             answer.believed,
             answer.follows,

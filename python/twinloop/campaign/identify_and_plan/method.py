@@ -112,13 +112,13 @@ class IdentifyAndPlan:
         """Identifies from all that was told, beginning with what was known at the last `ask`."""
 
         def from_all_in(book: Logbook) -> None:
-            latest, told = self.memory.latest, len(book.experiments)
-            if latest is not None and (at_once or latest.experiments == told):
+            latest, experiments = self.memory.latest, len(book.experiments)
+            if latest is not None and (at_once or latest.experiments == experiments):
                 return
             self._tests = tuple(run.number for run in book.experiments)
             asked, begun = self.memory.asked, self.memory.under_way
-            under_way = begun[1] if begun is not None and begun[0] == told else None
-            learnt = self.learner.learnt(book, asked, under_way, partial(self._keep, told))
+            under_way = begun[1] if begun is not None and begun[0] == experiments else None
+            learnt = self.learner.learnt(book, asked, under_way, partial(self._keep, experiments))
             self.memory = Memory(asked=asked, latest=learnt)
 
         asked = self.memory.asked
@@ -138,8 +138,8 @@ class IdentifyAndPlan:
         if known is not None and known.gains is not None and book.same_flights(asked):
             self.memory = replace(self.memory, gains=(book.outcomes, known.gains))
 
-    def _keep(self, told: int, under_way: UnderWay) -> None:
-        self.memory = replace(self.memory, under_way=(told, under_way))
+    def _keep(self, experiments: int, under_way: UnderWay) -> None:
+        self.memory = replace(self.memory, under_way=(experiments, under_way))
 
     def ask(self, book: Logbook, last: bool) -> Test:
         """The next test, with what is expected of it."""
@@ -303,26 +303,26 @@ class IdentifyAndPlan:
         gusts = self._gusts(latest, len(book.experiments))
         return Committee(latest.believed, sensors, latest.follows, slower, latest.explained, gusts)
 
-    def _gusts(self, latest: Learnt, told: int) -> Gusts:
+    def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
         """Disturbances that are known; none that are known to be a model error."""
         setup, lesson = self.setup, latest.lessons[-1]
         errors = [i for i, name in enumerate(setup.signals.state_names) if lesson.cause(name) == "law"]
         noise = latest.identified.noise(setup.signals).without(errors)
-        unit = Unit(setup.seed).part(told, 3)
+        unit = Unit(setup.seed).part(experiments, 3)
         return Gusts(latest.identified.model, noise, setup.quality, unit, setup.limits, self.workers)
 
     def _gains(self, book: Logbook) -> Floats:
         """Gains tuned on the committee; the best ones flown where no model can be trusted."""
-        told = len(book.experiments)
+        experiments = len(book.experiments)
         if self.memory.gains is not None and self.memory.gains[0] == book.outcomes:
             return self.memory.gains[1]
         committee, asked = self._committee(book), self.memory.asked
         starts = starts_of(self.setup, book, committee, None if asked is None else asked.gains)
         genes = starts[0]
         if committee.trusted:
-            genes = self.planner.tune(committee, starts, told, self._scored(book))
+            genes = self.planner.tune(committee, starts, experiments, self._scored(book))
         # What an interruption has left unlearnt must not show in what is tuned afterwards.
-        if self._latest().experiments == told:
+        if self._latest().experiments == experiments:
             self.memory = replace(self.memory, gains=(book.outcomes, genes), scores=None)
         return genes
 
