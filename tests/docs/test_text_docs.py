@@ -35,6 +35,14 @@ def test_the_code_of_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch)
         exec(compile(block, f"{page}, block {number}", "exec"), names)
 
 
+@pytest.mark.parametrize("page", sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")))
+def test_a_page_is_plain_markdown_that_every_reader_shows(page):
+    text = re.sub(
+        r"^```.*?^```", "", (DOCS / page).read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
+    assert not re.search(r"^ *(!!!|\?\?\?\+?|===) ", text, re.MULTILINE)
+
+
 def test_every_option_that_an_ablation_names_exists():
     text = (DOCS / "options.md").read_text(encoding="utf-8")
     changes = re.findall(r"[`\s]([a-z_]+)=([a-z0-9,.]*)[`\s,]", text)
