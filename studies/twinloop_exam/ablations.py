@@ -23,7 +23,16 @@ class Ablation:
     @property
     def settings(self) -> tuple[str, ...]:
         """The options as they are written on the command line, name=value each."""
-        return tuple(f"{name}={_written(value)}" for name, value in self.options.items())
+        return assignments(self.options)
+
+
+def assignments(options: Mapping[str, object]) -> tuple[str, ...]:
+    """Options as they are written on the command line, name=value each.
+
+    Args:
+        options: by name.
+    """
+    return tuple(f"{name}={_written(value)}" for name, value in options.items())
 
 
 def _written(value: object) -> str:

@@ -25,6 +25,7 @@ class Campaigner:
         experiments: after Υ0, by default; more on the systems in `longer`.
         longer: experiments by system where they differ.
         seconds: guess of what one experiment costs, on one core.
+        what: it is, for a table.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Campaigner:
     experiments: int = 4
     longer: Mapping[str, int] = field(default_factory=dict)
     seconds: float = 20.0
+    what: str = ""
 
     def why_missing(self) -> str | None:
         """It needs nothing."""
@@ -48,11 +50,13 @@ class Flyer:
         name: of the learner.
         experiments: after Υ0.
         seconds: guess of what one experiment costs.
+        what: it is, for a table.
     """
 
     name: str
     experiments: int = 6
     seconds: float = 0.1
+    what: str = ""
 
     def why_missing(self) -> str | None:
         """It needs nothing."""
@@ -71,6 +75,7 @@ class Fitter:
         seconds: guess of what one fit costs, on one core.
         experiments: numbers of flights after Υ0 at which it is judged.
         grid: values that `--tune` tries for each hyper-parameter.
+        what: it is, for a table.
     """
 
     name: str
@@ -80,6 +85,7 @@ class Fitter:
     seconds: float = 0.2
     experiments: Sequence[int] = (0, 1, 2, 4, 10, 20)
     grid: Mapping[str, Sequence[object]] = field(default_factory=dict)
+    what: str = ""
 
     def why_missing(self) -> str | None:
         """Why it cannot be run here; None if it can."""
@@ -112,6 +118,7 @@ class Tuner:
         flights: on the system, the first controller included.
         seconds: guess of what one flight costs.
         grid: values that `--tune` tries for each hyper-parameter.
+        what: it is, for a table.
     """
 
     name: str
@@ -121,6 +128,7 @@ class Tuner:
     flights: int = 20
     seconds: float = 0.05
     grid: Mapping[str, Sequence[object]] = field(default_factory=dict)
+    what: str = ""
 
     def why_missing(self) -> str | None:
         """Why it cannot be run here; None if it can."""
@@ -138,6 +146,7 @@ class Optimum:
         starts: the first from C0, the others random.
         draws: of the noise.
         seconds: guess of what it costs.
+        what: it is, for a table.
     """
 
     name: str
@@ -146,6 +155,7 @@ class Optimum:
     draws: int = 20
     patient: Mapping[str, int] = field(default_factory=dict)
     seconds: float = 60.0
+    what: str = ""
 
     def why_missing(self) -> str | None:
         """Why it cannot be run here; None if it can."""

@@ -19,18 +19,23 @@ VERSION = 1
 _RIDGES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 _SPARSE = {"threshold": (0.3, 1.0, 3.0, 10.0), "alpha": (1e-2, 1.0, 10.0, 100.0)}
 _SPARSE_INTEGRAL = {"threshold": (0.03, 0.1, 0.3), "alpha": (1e-8, 1e-7, 1e-6, 1e-5)}
+_RIDGE_REGRESSION = (
+    "ridge regression on all monomials to degree 2 in rates and commands (36 on the quadrotor)"
+)
 _FITTERS: tuple[Fitter, ...] = (
     Fitter(
         "least-squares",
         "least_squares",
         {"form": "increment", "ridge": 1e-6, "variables": "rates"},
         grid={"ridge": _RIDGES},
+        what=_RIDGE_REGRESSION,
     ),
     Fitter(
         "least-squares-integral",
         "least_squares",
         {"form": "integral", "ridge": 1e-9, "variables": "rates"},
         grid={"ridge": _RIDGES},
+        what=f"{_RIDGE_REGRESSION}, in the integral form",
     ),
     *(
         Fitter(
@@ -46,12 +51,13 @@ _FITTERS: tuple[Fitter, ...] = (
             package="pysindy",
             seconds=0.7 if "ensemble" in name else 0.2,
             grid=_SPARSE_INTEGRAL if name.endswith("integral") else _SPARSE,
+            what=what,
         )
-        for name, threshold, alpha in (
-            ("sindy-stlsq", 1.0, 100.0),
-            ("sindy-stlsq-integral", 0.1, 1e-6),
-            ("sindy-ensemble", 1.0, 100.0),
-            ("sindy-ensemble-integral", 0.1, 1e-6),
+        for name, threshold, alpha, what in (
+            ("sindy-stlsq", 1.0, 100.0, "PySINDy as its documentation has it"),
+            ("sindy-stlsq-integral", 0.1, 1e-6, "PySINDy's optimiser on our integral rows"),
+            ("sindy-ensemble", 1.0, 100.0, "PySINDy as its documentation has it, an ensemble"),
+            ("sindy-ensemble-integral", 0.1, 1e-6, "an ensemble of PySINDy's optimiser on our integral rows"),
         )
     ),
     Fitter(
@@ -62,6 +68,7 @@ _FITTERS: tuple[Fitter, ...] = (
         seconds=10.0,
         experiments=(1, 2, 4),
         grid={"window": (1, 3, 5, 9)},
+        what="pyoperon on accelerations averaged over a window",
     ),
 )
 _TUNERS = (
@@ -72,32 +79,58 @@ _TUNERS = (
         "bayes_opt",
         seconds=0.4,
         grid={"acquisition": ("ei", "ucb"), "random": (0, 3)},
+        what="a Gaussian process on the gains alone, tuned on the system itself, C0 first",
     ),
-    Tuner("cma-es", "cma_es", {"step": 0.3}, "cmaes", grid={"step": (0.1, 0.2, 0.3, 0.5)}),
-    Tuner("optuna-tpe", "tree_parzen", {"random": 15}, "optuna", grid={"random": (3, 5, 10, 15)}),
+    Tuner(
+        "cma-es",
+        "cma_es",
+        {"step": 0.3},
+        "cmaes",
+        grid={"step": (0.1, 0.2, 0.3, 0.5)},
+        what="the same by CMA-ES",
+    ),
+    Tuner(
+        "optuna-tpe",
+        "tree_parzen",
+        {"random": 15},
+        "optuna",
+        grid={"random": (3, 5, 10, 15)},
+        what="the same by Optuna",
+    ),
 )
 _IN_EVERY_TABLE = {"libraries": "ours-evolved", **{f"{kind}-tests": f"ours-{kind}" for kind in TEST_KINDS}}
 """Ablations that are measured as the preset itself is, and who they are then."""
 _CAMPAIGNERS = (
-    Campaigner("ours", "default", experiments=10, longer={"quadrotor": 20}),
-    Campaigner("ours-model", "default", arguments={"goal": "model"}),
-    Campaigner("ours-control", "default", arguments={"goal": "control"}),
-    *(Campaigner(who, "default", ABLATIONS[name].options) for name, who in _IN_EVERY_TABLE.items()),
-    Campaigner("ours-no-prior", "default", NO_PRIOR),
+    Campaigner("ours", "default", experiments=10, longer={"quadrotor": 20}, what="the preset `default`"),
+    Campaigner("ours-model", "default", arguments={"goal": "model"}, what="flights for the model alone"),
+    Campaigner(
+        "ours-control", "default", arguments={"goal": "control"}, what="flights for the controller alone"
+    ),
     *(
-        Campaigner(f"without-{name}", "default", each.options, experiments=2)
+        Campaigner(who, "default", ABLATIONS[name].options, what=f"without {ABLATIONS[name].without}")
+        for name, who in _IN_EVERY_TABLE.items()
+    ),
+    Campaigner(
+        "ours-no-prior", "default", NO_PRIOR, what="without libraries, and nothing known of derivatives"
+    ),
+    *(
+        Campaigner(f"without-{name}", "default", each.options, experiments=2, what=f"without {each.without}")
         for name, each in ABLATIONS.items()
         if name not in _IN_EVERY_TABLE
     ),
-    Campaigner("paper", "paper", {"model_generations": 1000}, seconds=5.0),
+    Campaigner("paper", "paper", {"model_generations": 1000}, seconds=5.0, what="the preset `paper`"),
 )
 
 _ALL: tuple[Learner, ...] = (
     *_CAMPAIGNERS,
-    Flyer("random-gains"),
+    Flyer("random-gains", what="Υ0 and gains uniform in their box, for tuning the fits"),
     *_FITTERS,
     *_TUNERS,
-    Optimum("optimum", patient={name: 2000 for name in ("quadrotor-0", "quadrotor", "quadrotor-noisy")}),
+    Optimum(
+        "optimum",
+        patient={name: 2000 for name in ("quadrotor-0", "quadrotor", "quadrotor-noisy")},
+        what="CMA-ES on the true system, several starts; not a learner, a bar",
+    ),
 )
 
 LEARNERS: dict[str, Learner] = {who.name: who for who in _ALL}
@@ -158,11 +191,11 @@ def key(who: Learner, data: Learner | None = None) -> str:
     Returns:
         12 hexadecimal digits; equal settings have equal ones.
     """
-    # What an exam costs, and where it is judged, changes no number of a row.
+    # What an exam costs, where it is judged, and how it is described, changes no number of a row.
     chosen = {
         name: value
         for name, value in asdict(who).items()
-        if name not in ("seconds", "experiments", "longer", "grid", "package")
+        if name not in ("seconds", "experiments", "longer", "grid", "package", "what")
     }
     settings: dict[str, object] = {"version": VERSION, "kind": type(who).__name__, "learner": chosen}
     if isinstance(who, Fitter) and data is not None:

@@ -83,6 +83,7 @@ class Subject:
         fresh: makes the system as a learner meets it, from a seed.
         truth: makes the same without noise and gusts.
         judged_runs: runs over whose noise a controller's quality is averaged; 0: one run of the truth.
+        what: it is, for a table.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Subject:
     fresh: Callable[[int], Any]
     truth: Callable[[], Any]
     judged_runs: int = 0
+    what: str = ""
 
     def rig(self, seed: int) -> Rig:
         """The system as a learner meets it, not flown yet.
@@ -181,11 +183,43 @@ def _harsh_in_calm_air() -> Any:
 SUBJECTS: dict[str, Subject] = {
     subject.name: subject
     for subject in (
-        Subject("quadrotor-0", "final_distance", _quadrotor(0.0), systems.Quadrotor),
-        Subject("quadrotor", "final_distance", _quadrotor(NOISE), systems.Quadrotor, NOISY_RUNS),
-        Subject("quadrotor-noisy", "final_distance", _quadrotor(10.0 * NOISE), systems.Quadrotor, NOISY_RUNS),
-        Subject("quadrotor-harsh", "iae", _harsh, _harsh_in_calm_air),
-        Subject("rotorpy", "iae", lambda seed: systems.RotorPy(noise=NOISE, seed=seed), systems.RotorPy),
+        Subject(
+            "quadrotor-0",
+            "final_distance",
+            _quadrotor(0.0),
+            systems.Quadrotor,
+            what="the built-in quadrotor, no noise",
+        ),
+        Subject(
+            "quadrotor",
+            "final_distance",
+            _quadrotor(NOISE),
+            systems.Quadrotor,
+            NOISY_RUNS,
+            f"{NOISE:g} rad and {5.0 * NOISE:g} rad/s of noise on the sensors",
+        ),
+        Subject(
+            "quadrotor-noisy",
+            "final_distance",
+            _quadrotor(10.0 * NOISE),
+            systems.Quadrotor,
+            NOISY_RUNS,
+            "ten times that noise",
+        ),
+        Subject(
+            "quadrotor-harsh",
+            "iae",
+            _harsh,
+            _harsh_in_calm_air,
+            what="the noise of `quadrotor`, with drag, a motor lag and gusts",
+        ),
+        Subject(
+            "rotorpy",
+            "iae",
+            lambda seed: systems.RotorPy(noise=NOISE, seed=seed),
+            systems.RotorPy,
+            what="a vehicle by others, with the same noise",
+        ),
     )
 }
 """Systems of the exam by name."""
