@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
@@ -91,35 +90,3 @@ def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:
         f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names) or '(there are none)'}."
     )
     return InvalidInput(f"Unknown {kind} {str(found)!r}: {advice}")
-
-
-@contextmanager
-def engine_input() -> Iterator[None]:
-    """Turns the engine's refusals into `InvalidInput`, with the engine's own sentence.
-
-    What a user's code raises while the engine calls it comes out as it is.
-
-    Raises:
-        InvalidInput: where the engine raised a ValueError, or an OverflowError for a count below 0.
-    """
-    try:
-        yield
-    except TwinloopError:
-        raise
-    except (ValueError, OverflowError) as refusal:
-        if _raised_by_others(refusal):
-            raise
-        sentence = str(refusal)
-        raise InvalidInput(sentence if sentence.endswith((".", "?")) else f"{sentence}.") from refusal
-
-
-def _raised_by_others(error: BaseException) -> bool:
-    """Whether an error in a block of `engine_input` was raised in a frame of another package than the block's own.
-
-    The engine has no frames of Python: what it refuses itself is raised in the frame that called it.
-    """
-    _, *frames = traceback.walk_tb(error.__traceback__)  # the first one is that of `engine_input`
-    block, *_, innermost = [
-        str(frame.f_globals.get("__name__")).partition(".")[0] for frame, _ in (frames[0], *frames)
-    ]
-    return innermost != block

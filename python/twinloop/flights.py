@@ -12,7 +12,6 @@ from twinloop._experiment.hold_back import HoldBack
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, Integers, floats
 from twinloop.controllers import Family
-from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
 __all__ = ["candidates", "disagreements", "qualities", "quality"]
@@ -51,16 +50,15 @@ def candidates(
     """
     n_x = family.signals.n_x
     rows = floats("Flights, genes (candidates, gains)", genes, (None, family.size))
-    with engine_input():
-        return _core.Flights(
-            (limits or Limits(family.signals)).setting(family.engine),
-            rows,
-            _states("Flights, initial states", initial_states, len(rows), n_x),
-            _states("Flights, target states", target_states, len(rows), n_x, steps),
-            steps,
-            excitation=excitation,
-            hold_back=None if hold_back is None else hold_back.engine,
-        )
+    return _core.Flights(
+        (limits or Limits(family.signals)).setting(family.engine),
+        rows,
+        _states("Flights, initial states", initial_states, len(rows), n_x),
+        _states("Flights, target states", target_states, len(rows), n_x, steps),
+        steps,
+        excitation=excitation,
+        hold_back=None if hold_back is None else hold_back.engine,
+    )
 
 
 def quality(kind: str, weights: ArrayLike, *, effort: float = 0.0, effort_rate: float = 0.0) -> _core.Quality:
@@ -79,8 +77,7 @@ def quality(kind: str, weights: ArrayLike, *, effort: float = 0.0, effort_rate: 
     Raises:
         InvalidInput: an unknown kind, or numbers that are negative or not finite.
     """
-    with engine_input():
-        return _core.Quality(kind, weights, effort=effort, effort_rate=effort_rate)
+    return _core.Quality(kind, weights, effort=effort, effort_rate=effort_rate)
 
 
 def qualities(
@@ -117,11 +114,10 @@ def qualities(
         InvalidInput: members, weights or draws that do not fit the flights.
     """
     envelope = [state.envelope for state in signals.states]
-    with engine_input():
-        return _core.qualities(
-            dynamics, flights, measure, envelope,
-            noise=noise, offsets=offsets, measured=measured, workers=workers,
-        )  # fmt: skip
+    return _core.qualities(
+        dynamics, flights, measure, envelope,
+        noise=noise, offsets=offsets, measured=measured, workers=workers,
+    )  # fmt: skip
 
 
 def disagreements(
@@ -154,8 +150,7 @@ def disagreements(
     Raises:
         InvalidInput: no models, models for other signals, or sds that are not above 0.
     """
-    with engine_input():
-        return _core.disagreements(models, flights, sds, cap=cap, workers=workers)
+    return _core.disagreements(models, flights, sds, cap=cap, workers=workers)
 
 
 def _states(what: str, states: ArrayLike, count: int, n_x: int, steps: int | None = None) -> Floats:

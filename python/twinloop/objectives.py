@@ -12,7 +12,7 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, Integers, floats, number
 from twinloop.controllers import Family
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.signals import Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
@@ -53,13 +53,12 @@ def selected_tests(
             f" and {len(trajectories)} trajectories; pass both in the same order."
         )
     family = tests[0].family
-    with engine_input():
-        selected = _core.SelectedTests((limits or Limits(family.signals)).setting(family.engine))
-        for test, trajectory in zip(tests, trajectories, strict=True):
-            selected = selected.with_test(
-                test.genes, test.target_state, trajectory.states, trajectory.commands, test.excitation,
-                None if test.hold_back is None else test.hold_back.engine,
-            )  # fmt: skip
+    selected = _core.SelectedTests((limits or Limits(family.signals)).setting(family.engine))
+    for test, trajectory in zip(tests, trajectories, strict=True):
+        selected = selected.with_test(
+            test.genes, test.target_state, trajectory.states, trajectory.commands, test.excitation,
+            None if test.hold_back is None else test.hold_back.engine,
+        )  # fmt: skip
     return selected
 
 
@@ -82,8 +81,7 @@ def open_loop(
     Raises:
         InvalidInput: models for other signals.
     """
-    with engine_input():
-        return _core.open_loop(models, selected, workers)
+    return _core.open_loop(models, selected, workers)
 
 
 def closed_loop(
@@ -103,8 +101,7 @@ def closed_loop(
     Raises:
         InvalidInput: models for other signals.
     """
-    with engine_input():
-        return _core.closed_loop(models, selected, workers)[0]
+    return _core.closed_loop(models, selected, workers)[0]
 
 
 def lasted(
@@ -123,8 +120,7 @@ def lasted(
     Raises:
         InvalidInput: models for other signals.
     """
-    with engine_input():
-        return _core.closed_loop(models, selected, workers)[1]
+    return _core.closed_loop(models, selected, workers)[1]
 
 
 def k_step(
@@ -151,8 +147,7 @@ def k_step(
     Raises:
         InvalidInput: models for other signals, or a test that is shorter.
     """
-    with engine_input():
-        return _core.k_step(models, selected, steps, workers)
+    return _core.k_step(models, selected, steps, workers)
 
 
 def frozen_error(trajectory: Trajectory, signals: Signals | None = None) -> float:
@@ -215,10 +210,9 @@ def final_distances(
     Raises:
         InvalidInput: shapes that do not fit.
     """
-    with engine_input():
-        return _core.final_distances(
-            models, (limits or Limits(family.signals)).setting(family.engine), genes, task, workers=workers
-        )  # fmt: skip
+    return _core.final_distances(
+        models, (limits or Limits(family.signals)).setting(family.engine), genes, task, workers=workers
+    )  # fmt: skip
 
 
 def discrimination(distances: ArrayLike, cap: float) -> Floats:

@@ -6,7 +6,6 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats, Integers, floats, whole
-from twinloop.errors import engine_input
 
 __all__ = ["Archive", "best_tradeoff", "crowding_distances", "ideal_point", "ranks", "select"]
 
@@ -25,8 +24,7 @@ def ranks(objectives: ArrayLike) -> Integers:
     Raises:
         InvalidInput: not a matrix, or numbers that are not finite.
     """
-    with engine_input():
-        return _core.ranks(_matrix(objectives))
+    return _core.ranks(_matrix(objectives))
 
 
 def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats:
@@ -42,8 +40,7 @@ def crowding_distances(objectives: ArrayLike, ranks: ArrayLike) -> Floats:
     Raises:
         InvalidInput: shapes that do not fit, or a number that is not finite.
     """
-    with engine_input():
-        return _core.crowding_distances(_matrix(objectives), ranks)
+    return _core.crowding_distances(_matrix(objectives), ranks)
 
 
 def select(objectives: ArrayLike, count: int) -> Integers:
@@ -59,8 +56,7 @@ def select(objectives: ArrayLike, count: int) -> Integers:
     Raises:
         InvalidInput: not a matrix, a number in it that is not finite, or a count below 1.
     """
-    with engine_input():
-        return _core.select(_matrix(objectives), whole("Select, count", count))
+    return _core.select(_matrix(objectives), whole("Select, count", count))
 
 
 def ideal_point(objectives: ArrayLike) -> Floats:
@@ -75,8 +71,7 @@ def ideal_point(objectives: ArrayLike) -> Floats:
     Raises:
         InvalidInput: not a matrix, or no row.
     """
-    with engine_input():
-        return _core.ideal_point(_matrix(objectives))
+    return _core.ideal_point(_matrix(objectives))
 
 
 def best_tradeoff(objectives: ArrayLike, normalised: bool = False) -> int:
@@ -92,8 +87,7 @@ def best_tradeoff(objectives: ArrayLike, normalised: bool = False) -> int:
     Raises:
         InvalidInput: not a matrix, or no row.
     """
-    with engine_input():
-        return _core.best_tradeoff(_matrix(objectives), normalised)
+    return _core.best_tradeoff(_matrix(objectives), normalised)
 
 
 def _matrix(objectives: ArrayLike) -> Floats:

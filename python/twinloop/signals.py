@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop._ground.arrays import Floats, number
 from twinloop._ground.values import Value
-from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
 
 Bounds = tuple[float, float]
@@ -320,24 +320,20 @@ class Signals(Value, Recorded, kind="signals"):
     def engine(self) -> _core.Signals:
         """The same signals as numbers, for the native engine."""
         index = {name: i for i, name in enumerate(self.state_names)}
-        with engine_input():
-            return _core.Signals(
-                self.dt,
-                [state.scale for state in self.states],
-                [command.bounds for command in self.commands],
-                [command.size for command in self.commands],
-                [
-                    None if state.derivative_of is None else index[state.derivative_of]
-                    for state in self.states
-                ],
-                None
-                if self.kinematics is None
-                else (
-                    tuple(index[name] for name in self.kinematics.angles),
-                    tuple(index[name] for name in self.kinematics.rates),
-                ),
-                periods=[state.period for state in self.states],
-            )
+        return _core.Signals(
+            self.dt,
+            [state.scale for state in self.states],
+            [command.bounds for command in self.commands],
+            [command.size for command in self.commands],
+            [None if state.derivative_of is None else index[state.derivative_of] for state in self.states],
+            None
+            if self.kinematics is None
+            else (
+                tuple(index[name] for name in self.kinematics.angles),
+                tuple(index[name] for name in self.kinematics.rates),
+            ),
+            periods=[state.period for state in self.states],
+        )
 
 
 def ordered(what: str, bounds: object) -> Bounds:

@@ -10,7 +10,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input, unknown
+from twinloop.errors import unknown
 from twinloop.signals import Signals
 
 Term = tuple[int, ...]
@@ -53,9 +53,8 @@ class Library:
         Raises:
             InvalidInput: another number of outputs than the signals have unknown derivatives.
         """
-        with engine_input():
-            program = _core.Program.parse(self._text(coefficients, signals))
-            return _core.Model(program, "acceleration", signals.engine)
+        program = _core.Program.parse(self._text(coefficients, signals))
+        return _core.Model(program, "acceleration", signals.engine)
 
     def _text(self, coefficients: Floats, signals: Signals) -> str:
         n_inputs = signals.n_x + signals.n_u

@@ -9,7 +9,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.law.parsing import program_of
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -39,10 +38,7 @@ def fit(
     searches = [search(inputs, target, settings, seed + i) for i, target in enumerate(targets.T)]
     names = {f"X{i + 1}": register for i, register in enumerate(variables)}
     formulas = [formula(found) for found in searches]
-    with engine_input():
-        return _core.Model(
-            program_of(formulas, names, signals.n_x + signals.n_u), "acceleration", signals.engine
-        )
+    return _core.Model(program_of(formulas, names, signals.n_x + signals.n_u), "acceleration", signals.engine)
 
 
 def samples(

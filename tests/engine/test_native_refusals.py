@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import twinloop
-from twinloop import _core
+from twinloop import InvalidInput, _core
 
 STUB = ast.parse(Path(twinloop.__file__).with_name("_core.pyi").read_text(encoding="utf-8"))
-REFUSALS = (ValueError, TypeError, OverflowError)
-"""What a refusal may be; `twinloop.errors.engine_input` makes InvalidInput of the first and the last."""
+REFUSALS = (InvalidInput, TypeError)
+"""What a refusal may be; a TypeError only where a text, a flag or an object of the engine is asked for."""
 
 
 LAWS = ("pid", "cascade", "state_feedback", "python")
@@ -515,6 +515,7 @@ HOSTILE = [
     -1,
     3,
     2**64,
+    10**400,
     math.nan,
     math.inf,
     -math.inf,
@@ -635,7 +636,7 @@ def test_what_is_made_for_other_signals_is_refused(name):
                 continue
             foreign = calls(other)[name][1][argument]
             refusal = attempt(function, {**arguments, argument: foreign})
-            assert isinstance(refusal, ValueError), f"{name} answers with {argument} of another campaign"
+            assert isinstance(refusal, InvalidInput), f"{name} answers with {argument} of another campaign"
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -674,14 +675,14 @@ def test_hostile_arguments_are_refused_or_answered_but_never_a_panic(name):
 def test_counts_that_no_machine_can_hold_are_refused(name, argument):
     function, arguments = CALLS[name]
     for huge in (HUGE, 2**63, 2**64 - 1):
-        assert isinstance(attempt(function, {**arguments, argument: huge}), ValueError), huge
+        assert isinstance(attempt(function, {**arguments, argument: huge}), InvalidInput), huge
 
 
 def test_a_search_that_is_advanced_on_tests_it_was_not_judged_on_is_refused():
     gains, target = OURS.gains[0], OURS.target
     empty = _core.SelectedTests(OURS.setting)
     other = empty.with_test(gains, target, OURS.states + 0.5, OURS.commands)
-    with pytest.raises(ValueError, match="last judged on"):
+    with pytest.raises(InvalidInput, match="last judged on"):
         OURS.search.advance(other, 1, OURS.workers)
     assert OURS.search.learn(other, OURS.workers).advance(other, 1, OURS.workers).generation == 1
 

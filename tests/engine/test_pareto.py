@@ -99,7 +99,7 @@ def test_numbers_that_cannot_be_ordered_are_refused(value):
         lambda: _core.best_tradeoff(rows),
         lambda: archive.offer(rows),
     ):
-        with pytest.raises(ValueError, match="expected finite numbers"):
+        with pytest.raises(InvalidInput, match="expected finite numbers"):
             call()
     assert len(archive) == 0
 
@@ -114,6 +114,8 @@ def test_what_is_no_matrix_is_refused():
         pareto.best_tradeoff(np.zeros((0, 2)))
     with pytest.raises(InvalidInput, match="expected a front"):
         pareto.crowding_distances([[1.0], [2.0]], [0])
+    with pytest.raises(InvalidInput, match="expected a 1-dimensional array"):
+        pareto.crowding_distances([[1.0], [2.0]], [[0, 0]])
     with pytest.raises(InvalidInput, match="expected a whole number"):
         pareto.select([[1.0]], -1)
 
@@ -180,7 +182,24 @@ def test_pruning_drops_the_most_crowded():
 
 
 def test_an_archive_refuses_rows_of_another_width():
-    with pytest.raises(ValueError, match="expected 2 objectives, found 3"):
+    with pytest.raises(InvalidInput, match="expected 2 objectives, found 3"):
         _core.Archive(2).offer([[1.0, 2.0, 3.0]])
-    with pytest.raises(ValueError, match="1 to 1000000 columns"):
+    with pytest.raises(InvalidInput, match="1 to 1000000 columns"):
         _core.Archive(0)
+
+
+def test_an_archive_refuses_what_is_no_count_and_no_matrix():
+    archive = pareto.Archive(2)
+    for call in (
+        lambda: pareto.Archive(-1),
+        lambda: pareto.Archive("two"),
+        lambda: pareto.Archive(2, "no such width"),
+        lambda: archive.prune(-1),
+        lambda: archive.prune(2**64),
+        lambda: archive.offer([1.0, 2.0]),
+        lambda: archive.offer("ab"),
+    ):
+        with pytest.raises(InvalidInput) as refusal:
+            call()
+        assert refusal.value.args[0].endswith(".")
+    assert len(archive) == 0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from oracles import EXACT, UNARY, needed, run_program, same_bits
 from strategies import exact_programs, program_text, programs, rows, seeds
-from twinloop import _core
+from twinloop import InvalidInput, _core
 
 GRAMMAR = _core.Grammar(
     3, 2, operations=["+", "-", "*", "/", "min", "max", "sin", "cos", "tanh", "exp", "sqrt", "abs"]
@@ -169,7 +169,7 @@ HEADER = "program inputs=2 outputs=1 registers=4\n"
     ],
 )
 def test_a_bad_text_names_its_line(text, line, word):
-    with pytest.raises(ValueError, match=rf"line {line}\b") as refusal:
+    with pytest.raises(InvalidInput, match=rf"line {line}\b") as refusal:
         _core.Program.parse(text)
     assert word in str(refusal.value)
     assert "expected" in str(refusal.value)
@@ -184,12 +184,12 @@ def test_a_bad_text_names_its_line(text, line, word):
     ],
 )
 def test_a_text_that_asks_for_endless_memory_is_refused(header):
-    with pytest.raises(ValueError, match="line 1"):
+    with pytest.raises(InvalidInput, match="line 1"):
         _core.Program.parse(header)
 
 
 def test_a_text_of_endless_instructions_is_refused():
-    with pytest.raises(ValueError, match="at most 32768 instructions"):
+    with pytest.raises(InvalidInput, match="at most 32768 instructions"):
         _core.Program.parse(HEADER + "page 1\n" + "r2 = r0 + r1\n" * 32769)
 
 
@@ -213,12 +213,12 @@ def test_a_text_of_endless_instructions_is_refused():
     ],
 )
 def test_a_grammar_that_no_program_can_have_is_refused(hostile):
-    with pytest.raises(ValueError, match="expected"):
+    with pytest.raises(InvalidInput, match="expected"):
         _core.Grammar(2, 1, **hostile)
 
 
 def test_inputs_of_another_width_are_refused():
-    with pytest.raises(ValueError, match="expected 2 columns"):
+    with pytest.raises(InvalidInput, match="expected 2 columns"):
         single("r2 = r0 + r1").run([[1.0, 2.0, 3.0]])
 
 
@@ -339,7 +339,7 @@ def test_half_of_the_crossovers_keep_the_place_of_the_page():
 
 def test_a_program_of_another_shape_is_refused():
     program = _core.Grammar(2, 1).random(0)[0]
-    with pytest.raises(ValueError, match="expected registers"):
+    with pytest.raises(InvalidInput, match="expected registers"):
         GRAMMAR.mutate(program, 0)
-    with pytest.raises(ValueError, match="expected registers"):
+    with pytest.raises(InvalidInput, match="expected registers"):
         GRAMMAR.crossover(GRAMMAR.random(0)[0], program, 0)

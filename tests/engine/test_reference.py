@@ -11,7 +11,6 @@ from oracles import same_bits
 from twinloop import _core, flights
 from twinloop._experiment.limits import Limits
 from twinloop.controllers import PID, Mixer
-from twinloop.errors import engine_input
 from twinloop.law.flight import drawn_runs, fly
 from twinloop.objectives import closed_loop, selected_tests
 from twinloop.planning.quality import quality_of
@@ -149,7 +148,7 @@ def test_a_reference_of_another_length_is_refused(family):
             PLANT.signals, controller=CONTROLLER, initial_state=[0, 0], duration=1.0,
             target_state=lambda t: [1.0, 0.0] if t < 0.3 else [np.nan, 0.0],
         )  # fmt: skip
-    with pytest.raises(tl.InvalidInput, match="a row of it for each of 21 states"), engine_input():
+    with pytest.raises(tl.InvalidInput, match="a row of it for each of 21 states"):
         _core.Task([0.0, 0.0], ROWS[:-1], STEPS)
 
 

@@ -6,7 +6,7 @@ import pytest
 from conftest import setting_of
 from oracles import Pid, close_loop, final_distance, model_step, same_bits
 from strategies import program_text
-from twinloop import _core, objectives
+from twinloop import InvalidInput, _core, objectives
 from twinloop.law.forms import DERIVATIVES as RATES
 from twinloop.law.forms import FORMS
 
@@ -248,25 +248,25 @@ def test_a_failing_step_function_passes_its_own_error_on(rig_setting):
 
     with pytest.raises(KeyError, match="fire"):
         _core.rollout(fails, rig_setting, np.ones((1, 6)), _core.Task(START, TARGET, 5))
-    with pytest.raises(ValueError, match=r"expected a next state of shape \(2,\)"):
+    with pytest.raises(InvalidInput, match=r"expected a next state of shape \(2,\)"):
         _core.rollout(lambda x, u: np.zeros(3), rig_setting, np.ones((1, 6)), _core.Task(START, TARGET, 5))
 
 
 def test_arguments_of_another_shape_are_refused(rig, rig_setting):
     model, task = models(rig, "absolute")[0], _core.Task(START, TARGET, 5)
-    with pytest.raises(ValueError, match="expected 6 columns"):
+    with pytest.raises(InvalidInput, match="expected 6 columns"):
         _core.rollout(model, rig_setting, np.ones((1, 5)), task)
-    with pytest.raises(ValueError, match="noise: expected shape"):
+    with pytest.raises(InvalidInput, match="noise: expected shape"):
         _core.rollout(model, rig_setting, np.ones((1, 6)), task, noise=np.zeros((1, 5, 2)))
     for name in ("excitation", "disturbance"):
-        with pytest.raises(ValueError, match=f"{name}: expected shape"):
+        with pytest.raises(InvalidInput, match=f"{name}: expected shape"):
             _core.rollout(model, rig_setting, np.ones((1, 6)), task, **{name: np.zeros((1, 6, 2))})
-    with pytest.raises(ValueError, match="expected 2 states"):
+    with pytest.raises(InvalidInput, match="expected 2 states"):
         _core.rollout(model, rig_setting, np.ones((1, 6)), _core.Task([0.0], [1.0], 5))
     for wrong in ([0.0, np.nan], [0.0, np.inf]):
-        with pytest.raises(ValueError, match="expected finite"):
+        with pytest.raises(InvalidInput, match="expected finite"):
             _core.Task(START, wrong, 5)
-    with pytest.raises(ValueError, match="steps"):
+    with pytest.raises(InvalidInput, match="steps"):
         _core.Task(START, TARGET, 0)
 
 
@@ -281,10 +281,10 @@ def test_a_recorded_test_that_does_not_fit_is_refused(rig, rig_setting, what):
     tests = _core.SelectedTests(rig_setting)
     assert len(tests.with_test(**good)) == 1
     longer = {**good, what: np.concatenate([good[what], good[what]])}
-    with pytest.raises(ValueError, match="expected"):
+    with pytest.raises(InvalidInput, match="expected"):
         tests.with_test(**longer)
     spoilt = good[what].copy()
     spoilt.flat[0] = np.nan
-    with pytest.raises(ValueError, match="expected"):
+    with pytest.raises(InvalidInput, match="expected"):
         tests.with_test(**{**good, what: spoilt})
     assert len(tests) == 0

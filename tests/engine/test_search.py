@@ -6,7 +6,7 @@ import pytest
 from conftest import setting_of
 from oracles import dominates, non_dominated, same_bits
 from strategies import program_text
-from twinloop import _core, pareto
+from twinloop import InvalidInput, _core, pareto
 
 START, TARGET = [0.3, -0.2], [0.8, 0.1]
 GRAMMAR = _core.Grammar(4, 2, pages=3, page_length=5)
@@ -154,12 +154,12 @@ def test_the_archive_is_filtered_again_when_a_test_is_added(selected):
 
 def test_moving_on_without_learning_the_new_test_is_refused(selected):
     search = started(selected[0])
-    with pytest.raises(ValueError, match="call learn first"):
+    with pytest.raises(InvalidInput, match="call learn first"):
         search.advance(selected[1], 1, WORKERS)
 
 
 def test_a_search_without_tests_is_refused(rig_setting):
-    with pytest.raises(ValueError, match="at least one selected test"):
+    with pytest.raises(InvalidInput, match="at least one selected test"):
         started(_core.SelectedTests(rig_setting))
 
 
@@ -207,7 +207,7 @@ def test_the_intron_share_is_the_mean_over_the_population(selected):
     ],
 )
 def test_a_variation_that_makes_no_generation_is_refused(wrong):
-    with pytest.raises(ValueError, match="expected"):
+    with pytest.raises(InvalidInput, match="expected"):
         _core.Variation(**{"population": 10, **wrong})
 
 
@@ -327,14 +327,14 @@ def test_every_asking_starts_from_another_random_population(committee, rig_setti
 
 def test_a_committee_of_two_kinds_is_refused(rig, rig_setting):
     other = _core.Model(linear(rig, 0.1).program, "increment", rig)
-    with pytest.raises(ValueError, match="all of one form"):
+    with pytest.raises(InvalidInput, match="all of one form"):
         search_of([linear(rig, 0.1), other], rig_setting)
-    with pytest.raises(ValueError, match="one model or more"):
+    with pytest.raises(InvalidInput, match="one model or more"):
         search_of([], rig_setting)
 
 
 def test_a_task_that_starts_at_its_target_is_refused(rig, rig_setting):
-    with pytest.raises(ValueError, match="away from the initial state"):
+    with pytest.raises(InvalidInput, match="away from the initial state"):
         search_of([linear(rig, 0.1)], rig_setting, _core.Task(START, START, 5))
 
 

@@ -63,6 +63,12 @@ def test_distances_that_are_none_are_refused(objective):
         objective([1.0, 2.0], 3.0)
 
 
+@pytest.mark.parametrize("objective", [objectives.discrimination, objectives.instability])
+def test_distances_on_no_model_are_refused(objective):
+    with pytest.raises(tl.InvalidInput, match="at least one row"):
+        objective(np.zeros((0, 5)), 3.0)
+
+
 def test_the_frozen_error_is_that_of_a_model_that_never_moves():
     states = np.random.default_rng(0).normal(size=(8, 3))
     run = tl.Trajectory(np.arange(8) * 0.1, states, np.zeros((7, 1)))

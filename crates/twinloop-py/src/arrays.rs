@@ -1,19 +1,43 @@
 //! Arrays in both directions: whatever NumPy can read as float64 comes in, float64 in C order goes out.
 
-use numpy::ndarray::{Array1, Array2, Array3, ArrayView, Dimension};
-use numpy::{
-    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLike1, PyArrayLike2, PyArrayLike3,
-};
+use numpy::ndarray::{Array1, Array2, Array3, ArrayView, Dimension, Ix1, Ix2, Ix3};
+use numpy::{AllowTypeChange, Element, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLike};
 use pyo3::prelude::*;
 
-use crate::error::{Result, misuse};
+use crate::error::{Result, misuse, refused};
+
+/// An argument that NumPy can read as numbers, with so many axes; refused else.
+pub struct Numbers<'py, D: Dimension, T: Element = f64>(PyArrayLike<'py, T, D, AllowTypeChange>);
 
 /// A vector argument.
-pub type Vector<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+pub type Vector<'py> = Numbers<'py, Ix1>;
 /// A matrix argument.
-pub type Matrix<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+pub type Matrix<'py> = Numbers<'py, Ix2>;
 /// An argument of three axes.
-pub type Cube<'py> = PyArrayLike3<'py, f64, AllowTypeChange>;
+pub type Cube<'py> = Numbers<'py, Ix3>;
+
+impl<'a, 'py, D, T> FromPyObject<'a, 'py> for Numbers<'py, D, T>
+where
+    D: Dimension + 'py,
+    T: Element + 'py,
+    Vec<T>: FromPyObject<'a, 'py>,
+{
+    type Error = PyErr;
+
+    fn extract(argument: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        argument.extract().map(Self).map_err(|error| {
+            let kind = D::NDIM.map_or("an".into(), |axes| format!("a {axes}-dimensional"));
+            refused(argument.py(), &format!("expected {kind} array of numbers: "), error)
+        })
+    }
+}
+
+impl<D: Dimension, T: Element> Numbers<'_, D, T> {
+    /// The numbers where they lie.
+    pub fn as_array(&self) -> ArrayView<'_, T, D> {
+        self.0.as_array()
+    }
+}
 
 /// All numbers of an array, in C order: at once where they lie so.
 pub fn numbers<D: Dimension>(array: ArrayView<'_, f64, D>) -> Vec<f64> {
@@ -101,7 +125,7 @@ pub fn views(rows: &[Vec<f64>]) -> Vec<&[f64]> {
 }
 
 /// A vector for Python.
-pub fn to_vector<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
+pub fn to_vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
     Array1::from_vec(values).into_pyarray(py)
 }
 
@@ -111,11 +135,7 @@ pub fn to_matrix(py: Python<'_>, columns: usize, values: Vec<f64>) -> Bound<'_, 
 }
 
 /// A matrix for Python from values in C order, of which there may be none.
-pub fn to_rows<T: numpy::Element>(
-    py: Python<'_>,
-    shape: [usize; 2],
-    values: Vec<T>,
-) -> Bound<'_, PyArray2<T>> {
+pub fn to_rows<T: Element>(py: Python<'_>, shape: [usize; 2], values: Vec<T>) -> Bound<'_, PyArray2<T>> {
     Array2::from_shape_vec(shape, values).expect("whole rows").into_pyarray(py)
 }
 

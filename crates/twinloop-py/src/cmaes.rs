@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use twinloop_core::{CmaEs, Eigen};
 
 use crate::arrays::{Matrix, Vector, numbers, rows, to_matrix, to_vector, vector};
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::rng::Name;
 
 /// A search for the least value of a function as a value: ask for points, judge them, tell.
@@ -15,7 +15,12 @@ pub struct PyCmaEs(CmaEs);
 #[pymethods]
 impl PyCmaEs {
     #[new]
-    fn new(mean: Vector<'_>, step: f64, population: usize, unit: Name) -> Result<Self> {
+    fn new(
+        mean: Vector<'_>,
+        #[pyo3(from_py_with = given)] step: f64,
+        #[pyo3(from_py_with = given)] population: usize,
+        #[pyo3(from_py_with = given)] unit: Name,
+    ) -> Result<Self> {
         Ok(Self(CmaEs::new(&vector(&mean), step, population, unit.unit()?)?))
     }
 

@@ -8,7 +8,7 @@ use pyo3::sync::MutexExt;
 use twinloop_core::{AnyLaw, Axis, Controller, Family, Gain, Mixer, Outer, Pid, Signals, StateFeedback};
 
 use crate::arrays::{Matrix, Vector, optional_rows, rows, to_matrix, to_vector, vector};
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::excitation::PyHoldBack;
 use crate::law::{PythonLaw, raised};
 use crate::model::PySignals;
@@ -42,10 +42,10 @@ impl PyFamily {
     #[pyo3(signature = (signals, axes, gains, output = None, *, derivative_filter = 0.0, anti_windup = false))]
     fn pid(
         signals: &PySignals,
-        axes: Vec<(usize, Option<usize>)>,
-        gains: Vec<GainBounds>,
-        output: Option<OutputMap<'_>>,
-        derivative_filter: f64,
+        #[pyo3(from_py_with = given)] axes: Vec<(usize, Option<usize>)>,
+        #[pyo3(from_py_with = given)] gains: Vec<GainBounds>,
+        #[pyo3(from_py_with = given)] output: Option<OutputMap<'_>>,
+        #[pyo3(from_py_with = given)] derivative_filter: f64,
         anti_windup: bool,
     ) -> Result<Self> {
         let axes = axes.into_iter().map(|(state, rate)| Axis { state, rate, outer: None }).collect();
@@ -56,10 +56,10 @@ impl PyFamily {
     #[pyo3(signature = (signals, axes, gains, output = None, *, derivative_filter = 0.0, anti_windup = false))]
     fn cascade(
         signals: &PySignals,
-        axes: Vec<(usize, usize, f64)>,
-        gains: Vec<GainBounds>,
-        output: Option<OutputMap<'_>>,
-        derivative_filter: f64,
+        #[pyo3(from_py_with = given)] axes: Vec<(usize, usize, f64)>,
+        #[pyo3(from_py_with = given)] gains: Vec<GainBounds>,
+        #[pyo3(from_py_with = given)] output: Option<OutputMap<'_>>,
+        #[pyo3(from_py_with = given)] derivative_filter: f64,
         anti_windup: bool,
     ) -> Result<Self> {
         let axis = |(angle, state, limit)| Axis { state, rate: None, outer: Some(Outer { angle, limit }) };
@@ -71,11 +71,11 @@ impl PyFamily {
     #[pyo3(signature = (signals, states, integrals, outputs, gains, output = None))]
     fn state_feedback(
         signals: &PySignals,
-        states: Vec<usize>,
-        integrals: Vec<usize>,
-        outputs: usize,
-        gains: Vec<GainBounds>,
-        output: Option<OutputMap<'_>>,
+        #[pyo3(from_py_with = given)] states: Vec<usize>,
+        #[pyo3(from_py_with = given)] integrals: Vec<usize>,
+        #[pyo3(from_py_with = given)] outputs: usize,
+        #[pyo3(from_py_with = given)] gains: Vec<GainBounds>,
+        #[pyo3(from_py_with = given)] output: Option<OutputMap<'_>>,
     ) -> Result<Self> {
         let signals = &signals.0;
         let output = output_map(signals, outputs, output)?;
@@ -84,7 +84,11 @@ impl PyFamily {
     }
 
     #[staticmethod]
-    fn python(signals: &PySignals, make: Py<PyAny>, gains: Vec<GainBounds>) -> Result<Self> {
+    fn python(
+        signals: &PySignals,
+        make: Py<PyAny>,
+        #[pyo3(from_py_with = given)] gains: Vec<GainBounds>,
+    ) -> Result<Self> {
         let signals = &signals.0;
         let law = Arc::new(PythonLaw { make, gains: gains.len() });
         let gains = gains.into_iter().map(Gain::from).collect();

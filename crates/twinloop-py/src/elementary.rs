@@ -1,10 +1,14 @@
 //! Elementary functions over arrays, with the same bits on every processor.
 
-use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn};
+use numpy::ndarray::IxDyn;
+use numpy::{IntoPyArray, PyArrayDyn};
 use pyo3::prelude::*;
 
+use crate::arrays::Numbers;
+use crate::error::given;
+
 /// An argument of any shape.
-type Array<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
+type Array<'py> = Numbers<'py, IxDyn>;
 
 fn each<'py>(py: Python<'py>, x: &Array<'py>, function: fn(f64) -> f64) -> Bound<'py, PyArrayDyn<f64>> {
     x.as_array().mapv(function).into_pyarray(py)
@@ -42,6 +46,6 @@ pub fn tanh<'py>(py: Python<'py>, x: Array<'py>) -> Bound<'py, PyArrayDyn<f64>> 
 
 /// x to the power of y, both numbers.
 #[pyfunction]
-pub fn power(x: f64, y: f64) -> f64 {
+pub fn power(#[pyo3(from_py_with = given)] x: f64, #[pyo3(from_py_with = given)] y: f64) -> f64 {
     libm::pow(x, y)
 }

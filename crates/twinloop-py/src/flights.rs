@@ -11,7 +11,7 @@ use crate::arrays::{
     Cube, Matrix, RowsOrBlocks, Vector, VectorOrRows, optional_blocks, optional_rows, rows, to_cube,
     to_integer_rows, to_vector, vector, views,
 };
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::excitation::PyHoldBack;
 use crate::law::flown;
 use crate::model::{PyModel, PySignals};
@@ -34,8 +34,8 @@ impl PyFlights {
         setting: &PySetting,
         parameters: Matrix<'_>,
         initial_states: Matrix<'_>,
-        target_states: RowsOrBlocks<'_>,
-        steps: usize,
+        #[pyo3(from_py_with = given)] target_states: RowsOrBlocks<'_>,
+        #[pyo3(from_py_with = given)] steps: usize,
         excitation: Option<Cube<'_>>,
         hold_back: Option<&PyHoldBack>,
     ) -> Result<Self> {
@@ -90,7 +90,12 @@ pub struct PyQuality(Quality);
 impl PyQuality {
     #[new]
     #[pyo3(signature = (kind, weights, *, effort = 0.0, effort_rate = 0.0))]
-    fn new(kind: &str, weights: Vector<'_>, effort: f64, effort_rate: f64) -> Result<Self> {
+    fn new(
+        kind: &str,
+        weights: Vector<'_>,
+        #[pyo3(from_py_with = given)] effort: f64,
+        #[pyo3(from_py_with = given)] effort_rate: f64,
+    ) -> Result<Self> {
         let quality = Quality { kind: kind.parse()?, weights: vector(&weights), effort, effort_rate };
         Ok(Self(quality.validated()?))
     }
@@ -99,7 +104,7 @@ impl PyQuality {
     fn recorded(
         &self,
         signals: &PySignals,
-        target: VectorOrRows<'_>,
+        #[pyo3(from_py_with = given)] target: VectorOrRows<'_>,
         states: Matrix<'_>,
         commands: Matrix<'_>,
     ) -> Result<f64> {
@@ -120,7 +125,7 @@ impl PyQuality {
 pub fn usages<'py>(
     py: Python<'py>,
     signals: &PySignals,
-    envelope: Vec<Option<(f64, f64)>>,
+    #[pyo3(from_py_with = given)] envelope: Vec<Option<(f64, f64)>>,
     states: Matrix<'py>,
 ) -> Result<Bound<'py, PyArray1<f64>>> {
     let states = rows("states", &states, signals.0.states())?.concat();
@@ -143,10 +148,10 @@ pub enum Members<'py> {
 #[expect(clippy::type_complexity, reason = "two arrays")]
 pub fn qualities<'py>(
     py: Python<'py>,
-    dynamics: Members<'py>,
+    #[pyo3(from_py_with = given)] dynamics: Members<'py>,
     flights: &PyFlights,
     quality: &PyQuality,
-    envelope: Vec<Option<(f64, f64)>>,
+    #[pyo3(from_py_with = given)] envelope: Vec<Option<(f64, f64)>>,
     noise: Option<Cube<'py>>,
     offsets: Option<Matrix<'py>>,
     measured: bool,
@@ -193,7 +198,7 @@ pub fn disagreements<'py>(
     models: Vec<Bound<'py, PyModel>>,
     flights: &PyFlights,
     sds: Vector<'py>,
-    cap: f64,
+    #[pyo3(from_py_with = given)] cap: f64,
     workers: Option<&PyWorkers>,
 ) -> Result<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<i64>>)> {
     let (workers, flights, sds) = (or_default(workers)?, &flights.0, vector(&sds));

@@ -8,7 +8,7 @@ use pyo3::sync::MutexExt;
 use twinloop_core::{Ahead, LookAhead};
 
 use crate::arrays::{Matrix, Vector, VectorOrRows, optional_rows, rows, to_vector, vector};
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::excitation::PyHoldBack;
 use crate::model::{PyModel, owned};
 use crate::setting::PySetting;
@@ -28,8 +28,8 @@ impl PyLookAhead {
         members: Vec<Bound<'_, PyModel>>,
         setting: &PySetting,
         parameters: Vector<'_>,
-        target: VectorOrRows<'_>,
-        steps: usize,
+        #[pyo3(from_py_with = given)] target: VectorOrRows<'_>,
+        #[pyo3(from_py_with = given)] steps: usize,
         envelope: Matrix<'_>,
         excitation: Option<Matrix<'_>>,
         hold_back: Option<&PyHoldBack>,
@@ -57,7 +57,7 @@ impl PyLookAhead {
         &self,
         py: Python<'_>,
         reading: Vector<'_>,
-        horizon: usize,
+        #[pyo3(from_py_with = given)] horizon: usize,
     ) -> Result<Option<(usize, usize, usize)>> {
         let found = self.lock(py)?.leaving(&vector(&reading), horizon)?;
         Ok(found.map(|leaving| (leaving.periods, leaving.state, leaving.member)))

@@ -10,7 +10,7 @@ use twinloop_core::{
 };
 
 use crate::arrays::{Cube, Matrix, Vector, rows, to_matrix, to_vector, vector};
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::program::PyProgram;
 use crate::rows::Rows;
 use crate::workers::{PyWorkers, or_default};
@@ -24,13 +24,13 @@ impl PySignals {
     #[new]
     #[pyo3(signature = (dt, state_scales, command_bounds, command_scales, derivative_of, kinematics = None, *, periods = None))]
     fn new(
-        dt: f64,
+        #[pyo3(from_py_with = given)] dt: f64,
         state_scales: Vector<'_>,
         command_bounds: Matrix<'_>,
         command_scales: Vector<'_>,
-        derivative_of: Vec<Option<usize>>,
-        kinematics: Option<([usize; 3], [usize; 3])>,
-        periods: Option<Vec<Option<f64>>>,
+        #[pyo3(from_py_with = given)] derivative_of: Vec<Option<usize>>,
+        #[pyo3(from_py_with = given)] kinematics: Option<([usize; 3], [usize; 3])>,
+        #[pyo3(from_py_with = given)] periods: Option<Vec<Option<f64>>>,
     ) -> Result<Self> {
         let bounds = rows("command bounds", &command_bounds, 2)?;
         let signals = Signals {
@@ -68,9 +68,9 @@ impl PyModel {
         program: &PyProgram,
         form: &str,
         signals: &PySignals,
-        actuators: Option<Vec<ActuatorParts>>,
-        hidden: Vec<HiddenParts>,
-        offsets: Vec<f64>,
+        #[pyo3(from_py_with = given)] actuators: Option<Vec<ActuatorParts>>,
+        #[pyo3(from_py_with = given)] hidden: Vec<HiddenParts>,
+        #[pyo3(from_py_with = given)] offsets: Vec<f64>,
     ) -> Result<Self> {
         let acts = actuators.is_some() || !hidden.is_empty();
         let actuation = acts.then(|| actuation(actuators.unwrap_or_default(), hidden));
@@ -79,12 +79,12 @@ impl PyModel {
     }
 
     /// The same model, of which each state is read so many s later (n_x).
-    fn with_offsets(&self, offsets: Vec<f64>) -> Result<Self> {
+    fn with_offsets(&self, #[pyo3(from_py_with = given)] offsets: Vec<f64>) -> Result<Self> {
         Ok(Self(self.0.with_offsets(&offsets)?))
     }
 
     /// The same model, with controllers' commands sent in levels (n_u); none of a command that is sent as it is.
-    fn with_levels(&self, levels: Vec<Vec<f64>>) -> Result<Self> {
+    fn with_levels(&self, #[pyo3(from_py_with = given)] levels: Vec<Vec<f64>>) -> Result<Self> {
         Ok(Self(self.0.with_levels(levels)?))
     }
 
@@ -140,7 +140,11 @@ impl PyModel {
     }
 
     /// The same model without introns, with other constants, and other lags and times of hidden states (none: the same).
-    fn with_constants(&self, constants: Vec<f64>, lags: Option<Vec<f64>>) -> Result<Self> {
+    fn with_constants(
+        &self,
+        #[pyo3(from_py_with = given)] constants: Vec<f64>,
+        #[pyo3(from_py_with = given)] lags: Option<Vec<f64>>,
+    ) -> Result<Self> {
         let times = lags.unwrap_or_else(|| self.0.frame().actuation().times());
         Ok(Self(self.0.varied(&constants, &times)?))
     }
@@ -194,10 +198,10 @@ fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Actuati
 #[pyfunction]
 pub fn command_effects<'py>(
     py: Python<'py>,
-    actuators: Vec<ActuatorParts>,
-    hidden: Vec<HiddenParts>,
+    #[pyo3(from_py_with = given)] actuators: Vec<ActuatorParts>,
+    #[pyo3(from_py_with = given)] hidden: Vec<HiddenParts>,
     scales: Vector<'_>,
-    dt: f64,
+    #[pyo3(from_py_with = given)] dt: f64,
     commands: Matrix<'py>,
 ) -> Result<[Bound<'py, PyArray2<f64>>; 3]> {
     let commands = rows("commands", &commands, actuators.len())?.concat();

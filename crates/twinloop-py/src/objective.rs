@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use twinloop_core::{Model, Signals};
 
 use crate::arrays::{Matrix, finite, rows, to_rows, to_vector, views};
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::law::flown;
 use crate::model::PyModel;
 use crate::rollout::{self, PyTask};
@@ -42,7 +42,7 @@ pub fn k_step<'py>(
     py: Python<'py>,
     models: Models<'py>,
     selected: &PySelectedTests,
-    steps: usize,
+    #[pyo3(from_py_with = given)] steps: usize,
     workers: Option<&PyWorkers>,
 ) -> Result<Errors<'py>> {
     let (workers, selected) = (or_default(workers)?, &selected.0);
@@ -124,7 +124,7 @@ fn columns(distances: &Matrix<'_>, cap: f64) -> Result<Vec<Vec<f64>>> {
 pub fn discrimination<'py>(
     py: Python<'py>,
     distances: Matrix<'py>,
-    cap: f64,
+    #[pyo3(from_py_with = given)] cap: f64,
 ) -> Result<Bound<'py, PyArray1<f64>>> {
     let of_test = |column: Vec<f64>| twinloop_core::discrimination(column.into_iter(), cap);
     Ok(to_vector(py, columns(&distances, cap)?.into_iter().map(of_test).collect()))
@@ -135,7 +135,7 @@ pub fn discrimination<'py>(
 pub fn instability<'py>(
     py: Python<'py>,
     distances: Matrix<'py>,
-    cap: f64,
+    #[pyo3(from_py_with = given)] cap: f64,
 ) -> Result<Bound<'py, PyArray1<f64>>> {
     let of_test = |column: Vec<f64>| twinloop_core::instability(column.into_iter(), cap);
     Ok(to_vector(py, columns(&distances, cap)?.into_iter().map(of_test).collect()))

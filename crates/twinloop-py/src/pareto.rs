@@ -2,12 +2,13 @@
 
 use std::sync::Mutex;
 
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1};
+use numpy::ndarray::Ix1;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::pareto::{self, Distance, NumberedArchive, Objectives};
 
-use crate::arrays::{Matrix, numbers, to_integers, to_matrix, to_vector};
-use crate::error::{Result, misuse};
+use crate::arrays::{Matrix, Numbers, numbers, to_integers, to_matrix, to_vector};
+use crate::error::{Result, given, misuse};
 
 /// The one door at which numbers that are not finite are refused.
 pub fn matrix(array: &Matrix<'_>) -> Result<Objectives> {
@@ -27,7 +28,7 @@ pub fn ranks<'py>(py: Python<'py>, objectives: Matrix<'py>) -> Result<Bound<'py,
 pub fn crowding_distances<'py>(
     py: Python<'py>,
     objectives: Matrix<'py>,
-    ranks: PyArrayLike1<'py, i64, AllowTypeChange>,
+    ranks: Numbers<'py, Ix1, i64>,
 ) -> Result<Bound<'py, PyArray1<f64>>> {
     let objectives = matrix(&objectives)?;
     let ranks: Option<Vec<u32>> = ranks.as_array().iter().map(|&rank| u32::try_from(rank).ok()).collect();
@@ -46,7 +47,7 @@ pub fn crowding_distances<'py>(
 pub fn select<'py>(
     py: Python<'py>,
     objectives: Matrix<'py>,
-    count: usize,
+    #[pyo3(from_py_with = given)] count: usize,
 ) -> Result<Bound<'py, PyArray1<i64>>> {
     Ok(to_integers(py, pareto::select(&matrix(&objectives)?, count)))
 }
@@ -82,7 +83,7 @@ pub struct PyArchive(Mutex<NumberedArchive>);
 impl PyArchive {
     #[new]
     #[pyo3(signature = (columns, width = "auto"))]
-    fn new(columns: usize, width: &str) -> Result<Self> {
+    fn new(#[pyo3(from_py_with = given)] columns: usize, width: &str) -> Result<Self> {
         Ok(Self(Mutex::new(NumberedArchive::new(columns, width.parse()?)?)))
     }
 
@@ -91,7 +92,7 @@ impl PyArchive {
         self.members(py)
     }
 
-    fn prune(&self, cap: usize) -> Result<bool> {
+    fn prune(&self, #[pyo3(from_py_with = given)] cap: usize) -> Result<bool> {
         Ok(self.lock()?.prune(cap))
     }
 

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use twinloop_core::{AnyDynamics, Quadrotor};
 
 use crate::arrays::{Cube, Matrix, Vector, to_matrix, to_vector, vector};
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::rows::Rows;
 use crate::workers::{PyWorkers, or_default};
 
@@ -19,16 +19,16 @@ impl PyQuadrotor {
     #[expect(clippy::too_many_arguments, reason = "the constants of a vehicle, named by keyword in Python")]
     #[pyo3(signature = (dt, *, arm, inertia, rotor_inertia, thrust_factor, drag_factor, gyroscopic, drag = [0.0; 3], motor_lag = 0.0, hover_speed = 0.0))]
     fn new(
-        dt: f64,
-        arm: f64,
-        inertia: [f64; 3],
-        rotor_inertia: f64,
-        thrust_factor: f64,
-        drag_factor: f64,
+        #[pyo3(from_py_with = given)] dt: f64,
+        #[pyo3(from_py_with = given)] arm: f64,
+        #[pyo3(from_py_with = given)] inertia: [f64; 3],
+        #[pyo3(from_py_with = given)] rotor_inertia: f64,
+        #[pyo3(from_py_with = given)] thrust_factor: f64,
+        #[pyo3(from_py_with = given)] drag_factor: f64,
         gyroscopic: &str,
-        drag: [f64; 3],
-        motor_lag: f64,
-        hover_speed: f64,
+        #[pyo3(from_py_with = given)] drag: [f64; 3],
+        #[pyo3(from_py_with = given)] motor_lag: f64,
+        #[pyo3(from_py_with = given)] hover_speed: f64,
     ) -> Result<Self> {
         let gyroscopic = gyroscopic.parse()?;
         let plant = Quadrotor {

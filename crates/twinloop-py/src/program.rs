@@ -12,7 +12,7 @@ use twinloop_core::{
 };
 
 use crate::arrays::{Matrix, rows, to_matrix, views};
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::workers::{PyWorkers, or_default};
 
 /// Pages of instructions over registers: inputs first, then outputs, then spare ones.
@@ -38,10 +38,10 @@ type InstructionParts<'py> = (String, i64, i64, Option<Bound<'py, PyAny>>);
 impl PyProgram {
     #[new]
     fn new(
-        inputs: usize,
-        outputs: usize,
-        registers: usize,
-        pages: Vec<Vec<InstructionParts<'_>>>,
+        #[pyo3(from_py_with = given)] inputs: usize,
+        #[pyo3(from_py_with = given)] outputs: usize,
+        #[pyo3(from_py_with = given)] registers: usize,
+        #[pyo3(from_py_with = given)] pages: Vec<Vec<InstructionParts<'_>>>,
     ) -> Result<Self> {
         let Some(spare) = registers.checked_sub(inputs.saturating_add(outputs)) else {
             return Err(misuse(format!(
@@ -162,19 +162,19 @@ impl PyGrammar {
     ))]
     #[expect(clippy::too_many_arguments, reason = "each is a named option of the paper's method")]
     fn new(
-        inputs: usize,
-        outputs: usize,
-        spare_registers: usize,
-        pages: usize,
-        page_length: usize,
-        operations: Vec<String>,
+        #[pyo3(from_py_with = given)] inputs: usize,
+        #[pyo3(from_py_with = given)] outputs: usize,
+        #[pyo3(from_py_with = given)] spare_registers: usize,
+        #[pyo3(from_py_with = given)] pages: usize,
+        #[pyo3(from_py_with = given)] page_length: usize,
+        #[pyo3(from_py_with = given)] operations: Vec<String>,
         writable_inputs: bool,
-        constant_share: f64,
-        constant_low: f64,
-        constant_high: f64,
-        constant_step: f64,
-        mutation_rate: f64,
-        aligned_pages: f64,
+        #[pyo3(from_py_with = given)] constant_share: f64,
+        #[pyo3(from_py_with = given)] constant_low: f64,
+        #[pyo3(from_py_with = given)] constant_high: f64,
+        #[pyo3(from_py_with = given)] constant_step: f64,
+        #[pyo3(from_py_with = given)] mutation_rate: f64,
+        #[pyo3(from_py_with = given)] aligned_pages: f64,
     ) -> Result<Self> {
         let operations =
             operations.iter().map(|name| name.parse()).collect::<twinloop_core::Result<Vec<Operation>>>()?;
@@ -194,7 +194,11 @@ impl PyGrammar {
     }
 
     #[pyo3(signature = (seed, count = 1))]
-    fn random(&self, seed: u64, count: usize) -> Result<Vec<PyProgram>> {
+    fn random(
+        &self,
+        #[pyo3(from_py_with = given)] seed: u64,
+        #[pyo3(from_py_with = given)] count: usize,
+    ) -> Result<Vec<PyProgram>> {
         let most = Variation::MOST_INDIVIDUALS;
         if count > most {
             return Err(misuse(format!("grammar: expected at most {most} programs, found {count}")));
@@ -202,12 +206,17 @@ impl PyGrammar {
         Ok((0..count).map(|unit| self.0.random(&mut single(seed, unit as u64)).into()).collect())
     }
 
-    fn mutate(&self, program: &PyProgram, seed: u64) -> Result<PyProgram> {
+    fn mutate(&self, program: &PyProgram, #[pyo3(from_py_with = given)] seed: u64) -> Result<PyProgram> {
         self.0.check(&program.0.program)?;
         Ok(self.0.mutate(&program.0.program, &mut single(seed, 0)).into())
     }
 
-    fn crossover(&self, first: &PyProgram, second: &PyProgram, seed: u64) -> Result<(PyProgram, PyProgram)> {
+    fn crossover(
+        &self,
+        first: &PyProgram,
+        second: &PyProgram,
+        #[pyo3(from_py_with = given)] seed: u64,
+    ) -> Result<(PyProgram, PyProgram)> {
         self.0.check(&first.0.program)?;
         self.0.check(&second.0.program)?;
         let (first, second) = self.0.crossover(&first.0.program, &second.0.program, &mut single(seed, 0));

@@ -9,7 +9,7 @@ use twinloop_core::{
 };
 
 use crate::arrays::{Matrix, Vector, finite, rows, to_matrix, to_vector, vector};
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::rng::Name;
 use crate::workers::{PyWorkers, or_default};
 
@@ -28,7 +28,12 @@ pub struct PyRegression(Regression);
 #[pymethods]
 impl PyRegression {
     #[new]
-    fn new(states: usize, dt: f64, form: &str, records: Vec<RecordArrays<'_>>) -> Result<Self> {
+    fn new(
+        #[pyo3(from_py_with = given)] states: usize,
+        #[pyo3(from_py_with = given)] dt: f64,
+        form: &str,
+        #[pyo3(from_py_with = given)] records: Vec<RecordArrays<'_>>,
+    ) -> Result<Self> {
         let chain = Chain { states, dt, form: form.parse()? }.validated()?;
         let features = records.first().map_or(0, |(_, _, start, _, _)| start.as_array().ncols());
         let record = |(measured, weights, start, middle, end): &RecordArrays<'_>| {
@@ -55,11 +60,20 @@ impl PyRegression {
         Ok(residuals.into_iter().map(|residual| to_matrix(py, self.0.chain().states, residual)).collect())
     }
 
-    fn likelihood(&self, coefficients: Vector<'_>, sensors: Vector<'_>, motion: Motion) -> Result<f64> {
+    fn likelihood(
+        &self,
+        coefficients: Vector<'_>,
+        sensors: Vector<'_>,
+        #[pyo3(from_py_with = given)] motion: Motion,
+    ) -> Result<f64> {
         Ok(self.0.likelihood(&vector(&coefficients), &self.noise(&sensors, motion)?)?)
     }
 
-    fn log_determinant(&self, sensors: Vector<'_>, motion: Motion) -> Result<f64> {
+    fn log_determinant(
+        &self,
+        sensors: Vector<'_>,
+        #[pyo3(from_py_with = given)] motion: Motion,
+    ) -> Result<f64> {
         Ok(self.0.log_determinant(&self.noise(&sensors, motion)?))
     }
 
@@ -68,7 +82,7 @@ impl PyRegression {
         &self,
         py: Python<'_>,
         sensors: Vector<'_>,
-        motion: Motion,
+        #[pyo3(from_py_with = given)] motion: Motion,
         workers: Option<&PyWorkers>,
     ) -> Result<PyGram> {
         let workers = or_default(workers)?;
@@ -93,7 +107,7 @@ type Left<'py> = (Bound<'py, PyRegression>, Vector<'py>, Vector<'py>, Motion, Ve
 #[expect(clippy::type_complexity, reason = "sensors' variances, motion, −2 log of the likelihood")]
 pub fn most_likely_noises<'py>(
     py: Python<'py>,
-    problems: Vec<Left<'py>>,
+    #[pyo3(from_py_with = given)] problems: Vec<Left<'py>>,
     workers: Option<&PyWorkers>,
 ) -> Result<Vec<(Bound<'py, PyArray1<f64>>, Motion, f64)>> {
     let workers = or_default(workers)?;
@@ -161,8 +175,8 @@ impl PyGram {
     fn solve<'py>(
         &self,
         py: Python<'py>,
-        subset: Vec<usize>,
-        ridge: f64,
+        #[pyo3(from_py_with = given)] subset: Vec<usize>,
+        #[pyo3(from_py_with = given)] ridge: f64,
     ) -> Result<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64)>> {
         let solved = |found: Solution| {
             let covariance = to_matrix(py, subset.len(), found.covariance);
@@ -179,12 +193,12 @@ impl PyGram {
 pub fn search_subsets(
     py: Python<'_>,
     grams: Vec<Bound<'_, PyGram>>,
-    prices: Vec<Vector<'_>>,
-    moves: usize,
-    largest: usize,
-    starts: usize,
-    unit: Name,
-    coldest: f64,
+    #[pyo3(from_py_with = given)] prices: Vec<Vector<'_>>,
+    #[pyo3(from_py_with = given)] moves: usize,
+    #[pyo3(from_py_with = given)] largest: usize,
+    #[pyo3(from_py_with = given)] starts: usize,
+    #[pyo3(from_py_with = given)] unit: Name,
+    #[pyo3(from_py_with = given)] coldest: f64,
     workers: Option<&PyWorkers>,
 ) -> Result<Vec<Walked>> {
     let workers = or_default(workers)?;

@@ -7,7 +7,7 @@ use numpy::{IntoPyArray, PyArrayDyn};
 use pyo3::prelude::*;
 use twinloop_core::{Purpose, Stream, Unit};
 
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 
 /// A unit of work: a seed, what its numbers are for, and the numbers that lead to it.
 #[derive(FromPyObject)]
@@ -31,18 +31,22 @@ pub struct PyStream(Mutex<Stream>);
 #[pymethods]
 impl PyStream {
     #[new]
-    fn new(unit: Name) -> Result<Self> {
+    fn new(#[pyo3(from_py_with = given)] unit: Name) -> Result<Self> {
         Ok(Self(Mutex::new(unit.unit()?.stream(0))))
     }
 
     /// One number, uniform between two, the first included.
     #[pyo3(signature = (low = 0.0, high = 1.0))]
-    fn uniform(&self, low: f64, high: f64) -> Result<f64> {
+    fn uniform(
+        &self,
+        #[pyo3(from_py_with = given)] low: f64,
+        #[pyo3(from_py_with = given)] high: f64,
+    ) -> Result<f64> {
         self.drawn(|stream| low + (high - low) * stream.uniform())
     }
 
     /// One of 0, …, n − 1.
-    fn below(&self, n: usize) -> Result<usize> {
+    fn below(&self, #[pyo3(from_py_with = given)] n: usize) -> Result<usize> {
         if n == 0 {
             return Err(misuse("below: expected at least 1 number to draw from, found 0".into()));
         }
@@ -50,7 +54,11 @@ impl PyStream {
     }
 
     /// One number, log-uniform between two above 0.
-    fn log_uniform(&self, low: f64, high: f64) -> Result<f64> {
+    fn log_uniform(
+        &self,
+        #[pyo3(from_py_with = given)] low: f64,
+        #[pyo3(from_py_with = given)] high: f64,
+    ) -> Result<f64> {
         if !(0.0 < low && low <= high && high.is_finite()) {
             return Err(misuse(format!("log_uniform: expected 0 < low <= high, found {low} and {high}")));
         }
@@ -59,13 +67,21 @@ impl PyStream {
 
     /// An array of a shape, uniform in [0, 1).
     #[pyo3(signature = (*shape))]
-    fn uniforms<'py>(&self, py: Python<'py>, shape: Vec<usize>) -> Result<Bound<'py, PyArrayDyn<f64>>> {
+    fn uniforms<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = given)] shape: Vec<usize>,
+    ) -> Result<Bound<'py, PyArrayDyn<f64>>> {
         self.array(py, &shape, Stream::uniform)
     }
 
     /// An array of a shape, standard normal.
     #[pyo3(signature = (*shape))]
-    fn normals<'py>(&self, py: Python<'py>, shape: Vec<usize>) -> Result<Bound<'py, PyArrayDyn<f64>>> {
+    fn normals<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = given)] shape: Vec<usize>,
+    ) -> Result<Bound<'py, PyArrayDyn<f64>>> {
         self.array(py, &shape, Stream::gaussian)
     }
 }

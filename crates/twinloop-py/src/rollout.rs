@@ -13,7 +13,7 @@ use crate::arrays::{
     Cube, Matrix, Vector, VectorOrRows, finite, optional_blocks, rows, to_cube, to_integers, to_vector,
     vector, views,
 };
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::excitation::PyHoldBack;
 use crate::law::{flown, raised};
 use crate::model::PyModel;
@@ -28,7 +28,11 @@ pub struct PyTask(pub Task);
 #[pymethods]
 impl PyTask {
     #[new]
-    fn new(initial: Vector<'_>, target: VectorOrRows<'_>, steps: usize) -> Result<Self> {
+    fn new(
+        initial: Vector<'_>,
+        #[pyo3(from_py_with = given)] target: VectorOrRows<'_>,
+        #[pyo3(from_py_with = given)] steps: usize,
+    ) -> Result<Self> {
         Ok(Self(Task::new(vector(&initial), target.numbers(), steps)?))
     }
 }

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use twinloop_core::{Experiment, SelectedTests};
 
 use crate::arrays::{Matrix, Vector, VectorOrRows, optional_rows, rows, vector};
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::excitation::PyHoldBack;
 use crate::setting::PySetting;
 
@@ -25,7 +25,7 @@ impl PySelectedTests {
     fn with_test(
         &self,
         parameters: Vector<'_>,
-        target: VectorOrRows<'_>,
+        #[pyo3(from_py_with = given)] target: VectorOrRows<'_>,
         states: Matrix<'_>,
         commands: Matrix<'_>,
         excitation: Option<Matrix<'_>>,

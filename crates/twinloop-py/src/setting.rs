@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use twinloop_core::{Limits, Setting};
 
 use crate::controller::PyFamily;
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::model::PySignals;
 
 /// Where runs of a system count as diverged: at a multiple of the scale of a state.
@@ -17,7 +17,7 @@ pub struct PyLimits(pub Limits);
 impl PyLimits {
     #[new]
     #[pyo3(signature = (signals, divergence_factor = 10.0))]
-    fn new(signals: &PySignals, divergence_factor: f64) -> Result<Self> {
+    fn new(signals: &PySignals, #[pyo3(from_py_with = given)] divergence_factor: f64) -> Result<Self> {
         Ok(Self(Limits::new(signals.0.clone(), divergence_factor)?))
     }
 }

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use twinloop_core::{Chain, Learnt, Noise, Observed, Predictions, Recorded, Signals, Tuning};
 
 use crate::arrays::{Matrix, finite, rows, to_matrix};
-use crate::error::{Result, misuse};
+use crate::error::{Result, given, misuse};
 use crate::model::PyModel;
 use crate::regression::PyGram;
 use crate::rng::Name;
@@ -98,13 +98,13 @@ pub fn tune<'py>(
     py: Python<'py>,
     model: &PyModel,
     limits: &PyLimits,
-    chains: Chains,
-    records: Records<'py>,
-    free: Vec<usize>,
-    lags: Vec<Vec<usize>>,
-    iterations: usize,
-    draws: usize,
-    unit: Option<Name>,
+    #[pyo3(from_py_with = given)] chains: Chains,
+    #[pyo3(from_py_with = given)] records: Records<'py>,
+    #[pyo3(from_py_with = given)] free: Vec<usize>,
+    #[pyo3(from_py_with = given)] lags: Vec<Vec<usize>>,
+    #[pyo3(from_py_with = given)] iterations: usize,
+    #[pyo3(from_py_with = given)] draws: usize,
+    #[pyo3(from_py_with = given)] unit: Option<Name>,
     workers: Option<&PyWorkers>,
 ) -> Result<(PyModel, f64, usize, Bound<'py, PyArray2<f64>>, Vec<PyModel>)> {
     let workers = or_default(workers)?;
@@ -137,10 +137,10 @@ pub fn linearised<'py>(
     py: Python<'py>,
     model: &PyModel,
     limits: &PyLimits,
-    chains: Chains,
-    records: Records<'py>,
-    free: Vec<usize>,
-    lags: Vec<Vec<usize>>,
+    #[pyo3(from_py_with = given)] chains: Chains,
+    #[pyo3(from_py_with = given)] records: Records<'py>,
+    #[pyo3(from_py_with = given)] free: Vec<usize>,
+    #[pyo3(from_py_with = given)] lags: Vec<Vec<usize>>,
     workers: Option<&PyWorkers>,
 ) -> Result<Option<PyGram>> {
     let workers = or_default(workers)?;
@@ -157,8 +157,8 @@ pub fn predictions<'py>(
     py: Python<'py>,
     model: &PyModel,
     limits: &PyLimits,
-    chains: Chains,
-    records: Records<'py>,
+    #[pyo3(from_py_with = given)] chains: Chains,
+    #[pyo3(from_py_with = given)] records: Records<'py>,
     workers: Option<&PyWorkers>,
 ) -> Result<Option<Vec<OfRun<'py>>>> {
     let workers = or_default(workers)?;

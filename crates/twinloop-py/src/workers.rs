@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use twinloop_core::{Width, Workers};
 
-use crate::error::Result;
+use crate::error::{Result, given};
 
 /// How work is carried out, never what comes out: a number of threads and a vector width.
 #[pyclass(frozen, name = "Workers", module = "twinloop._core")]
@@ -15,7 +15,7 @@ pub struct PyWorkers(pub Arc<Workers>);
 impl PyWorkers {
     #[new]
     #[pyo3(signature = (threads = 1, width = "auto"))]
-    fn new(threads: usize, width: &str) -> Result<Self> {
+    fn new(#[pyo3(from_py_with = given)] threads: usize, width: &str) -> Result<Self> {
         Ok(Self(Arc::new(Workers::new(threads, width.parse()?)?)))
     }
 

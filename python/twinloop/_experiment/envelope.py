@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
 
@@ -23,8 +22,7 @@ def usages_of(signals: Signals, states: Floats) -> Floats:
         signals: of the system.
         states: (n, n_x).
     """
-    with engine_input():
-        return _core.usages(signals.engine, [state.envelope for state in signals.states], states)
+    return _core.usages(signals.engine, [state.envelope for state in signals.states], states)
 
 
 def outside(usages: Floats) -> NDArray[np.bool_]:

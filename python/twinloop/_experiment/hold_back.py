@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.values import Value
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
 from twinloop.signals import Signals, State
 
@@ -45,8 +45,7 @@ class HoldBack(Value, Recorded, kind="hold_back"):
             if ranges.ndim != 2 or ranges.shape[1] != 2:
                 raise InvalidInput(f"HoldBack.{name}: expected shape (states, 2), found {ranges.shape}.")
             object.__setattr__(self, name, ranges)
-        with engine_input():
-            _ = self.engine  # the engine refuses now rather than at the first flight
+        _ = self.engine  # the engine refuses now rather than at the first flight
 
     @cached_property
     def engine(self) -> _core.HoldBack:

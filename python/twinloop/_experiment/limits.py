@@ -10,7 +10,6 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.values import Value
-from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
 DIVERGENCE_FACTOR = 10.0
@@ -33,8 +32,7 @@ class Limits(Value):
     divergence_factor: float = DIVERGENCE_FACTOR
 
     def __post_init__(self) -> None:
-        with engine_input():
-            _ = self.engine  # the engine refuses now rather than at the first flight
+        _ = self.engine  # the engine refuses now rather than at the first flight
 
     @cached_property
     def engine(self) -> _core.Limits:
@@ -56,5 +54,4 @@ class Limits(Value):
         Raises:
             InvalidInput: it is for other signals.
         """
-        with engine_input():
-            return _core.Setting(self.engine, family)
+        return _core.Setting(self.engine, family)

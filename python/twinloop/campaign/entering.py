@@ -11,7 +11,7 @@ from twinloop import _core
 from twinloop._experiment.replay import Replay
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.objectives import frozen_error
 from twinloop.test import Test, final_distance
 from twinloop.trajectory import Trajectory, check_recorded, continued
@@ -108,13 +108,12 @@ def with_run(selected: _core.SelectedTests, replayed: Test | Replay, run: Trajec
         replayed: the test, or the commands as they were recorded.
         run: what the system answered.
     """
-    with engine_input():
-        if isinstance(replayed, Replay):
-            return selected.with_record(run.states, run.commands)
-        held = None if replayed.hold_back is None else replayed.hold_back.engine
-        return selected.with_test(
-            replayed.genes, replayed.target_state, run.states, run.commands, replayed.excitation, held
-        )
+    if isinstance(replayed, Replay):
+        return selected.with_record(run.states, run.commands)
+    held = None if replayed.hold_back is None else replayed.hold_back.engine
+    return selected.with_test(
+        replayed.genes, replayed.target_state, run.states, run.commands, replayed.excitation, held
+    )
 
 
 def check_first_reading(trajectory: Trajectory, test: Test) -> None:

@@ -22,7 +22,7 @@ from twinloop.campaign.own_progress import OwnProgress
 from twinloop.campaign.presets import Options
 from twinloop.campaign.setup import Setup
 from twinloop.controllers import Controller
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.law.twin import Twin
 from twinloop.records import Record, Recorded, checked_record
 from twinloop.store import Stored
@@ -49,8 +49,7 @@ class Persistent(Recorded):
         self.progress = progress
         self._own_progress = OwnProgress(setup.options)
         self.interrupted = False
-        with engine_input():
-            self._workers = _core.Workers(threads=self.threads)
+        self._workers = _core.Workers(threads=self.threads)
         self._book = Logbook(self.setup)
         self._method = self._chosen()
         self._controller: Controller | None = None

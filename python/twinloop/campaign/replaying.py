@@ -14,7 +14,6 @@ from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.logbook import Logbook
-from twinloop.errors import engine_input
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
@@ -132,8 +131,7 @@ def as_flown(model: _core.Model, flight: Experiment, length: int) -> Test | Repl
 
 def start_of(model: _core.Model, reading: Floats) -> Floats:
     """The state of a model that is read so (n_x,)."""
-    with engine_input():
-        start: Floats = model.states_of(reading[np.newaxis])[0]
+    start: Floats = model.states_of(reading[np.newaxis])[0]
     return start
 
 

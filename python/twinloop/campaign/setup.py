@@ -20,7 +20,7 @@ from twinloop._ground.values import Value
 from twinloop.campaign.coevolution.search import grammar, settings_of_tests, variation
 from twinloop.campaign.presets import AnyOptions, DefaultOptions, Options, options_of
 from twinloop.controllers import Family, Mixer, UnboundFamily
-from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
+from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.identification.terms.formulas import parsed_term
 from twinloop.identification.terms.pool import Pool
 from twinloop.identification.terms.priors import priors_of
@@ -239,8 +239,7 @@ def checked(flights: Flights, choices: Choices) -> Setup:
     setup = Setup(
         signals, controller, family, start, target, steps, choices.preset, options, seed, purpose, measure
     )
-    with engine_input():
-        _ = setup.task  # the engine refuses now rather than after the first flight
+    _ = setup.task  # the engine refuses now rather than after the first flight
     _check_ends(setup)
     _check_use(options, signals)
     return setup
@@ -314,10 +313,9 @@ def _check_use(options: AnyOptions, signals: Signals) -> None:
             parsed_term(text, pool, signals)
         priors_of(options, pool, signals)
     if isinstance(options, Options):
-        with engine_input():
-            grammar(options, signals)
-            variation(options, options.model_population)
-            settings_of_tests(options)
+        grammar(options, signals)
+        variation(options, options.model_population)
+        settings_of_tests(options)
 
 
 def _purpose(choices: Choices, options: AnyOptions, signals: Signals) -> tuple[str, Quality]:

@@ -19,7 +19,7 @@ from twinloop.controllers.axes import (
 from twinloop.controllers.family import Family
 from twinloop.controllers.gains import GainBounds, bounds_by_name, gain_of, gain_units
 from twinloop.controllers.mixer import Mixer, check_output
-from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -113,15 +113,14 @@ class Cascade(Recorded, kind="cascade"):
             of_axis = (gain_units(units[rate], units[angle])[0], *gain_units(of_output, units[rate]))
             for name, unit in zip(_names([(angle, rate)]), of_axis, strict=True):
                 gains.append(gain_of(name, unit, self.gains[name]))
-        with engine_input():
-            engine = _core.Family.cascade(
-                signals.engine,
-                axes,
-                [gain.engine for gain in gains],
-                None if self.output is None else self.output.engine,
-                derivative_filter=self.derivative_filter,
-                anti_windup=self.anti_windup is not None,
-            )
+        engine = _core.Family.cascade(
+            signals.engine,
+            axes,
+            [gain.engine for gain in gains],
+            None if self.output is None else self.output.engine,
+            derivative_filter=self.derivative_filter,
+            anti_windup=self.anti_windup is not None,
+        )
         return Family(signals, gains, engine)
 
 

@@ -13,7 +13,7 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.controllers.family import Family
 from twinloop.controllers.gains import GainBounds, bounds_by_name, gain_of
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.signals import Signals
 
 
@@ -117,6 +117,5 @@ class Custom:
             return controller
 
         made([bounds[0] if isinstance(bounds, tuple) else bounds for bounds in self.gains.values()])
-        with engine_input():
-            engine = _core.Family.python(signals.engine, made, [gain.engine for gain in gains])
+        engine = _core.Family.python(signals.engine, made, [gain.engine for gain in gains])
         return Family(signals, gains, engine)

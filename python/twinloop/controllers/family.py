@@ -17,7 +17,7 @@ from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats, floats, number
 from twinloop._ground.values import Value
 from twinloop.controllers.gains import FixedGain, Gain
-from twinloop.errors import InvalidInput, NotAvailable, engine_input, unknown
+from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.signals import Signals
 
 AT_A_BOUND = 0.01
@@ -237,9 +237,8 @@ class Controller:
         self.genes = genes
         self.excitation = excitation
         self.hold_back = hold_back
-        with engine_input():
-            held = None if hold_back is None else hold_back.engine
-            self._law = family.engine.controller(genes, excitation, held)
+        held = None if hold_back is None else hold_back.engine
+        self._law = family.engine.controller(genes, excitation, held)
         # State and target of each period of the run: what a copy must hear to be where this controller is.
         self._periods, self._heard = 0, array("d")
         self.reset()
@@ -297,8 +296,7 @@ class Controller:
         if self._periods < MOST_HEARD:
             self._heard.frombytes(state.tobytes() + target.tobytes())
         self._periods += 1
-        with engine_input():
-            return self._law.command(state, target)
+        return self._law.command(state, target)
 
     def __copy__(self) -> Controller:
         """A controller with a memory of its own, in the midst of the same run; it hears again what this one heard.

@@ -18,7 +18,6 @@ from twinloop.controllers.axes import (
 from twinloop.controllers.family import Family
 from twinloop.controllers.gains import GainBounds, bounds_by_name, gain_of, gain_units
 from twinloop.controllers.mixer import Mixer, check_output
-from twinloop.errors import engine_input
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -81,13 +80,12 @@ class PID(Recorded, kind="pid"):
             for (angle, _), of_output in zip(self.axes, asked, strict=True)
             for term, unit in zip(TERMS, gain_units(of_output, units[angle]), strict=True)
         ]
-        with engine_input():
-            engine = _core.Family.pid(
-                signals.engine,
-                axes,
-                [gain.engine for gain in gains],
-                None if self.output is None else self.output.engine,
-                derivative_filter=self.derivative_filter,
-                anti_windup=self.anti_windup is not None,
-            )
+        engine = _core.Family.pid(
+            signals.engine,
+            axes,
+            [gain.engine for gain in gains],
+            None if self.output is None else self.output.engine,
+            derivative_filter=self.derivative_filter,
+            anti_windup=self.anti_windup is not None,
+        )
         return Family(signals, gains, engine)

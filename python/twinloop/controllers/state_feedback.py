@@ -17,7 +17,7 @@ from twinloop.controllers.gains import (
     gain_units,
 )
 from twinloop.controllers.mixer import Mixer, check_output
-from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -84,15 +84,14 @@ class StateFeedback(Recorded, kind="state_feedback"):
             self.output.check(signals.n_u, axes)
             outputs = {f"u{j + 1}": self.output.unit for j in range(axes)}
         gains = self._gains(signals, states, outputs)
-        with engine_input():
-            engine = _core.Family.state_feedback(
-                signals.engine,
-                [index[name] for name in states],
-                [index[name] for name in self.integral],
-                len(outputs),
-                [gain.engine for gain in gains],
-                None if self.output is None else self.output.engine,
-            )
+        engine = _core.Family.state_feedback(
+            signals.engine,
+            [index[name] for name in states],
+            [index[name] for name in self.integral],
+            len(outputs),
+            [gain.engine for gain in gains],
+            None if self.output is None else self.output.engine,
+        )
         return FeedbackFamily(signals, gains, engine, states, tuple(self.integral), self.output)
 
     def _gains(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop.controllers import Controller
-from twinloop.errors import InvalidInput, NotAvailable, engine_input
+from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard.band import BandWatch
 from twinloop.guard.sensors import SensorWatch
 from twinloop.law.twin import Twin
@@ -143,9 +143,8 @@ class Guard:
             command = self.fallback.copy()
         self._estimate = reading
         if self._ahead is not None:
-            with engine_input():
-                self._estimate = self._ahead.following(reading, command)
-                self._ahead.sent(reading, goal, command)
+            self._estimate = self._ahead.following(reading, command)
+            self._ahead.sent(reading, goal, command)
         self.period += 1
         return command
 
@@ -211,8 +210,7 @@ class Guard:
                 f"readings were outside of the twin's band for too long, {count} periods in a row now"
             )
         if self._ahead is not None and self.period < self.test.steps:
-            with engine_input():
-                found = self._ahead.leaving(reading, self.horizon)
+            found = self._ahead.leaving(reading, self.horizon)
             self._leaving = 0 if found is None else self._leaving + 1
             if found is not None and (self._leaving >= CERTAIN or found[0] < CERTAIN):
                 seconds = found[0] * self.signals.dt

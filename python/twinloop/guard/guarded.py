@@ -8,7 +8,6 @@ from collections.abc import Callable
 from twinloop import _core
 from twinloop.controllers import Family
 from twinloop.controllers.custom import Law
-from twinloop.errors import engine_input
 from twinloop.guard.guard import Guard
 from twinloop.signals import Signals
 from twinloop.systems.base import System
@@ -78,6 +77,5 @@ def led_by(law: Law, test: Test) -> Test:
     """
     family = test.family
     gains = [gain.engine for gain in family.law_gains]
-    with engine_input():
-        engine = _core.Family.python(family.signals.engine, lambda values: law, gains)
+    engine = _core.Family.python(family.signals.engine, lambda values: law, gains)
     return dataclasses.replace(test.quiet(), family=Family(family.signals, family.law_gains, engine))

@@ -10,7 +10,7 @@ from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -71,23 +71,22 @@ def drawn_runs(
     Raises:
         InvalidInput: the engine refused the arguments.
     """
-    with engine_input():
-        if isinstance(test, Replay):
-            if not isinstance(dynamics, (_core.Model, _core.Quadrotor)):
-                raise InvalidInput(
-                    "Replay: expected a model or plant of the engine, found a function; fly a test."
-                )
-            return _core.replay(
-                dynamics, limits.engine, test.initial_state, test.commands, noise=noise, disturbance=disturbance,
-                anchors=_anchored(test, noise, disturbance), workers=workers,
-            )  # fmt: skip
-        count = _count(noise, disturbance)
-        excitation = None if test.excitation is None else np.tile(test.excitation, (count, 1, 1))
-        return _core.rollout(
-            dynamics, limits.setting(test.family.engine), np.tile(test.genes, (count, 1)), test.task,
-            noise=noise, excitation=excitation, disturbance=disturbance, workers=workers,
-            hold_back=None if test.hold_back is None else test.hold_back.engine,
+    if isinstance(test, Replay):
+        if not isinstance(dynamics, (_core.Model, _core.Quadrotor)):
+            raise InvalidInput(
+                "Replay: expected a model or plant of the engine, found a function; fly a test."
+            )
+        return _core.replay(
+            dynamics, limits.engine, test.initial_state, test.commands, noise=noise, disturbance=disturbance,
+            anchors=_anchored(test, noise, disturbance), workers=workers,
         )  # fmt: skip
+    count = _count(noise, disturbance)
+    excitation = None if test.excitation is None else np.tile(test.excitation, (count, 1, 1))
+    return _core.rollout(
+        dynamics, limits.setting(test.family.engine), np.tile(test.genes, (count, 1)), test.task,
+        noise=noise, excitation=excitation, disturbance=disturbance, workers=workers,
+        hold_back=None if test.hold_back is None else test.hold_back.engine,
+    )  # fmt: skip
 
 
 def _count(*draws: Floats | None) -> int:

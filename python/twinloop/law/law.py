@@ -8,7 +8,6 @@ from functools import cached_property
 
 from twinloop import _core
 from twinloop._ground.values import Value
-from twinloop.errors import engine_input
 from twinloop.law.actuation import Actuation
 from twinloop.law.expressions import UPRIGHT, Expressions, Node
 from twinloop.law.levels import Levels
@@ -65,16 +64,15 @@ class Law(Value):
     def model(self) -> _core.Model:
         """The engine's model of this law, which roll-outs run."""
         program = self.expressions.program(self.outputs, self.inputs)
-        with engine_input():
-            model = _core.Model(
-                program,
-                self.form,
-                self.signals.engine,
-                self.actuation.actuators,
-                self.actuation.hidden,
-                self.offsets,
-            )
-            return model.with_levels(self.levels) if self.levels else model
+        model = _core.Model(
+            program,
+            self.form,
+            self.signals.engine,
+            self.actuation.actuators,
+            self.actuation.hidden,
+            self.offsets,
+        )
+        return model.with_levels(self.levels) if self.levels else model
 
     @property
     def inputs(self) -> int:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 
 from twinloop import _core
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.law.expressions import UNARY, Expressions
 
 OPERATORS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
@@ -69,8 +69,7 @@ def program_of(formulas: Sequence[str], registers: Mapping[str, int], inputs: in
     expressions = Expressions()
     names = {name: expressions.input(place) for name, place in registers.items()}
     roots = [parsed(formula.replace("^", "**"), expressions, names) for formula in formulas]
-    with engine_input():
-        return expressions.program(roots, inputs)
+    return expressions.program(roots, inputs)
 
 
 class _Reader:

@@ -23,7 +23,6 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import exp
-from twinloop.errors import engine_input
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise, reaches
 from twinloop.trajectory import Trajectory, continued
@@ -70,8 +69,7 @@ def in_pieces(replay: Replay, model: _core.Model, readings: Floats, length: int)
     if length >= replay.steps:
         return replay
     anchors = np.full((replay.steps + 1, readings.shape[1]), np.nan)
-    with engine_input():
-        anchors[:-1:length] = model.states_of(np.ascontiguousarray(readings[:-1:length]))
+    anchors[:-1:length] = model.states_of(np.ascontiguousarray(readings[:-1:length]))
     return dataclasses.replace(replay, anchors=anchors)
 
 
@@ -103,8 +101,7 @@ def judged_length(
     signals = limits.signals
     scales = np.array([state.scale for state in signals.states])
     readings = continued(flight, signals, flight.states[0]).states
-    with engine_input():
-        start = model.states_of(readings[:1])[0]
+    start = model.states_of(readings[:1])[0]
     whole = Replay(signals, start, flight.commands)
     runs = drawn_runs(model, whole, limits, workers=workers)
     free, frozen = (
@@ -223,14 +220,12 @@ def _slopes(
 ) -> Floats | None:
     """Slopes of each step along the record (n, n_x, n_x), over deviations (n_x,); None where a step is not finite."""
     n_x = readings.shape[1]
-    with engine_input():
-        states = model.states_of(readings)
+    states = model.states_of(readings)
     begun = np.concatenate([states[np.newaxis], states + np.diag(off)[:, np.newaxis, :]])
     begun[:, -1] = np.nan  # where the last step ends nothing begins
-    with engine_input():
-        runs = _core.replay(
-            model, limits.engine, whole.initial_state, whole.commands, anchors=begun, workers=workers
-        )
+    runs = _core.replay(
+        model, limits.engine, whole.initial_state, whole.commands, anchors=begun, workers=workers
+    )
     if int(np.min(runs.lasted)) < whole.steps:
         return None
     ends = np.asarray(runs.states)[:, 1:]

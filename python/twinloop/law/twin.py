@@ -18,7 +18,7 @@ from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop._ground.showing import Shown
 from twinloop._ground.values import Value
-from twinloop.errors import InvalidInput, NotAvailable, engine_input
+from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.law.accuracy import ErrorTable, FitTable, TestErrors, fit_table
 from twinloop.law.equations import Equations
 from twinloop.law.exports.environment import Reward, environment
@@ -117,9 +117,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         models = [read(_core.Model, found["model"], f"{where}.model", given)]
         models += read(tuple[_core.Model, ...], found["members"], f"{where}.members", given)
         if found.get("offsets"):
-            with engine_input():
-                late = read(tuple[float, ...], found["offsets"], f"{where}.offsets")
-                models = [model.with_offsets(late) for model in models]
+            late = read(tuple[float, ...], found["offsets"], f"{where}.offsets")
+            models = [model.with_offsets(late) for model in models]
         twin = cls(
             models[0],
             signals,
@@ -308,8 +307,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         Returns:
             The state (n_x,).
         """
-        with engine_input():
-            states: Floats = self.model.states_of(flown.states[:1])
+        states: Floats = self.model.states_of(flown.states[:1])
         began: Floats = states[0]
         return began
 
@@ -373,8 +371,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         if past is not None:
             rows = np.asarray(past)[np.newaxis] if np.ndim(past) == 2 and single else past
             before = floats("Past commands", rows, (len(x), None, self.signals.n_u))
-        with engine_input():
-            following = self.model.step(x, u, past=before)
+        following = self.model.step(x, u, past=before)
         return following[0] if single else following
 
     def env(

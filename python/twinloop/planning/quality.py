@@ -10,7 +10,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import InvalidInput, engine_input, unknown
+from twinloop.errors import InvalidInput, unknown
 from twinloop.flights import quality as engine_quality
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -48,8 +48,7 @@ class Quality:
             trajectory: of at least one step.
             target: state that it should have been led to (n_x,), or a row for each of its states (n + 1, n_x).
         """
-        with engine_input():
-            return self.engine.recorded(self.signals.engine, target, trajectory.states, trajectory.commands)
+        return self.engine.recorded(self.signals.engine, target, trajectory.states, trajectory.commands)
 
 
 def quality_of(

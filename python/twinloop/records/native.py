@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from twinloop import _core
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.records.reading import (
     keys,
     read_flag,
@@ -25,8 +25,7 @@ MOTION_KEYS = ("states", "settled")
 def read_program(value: object, where: str) -> _core.Program:
     """A program from its text."""
     text = read_text(value, where)
-    with engine_input():
-        return _core.Program.parse(text)
+    return _core.Program.parse(text)
 
 
 def model_record(model: _core.Model) -> dict[str, Any]:
@@ -70,10 +69,9 @@ def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Mo
         [read_number(value, f"{where}.levels[{i}]") for value in read_list(each, f"{where}.levels[{i}]")]
         for i, each in enumerate(read_list(found.get("levels", []), f"{where}.levels"))
     ]
-    with engine_input():
-        form = read_text(found["form"], f"{where}.form")
-        model = _core.Model(program, form, signals, actuators or None, hidden, offsets)
-        return model.with_levels(levels) if levels else model
+    form = read_text(found["form"], f"{where}.form")
+    model = _core.Model(program, form, signals, actuators or None, hidden, offsets)
+    return model.with_levels(levels) if levels else model
 
 
 def _actuator(value: object, where: str) -> tuple[float, int, float | None]:

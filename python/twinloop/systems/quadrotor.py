@@ -11,7 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number, whole
 from twinloop.controllers import PID, Mixer
-from twinloop.errors import engine_input, unknown
+from twinloop.errors import unknown
 from twinloop.law.flight import fly
 from twinloop.signals import Command, Signals, State
 from twinloop.systems.base import System
@@ -105,19 +105,18 @@ class Quadrotor(Repeatable, System, kind="quadrotor"):
         self.top_speed = number("Quadrotor, top_speed (rad/s)", top_speed, above=self.hover_speed)
         self.runs = 0
         self._signals = _signals(self.hover_speed, self.top_speed)
-        with engine_input():
-            self._dynamics = _core.Quadrotor(
-                self._signals.dt,
-                arm=self.arm,
-                inertia=self.inertia,
-                rotor_inertia=self.rotor_inertia,
-                thrust_factor=self.thrust_factor,
-                drag_factor=self.drag_factor,
-                gyroscopic=self.gyroscopic,
-                drag=self.drag.tolist(),
-                motor_lag=self.motor_lag,
-                hover_speed=self.hover_speed,
-            )
+        self._dynamics = _core.Quadrotor(
+            self._signals.dt,
+            arm=self.arm,
+            inertia=self.inertia,
+            rotor_inertia=self.rotor_inertia,
+            thrust_factor=self.thrust_factor,
+            drag_factor=self.drag_factor,
+            gyroscopic=self.gyroscopic,
+            drag=self.drag.tolist(),
+            motor_lag=self.motor_lag,
+            hover_speed=self.hover_speed,
+        )
 
     @classmethod
     def harsh(cls, noise: float = 1e-3, seed: int = 0) -> Quadrotor:

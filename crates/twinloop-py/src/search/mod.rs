@@ -14,7 +14,7 @@ use twinloop_core::pareto::Objectives;
 use twinloop_core::{Search, Snapshot, Variation};
 
 use crate::arrays::{Matrix, to_matrix};
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::pareto::{distance, matrix as objectives_of};
 
 /// How a generation is made out of the last.
@@ -30,13 +30,13 @@ impl PyVariation {
     ))]
     #[expect(clippy::too_many_arguments, reason = "each is a named option of the paper's method")]
     fn new(
-        population: usize,
-        mutation_share: f64,
-        crossover_share: f64,
-        reproduction_share: f64,
-        elite_share: f64,
-        ranking_pressure: f64,
-        archive_cap: usize,
+        #[pyo3(from_py_with = given)] population: usize,
+        #[pyo3(from_py_with = given)] mutation_share: f64,
+        #[pyo3(from_py_with = given)] crossover_share: f64,
+        #[pyo3(from_py_with = given)] reproduction_share: f64,
+        #[pyo3(from_py_with = given)] elite_share: f64,
+        #[pyo3(from_py_with = given)] ranking_pressure: f64,
+        #[pyo3(from_py_with = given)] archive_cap: usize,
         normalised_tradeoff: bool,
     ) -> Result<Self> {
         let variation = Variation {

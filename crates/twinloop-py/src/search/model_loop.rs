@@ -8,7 +8,7 @@ use twinloop_core::{Learnt, ModelSearch};
 
 use super::{Counters, PyVariation, array, counters, snapshot};
 use crate::arrays::{Matrix, to_vector};
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::law::flown;
 use crate::model::{PyModel, PySignals};
 use crate::program::{PyGrammar, PyProgram};
@@ -27,7 +27,7 @@ impl PyModelSearch {
         grammar: &PyGrammar,
         form: &str,
         variation: &PyVariation,
-        seed: u64,
+        #[pyo3(from_py_with = given)] seed: u64,
         selected: &PySelectedTests,
         workers: &PyWorkers,
     ) -> Result<Self> {
@@ -44,7 +44,7 @@ impl PyModelSearch {
         form: &str,
         variation: &PyVariation,
         signals: &PySignals,
-        counters: Counters,
+        #[pyo3(from_py_with = given)] counters: Counters,
         population: Vec<Bound<'_, PyProgram>>,
         population_objectives: Matrix<'_>,
         archive: Vec<Bound<'_, PyProgram>>,
@@ -70,7 +70,7 @@ impl PyModelSearch {
         &self,
         py: Python<'_>,
         selected: &PySelectedTests,
-        generations: u64,
+        #[pyo3(from_py_with = given)] generations: u64,
         workers: &PyWorkers,
     ) -> Result<Self> {
         let search = flown(py, || self.0.clone().advance(&selected.0, generations, &workers.0))??;
@@ -152,7 +152,7 @@ impl PyModelSearch {
         to_vector(py, self.0.search().archive().objectives_of(self.0.best()))
     }
 
-    fn committee(&self, size: usize) -> Vec<usize> {
+    fn committee(&self, #[pyo3(from_py_with = given)] size: usize) -> Vec<usize> {
         self.0.committee(size)
     }
 }

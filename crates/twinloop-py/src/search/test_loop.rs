@@ -8,7 +8,7 @@ use twinloop_core::{TestSearch, TestSettings};
 
 use super::{Counters, PyVariation, array, counters, snapshot};
 use crate::arrays::{Matrix, rows, to_matrix, to_vector};
-use crate::error::Result;
+use crate::error::{Result, given};
 use crate::law::flown;
 use crate::model::{PyModel, owned};
 use crate::rollout::PyTask;
@@ -27,10 +27,10 @@ impl PyTestSettings {
     ))]
     fn new(
         control_quality: bool,
-        distance_cap: f64,
-        mutants: usize,
-        mutant_step: f64,
-        mutation_step: f64,
+        #[pyo3(from_py_with = given)] distance_cap: f64,
+        #[pyo3(from_py_with = given)] mutants: usize,
+        #[pyo3(from_py_with = given)] mutant_step: f64,
+        #[pyo3(from_py_with = given)] mutation_step: f64,
     ) -> Result<Self> {
         let settings = TestSettings { control_quality, distance_cap, mutants, mutant_step, mutation_step };
         Ok(Self(settings.validated()?))
@@ -52,8 +52,8 @@ impl PyTestSearch {
         task: &PyTask,
         settings: &PyTestSettings,
         variation: &PyVariation,
-        seed: u64,
-        iteration: u64,
+        #[pyo3(from_py_with = given)] seed: u64,
+        #[pyo3(from_py_with = given)] iteration: u64,
         workers: &PyWorkers,
     ) -> Result<Self> {
         let committee = owned(&committee);
@@ -73,7 +73,7 @@ impl PyTestSearch {
         task: &PyTask,
         settings: &PyTestSettings,
         variation: &PyVariation,
-        counters: Counters,
+        #[pyo3(from_py_with = given)] counters: Counters,
         flat: bool,
         population: Matrix<'_>,
         population_objectives: Matrix<'_>,
@@ -94,7 +94,12 @@ impl PyTestSearch {
         Ok(Self(search))
     }
 
-    fn advance(&self, py: Python<'_>, generations: u64, workers: &PyWorkers) -> Result<Self> {
+    fn advance(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = given)] generations: u64,
+        workers: &PyWorkers,
+    ) -> Result<Self> {
         Ok(Self(flown(py, || self.0.clone().advance(generations, &workers.0))?))
     }
 

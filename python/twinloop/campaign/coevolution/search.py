@@ -8,7 +8,6 @@ from typing import TypeVar
 
 from twinloop import _core
 from twinloop.campaign.presets import Options
-from twinloop.errors import engine_input
 from twinloop.signals import Signals
 
 CHUNK_SECONDS = 0.3
@@ -55,23 +54,22 @@ def grammar(options: Options, signals: Signals) -> _core.Grammar:
     Raises:
         InvalidInput: options that no program can have.
     """
-    with engine_input():
-        inputs, outputs = _core.Model.shape(options.form, signals.engine)
-        return _core.Grammar(
-            inputs,
-            outputs,
-            spare_registers=options.spare_registers,
-            pages=options.pages,
-            page_length=options.page_length,
-            operations=options.operations,
-            writable_inputs=options.writable_inputs,
-            constant_share=options.constant_share,
-            constant_low=options.constant_low,
-            constant_high=options.constant_high,
-            constant_step=options.constant_step,
-            mutation_rate=options.mutation_rate,
-            aligned_pages=options.aligned_pages,
-        )
+    inputs, outputs = _core.Model.shape(options.form, signals.engine)
+    return _core.Grammar(
+        inputs,
+        outputs,
+        spare_registers=options.spare_registers,
+        pages=options.pages,
+        page_length=options.page_length,
+        operations=options.operations,
+        writable_inputs=options.writable_inputs,
+        constant_share=options.constant_share,
+        constant_low=options.constant_low,
+        constant_high=options.constant_high,
+        constant_step=options.constant_step,
+        mutation_rate=options.mutation_rate,
+        aligned_pages=options.aligned_pages,
+    )
 
 
 def variation(options: Options, population: int) -> _core.Variation:
@@ -87,17 +85,16 @@ def variation(options: Options, population: int) -> _core.Variation:
     Raises:
         InvalidInput: shares or a pressure that cannot be used.
     """
-    with engine_input():
-        return _core.Variation(
-            population,
-            mutation_share=options.mutation_share,
-            crossover_share=options.crossover_share,
-            reproduction_share=options.reproduction_share,
-            elite_share=options.elite_share,
-            ranking_pressure=options.ranking_pressure,
-            archive_cap=options.archive_cap,
-            normalised_tradeoff=options.tradeoff == "normalised",
-        )
+    return _core.Variation(
+        population,
+        mutation_share=options.mutation_share,
+        crossover_share=options.crossover_share,
+        reproduction_share=options.reproduction_share,
+        elite_share=options.elite_share,
+        ranking_pressure=options.ranking_pressure,
+        archive_cap=options.archive_cap,
+        normalised_tradeoff=options.tradeoff == "normalised",
+    )
 
 
 def settings_of_tests(options: Options) -> _core.TestSettings:
@@ -112,14 +109,13 @@ def settings_of_tests(options: Options) -> _core.TestSettings:
     Raises:
         InvalidInput: mutants or caps that cannot be used.
     """
-    with engine_input():
-        return _core.TestSettings(
-            control_quality=options.control_quality,
-            distance_cap=options.distance_cap,
-            mutants=options.mutants,
-            mutant_step=options.mutant_step,
-            mutation_step=options.test_mutation_step,
-        )
+    return _core.TestSettings(
+        control_quality=options.control_quality,
+        distance_cap=options.distance_cap,
+        mutants=options.mutants,
+        mutant_step=options.mutant_step,
+        mutation_step=options.test_mutation_step,
+    )
 
 
 def start_models(
@@ -141,10 +137,9 @@ def start_models(
         InvalidInput: the engine refused the options.
     """
     programs = grammar(options, signals)
-    with engine_input():
-        return _core.ModelSearch.start(
-            programs, options.form, variation(options, options.model_population), seed, selected, workers
-        )
+    return _core.ModelSearch.start(
+        programs, options.form, variation(options, options.model_population), seed, selected, workers
+    )
 
 
 def start_tests(
@@ -174,17 +169,16 @@ def start_tests(
     Raises:
         InvalidInput: the engine refused the options.
     """
-    with engine_input():
-        return _core.TestSearch.start(
-            committee(models, options.committee_size),
-            setting,
-            task,
-            settings_of_tests(options),
-            variation(options, options.test_population),
-            seed,
-            iteration,
-            workers,
-        )
+    return _core.TestSearch.start(
+        committee(models, options.committee_size),
+        setting,
+        task,
+        settings_of_tests(options),
+        variation(options, options.test_population),
+        seed,
+        iteration,
+        workers,
+    )
 
 
 def committee(models: _core.ModelSearch, size: int) -> Sequence[_core.Model]:

@@ -8,7 +8,7 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats, floats
 from twinloop.campaign.coevolution.search import committee, grammar, settings_of_tests, variation
 from twinloop.campaign.presets import Options
-from twinloop.errors import InvalidInput, engine_input
+from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
@@ -64,19 +64,18 @@ class ModelSnapshot(Recorded, kind="model_search"):
             InvalidInput: the snapshot is not of a search with these options and signals.
         """
         programs = grammar(options, signals)
-        with engine_input():
-            return _core.ModelSearch.restored(
-                programs,
-                options.form,
-                variation(options, options.model_population),
-                signals.engine,
-                _counters(self),
-                self.population,
-                _rows(self.population_objectives),
-                self.archive,
-                _rows(self.archive_objectives),
-                workers,
-            )
+        return _core.ModelSearch.restored(
+            programs,
+            options.form,
+            variation(options, options.model_population),
+            signals.engine,
+            _counters(self),
+            self.population,
+            _rows(self.population_objectives),
+            self.archive,
+            _rows(self.archive_objectives),
+            workers,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,21 +142,20 @@ class TestSnapshot(Recorded, kind="test_search"):
         Raises:
             InvalidInput: the snapshot is not of a search with these options and controllers.
         """
-        with engine_input():
-            return _core.TestSearch.restored(
-                committee(models, options.committee_size),
-                setting,
-                task,
-                settings_of_tests(options),
-                variation(options, options.test_population),
-                _counters(self),
-                self.flat,
-                _rows(self.population),
-                _rows(self.population_objectives),
-                _rows(self.archive),
-                _rows(self.archive_objectives),
-                workers,
-            )
+        return _core.TestSearch.restored(
+            committee(models, options.committee_size),
+            setting,
+            task,
+            settings_of_tests(options),
+            variation(options, options.test_population),
+            _counters(self),
+            self.flat,
+            _rows(self.population),
+            _rows(self.population_objectives),
+            _rows(self.archive),
+            _rows(self.archive_objectives),
+            workers,
+        )
 
 
 def _counters(snapshot: ModelSnapshot | TestSnapshot) -> tuple[int, int, int, int, int, int]:

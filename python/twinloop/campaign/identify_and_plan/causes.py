@@ -36,7 +36,6 @@ from twinloop.campaign.identify_and_plan.likeness import Likeness, in_pieces
 from twinloop.campaign.identify_and_plan.neighbours import alike_nearby
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.campaign.replaying import cut, start_of
-from twinloop.errors import engine_input
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.offsets import moved
@@ -87,14 +86,13 @@ def observed(
         workers: how the work is carried out.
     """
     runs = runs_of(identified, experiments, signals)
-    with engine_input():
-        return _core.predictions(
-            identified.model,
-            limits.engine,
-            [chain.engine for chain in identified.chains],
-            [run.engine for run in runs],
-            workers=workers,
-        )
+    return _core.predictions(
+        identified.model,
+        limits.engine,
+        [chain.engine for chain in identified.chains],
+        [run.engine for run in runs],
+        workers=workers,
+    )
 
 
 def causes_of(

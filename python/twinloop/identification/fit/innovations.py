@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from twinloop import _core
-from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.description import shortest
 from twinloop.identification.evidence import CORRELATED
@@ -101,8 +100,7 @@ class _Likelihood:
         for run, weights in zip(hypothesis.runs, self.counted, strict=True):
             nothing = np.zeros((len(weights) - 1, 1))
             records.append((run.states[:, self.states], weights, nothing, nothing, nothing))
-        with engine_input():
-            self.readings_alone = _core.Regression(len(self.states), dt, chain.form, records)
+        self.readings_alone = _core.Regression(len(self.states), dt, chain.form, records)
         """The readings alone: of a likelihood they know the determinant, which is that of the kinematics."""
 
     def __call__(self, chain: Chain) -> float:

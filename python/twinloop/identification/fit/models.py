@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from twinloop import _core
-from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.structure import Sum
@@ -30,10 +29,9 @@ def model_of(context: Context, hypothesis: Hypothesis) -> _core.Model:
         for i, terms in enumerate(outputs):
             terms[i] = terms.get(i, 0.0) + 1.0
     program = pool.program_of_sums(outputs, len(actuation.hidden))
-    with engine_input():
-        return _core.Model(
-            program, hypothesis.form, context.signals.engine, actuation.actuators, actuation.hidden
-        )
+    return _core.Model(
+        program, hypothesis.form, context.signals.engine, actuation.actuators, actuation.hidden
+    )
 
 
 def layout(hypothesis: Hypothesis) -> tuple[list[int], list[range]]:

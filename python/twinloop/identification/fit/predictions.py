@@ -9,7 +9,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 
@@ -24,14 +23,13 @@ def predictions(context: Context, hypothesis: Hypothesis) -> Sequence[tuple[Floa
     fit = hypothesis.fit
     if fit is None:
         return None
-    with engine_input():
-        return _core.predictions(
-            fit.model,
-            context.limits.engine,
-            [chain.engine for chain in fit.observer],
-            [run.engine for run in hypothesis.runs],
-            workers=context.workers,
-        )
+    return _core.predictions(
+        fit.model,
+        context.limits.engine,
+        [chain.engine for chain in fit.observer],
+        [run.engine for run in hypothesis.runs],
+        workers=context.workers,
+    )
 
 
 def without_outliers(context: Context, hypothesis: Hypothesis) -> Hypothesis:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from twinloop import _core
-from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.fit.models import inner, layout, model_of
 from twinloop.identification.fit.settling import settled
@@ -44,16 +43,15 @@ def promises(context: Context, hypothesis: Hypothesis, i: int, nodes: Sequence[i
     tuned = [place for place, node in inner(beside).items() if node in old]
     tuned += [place for at in places for place in at if place not in added]
     lags = moving_together(model, beside, context.signals)
-    with engine_input():
-        gram = _core.linearised(
-            model,
-            context.limits.engine,
-            [chain.engine for chain in fit.observer],
-            [run.engine for run in hypothesis.runs],
-            free=[*added, *tuned],
-            lags=lags,
-            workers=context.workers,
-        )
+    gram = _core.linearised(
+        model,
+        context.limits.engine,
+        [chain.engine for chain in fit.observer],
+        [run.engine for run in hypothesis.runs],
+        free=[*added, *tuned],
+        lags=lags,
+        workers=context.workers,
+    )
     if gram is None:
         return [0.0] * len(nodes)
     others = range(len(added), gram.features)

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
-from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.fit.models import layout, limits_of
 from twinloop.identification.hypothesis import Fit, Hypothesis
@@ -53,19 +52,18 @@ def tune(
     held = {place for place, bounds in limits.items() if steps == 0 and start[place] in bounds}
     longest = LONGEST_MEMORY * signals.dt * max(len(run.commands) for run in hypothesis.runs)
     for turn in itertools.count():
-        with engine_input():
-            tuned, chi_squared, readings, covariance, drawn = _core.tune(
-                model,
-                context.limits.engine,
-                [chain.engine for chain in observer],
-                [run.engine for run in hypothesis.runs],
-                free=[place for place in free if place not in held] if tuning else [],
-                lags=lags if tuning else [],
-                iterations=steps,
-                draws=draws,
-                unit=context.unit.part(number, turn).named("members") if draws else None,
-                workers=context.workers,
-            )
+        tuned, chi_squared, readings, covariance, drawn = _core.tune(
+            model,
+            context.limits.engine,
+            [chain.engine for chain in observer],
+            [run.engine for run in hypothesis.runs],
+            free=[place for place in free if place not in held] if tuning else [],
+            lags=lags if tuning else [],
+            iterations=steps,
+            draws=draws,
+            unit=context.unit.part(number, turn).named("members") if draws else None,
+            workers=context.workers,
+        )
         outside = beyond(tuned, limits)
         model = bounded_model(tuned, limits) if outside else tuned
         endless: set[int] = set()

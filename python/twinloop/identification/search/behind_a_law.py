@@ -14,7 +14,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.context import Context
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.noise import RIDGE
@@ -62,12 +61,11 @@ def _length(problem: Problem, chain: Chain) -> float:
     low, slow = floor_of(chain, problem.dt, problem.integration(chain))
     sensors, length = np.maximum(chain.rough, low), np.inf
     motion = (max(float(chain.rough[0]) / problem.dt, slow.white), slow.correlated, 10.0 * problem.dt)
-    with engine_input():
-        for _ in range(ROUNDS):
-            solved = regression.gram(sensors, motion, problem.workers).solve(list(range(len(terms))), RIDGE)
-            if solved is None:
-                break
-            ((sensors, motion, length),) = _core.most_likely_noises(
-                [(regression, solved[0], sensors, motion, low, slow)], problem.workers
-            )
+    for _ in range(ROUNDS):
+        solved = regression.gram(sensors, motion, problem.workers).solve(list(range(len(terms))), RIDGE)
+        if solved is None:
+            break
+        ((sensors, motion, length),) = _core.most_likely_noises(
+            [(regression, solved[0], sensors, motion, low, slow)], problem.workers
+        )
     return float(length)

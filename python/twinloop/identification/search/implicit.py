@@ -16,7 +16,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.search.noise import calm
 from twinloop.identification.search.poles import vanishes_nowhere
 from twinloop.identification.search.problem import Columns, Problem
@@ -198,8 +197,7 @@ def whitened(
                 coefficients[walked[0][0]] = solved[0]
             floor = floor_of(chain, problem.dt, problem.integration(chain))
             posed.append((regression, coefficients, chain.sensors, chain.motion, *floor))
-        with engine_input():
-            noises = _core.most_likely_noises(posed, problem.workers)
+        noises = _core.most_likely_noises(posed, problem.workers)
         chains = [
             chain.with_noise(sensors, motion)
             for chain, (sensors, motion, _) in zip(chains, noises, strict=True)

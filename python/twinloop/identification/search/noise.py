@@ -11,7 +11,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.description import shortest
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.sensors.chains import Chain, Motion
@@ -60,10 +59,9 @@ def unexplained(problem: Problem, chain: Chain, gusts: bool = True) -> Chain:
     low, slow = floor_of(chain, problem.dt, problem.integration(chain))
     # Where a disturbance is far too small no small change of it makes any difference: it is tried at several sizes.
     begun = [_begun(chain, low, slow, problem.dt, size) for size in (GUSTS if gusts else (0.0,))]
-    with engine_input():
-        found = _core.most_likely_noises(
-            [(regression, [0.0], *start, low, slow) for start in begun], problem.workers
-        )
+    found = _core.most_likely_noises(
+        [(regression, [0.0], *start, low, slow) for start in begun], problem.workers
+    )
     sensors, motion, _ = shortest(found, lambda answer: answer[2])
     return chain.with_noise(sensors, motion)
 
@@ -90,10 +88,9 @@ def first_noise(problem: Problem, chain: Chain, terms: Sequence[int], gusts: boo
         solved = gram.solve(list(range(len(usable))), RIDGE)
         if solved is None:
             break
-        with engine_input():
-            ((sensors, found, _),) = _core.most_likely_noises(
-                [(regression, solved[0], sensors, motion, low, slow)], problem.workers
-            )
+        ((sensors, found, _),) = _core.most_likely_noises(
+            [(regression, solved[0], sensors, motion, low, slow)], problem.workers
+        )
         motion = Motion(*found)
         used = min(len(usable), 0.7 * readings)
         sensors = sensors * readings / (readings - used)

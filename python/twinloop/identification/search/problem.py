@@ -9,7 +9,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.records import Stages, stages
 from twinloop.identification.search.poles import room
 from twinloop.identification.sensors.chains import Chain
@@ -84,8 +83,7 @@ class Problem:
                 (measured, run.weights[:, states], start[rows], middle[rows], end[rows])
                 for measured, run, rows in zip(readings, self.runs, self.stages.runs, strict=True)
             ]
-            with engine_input():
-                return _core.Regression(len(states), self.dt, chain.form, records)
+            return _core.Regression(len(states), self.dt, chain.form, records)
 
         readings = [run.states[:, states] for run in self.runs]
         if known := self.usable(self.priors.fixed.get(states[0], ())):

@@ -11,7 +11,6 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log, power
-from twinloop.errors import engine_input
 from twinloop.identification.search.moderation import precisions
 from twinloop.identification.search.problem import Problem
 from twinloop.identification.search.subsets import Judge, Judged
@@ -169,8 +168,7 @@ def search(
         if fixed_noise:
             break
         before = [one.chain for one in unsettled]
-        with engine_input():
-            noises = _core.most_likely_noises([one.posed(problem) for one in unsettled], problem.workers)
+        noises = _core.most_likely_noises([one.posed(problem) for one in unsettled], problem.workers)
         for one, (sensors, motion, _) in zip(unsettled, noises, strict=True):
             # Corrected for the degrees of freedom that were used.
             readings, used = problem.readings(one.chain), len(one.subsets[0].features)
@@ -279,8 +277,7 @@ def _chosen(
             continue
         rows = problem.feedthrough(chain, usable)
         for attempt, price in enumerate(FEEDTHROUGH_PRICES):
-            with engine_input():
-                dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
+            dear = gram.with_rows(np.sqrt(price) * np.column_stack([rows, np.zeros(len(rows))]))
             (walked,) = walk([dear], [one.costs], 1 + i * len(FEEDTHROUGH_PRICES) + attempt)
             # Where the noise was taken for much too small every term pays, and only the price itself keeps J down.
             found = [

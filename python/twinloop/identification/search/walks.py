@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Purpose, Unit
-from twinloop.errors import engine_input
 
 Subsets = Sequence[tuple[list[int], float]]
 """Subsets of features with their description lengths, the best first."""
@@ -50,8 +49,7 @@ class Walks:
             costs: of each chain's features, in units of χ².
             workers: how the work is carried out.
         """
-        with engine_input():
-            return _core.search_subsets(
-                grams, costs, moves=self.moves, largest=self.largest, starts=self.starts,
-                unit=self.unit.named(self.purpose), workers=workers,
-            )  # fmt: skip
+        return _core.search_subsets(
+            grams, costs, moves=self.moves, largest=self.largest, starts=self.starts,
+            unit=self.unit.named(self.purpose), workers=workers,
+        )  # fmt: skip

@@ -8,7 +8,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.terms.pool import Pool
 from twinloop.signals import Signals
 
@@ -26,8 +25,7 @@ def kinematic_model(signals: Signals, dt: float, form: str = "acceleration") -> 
     """
     outputs: list[dict[int, float]] = [{} for _ in signals.driven]
     program = Pool(signals.n_x + signals.n_u).program_of_sums(outputs)
-    with engine_input():
-        return _core.Model(program, form, replace(signals, dt=dt).engine)
+    return _core.Model(program, form, replace(signals, dt=dt).engine)
 
 
 def kinematic_step(states: Floats, signals: Signals, form: str = "acceleration") -> Floats:

@@ -8,7 +8,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.chains import Chain, Motion
 from twinloop.identification.sensors.kinematic_steps import kinematic_step
@@ -112,11 +111,10 @@ def _drifting(
         records.append((added, counted, nothing, nothing, nothing))
     first = float(quiet.sensors[0])
     low, slow = BEST_SENSOR * BEST_SENSOR * quiet.rough, Motion(KINEMATIC * first, 0.0, dt)
-    with engine_input():
-        regression = _core.Regression(1, dt, "increment", records)
-        begun = (regression, [0.0], quiet.sensors, Motion(1e-2 * first, 0.0, dt), low, slow)
-        ((sensors, motion, length),) = _core.most_likely_noises([begun])
-        without = regression.likelihood([0.0], quiet.sensors, slow)
+    regression = _core.Regression(1, dt, "increment", records)
+    begun = (regression, [0.0], quiet.sensors, Motion(1e-2 * first, 0.0, dt), low, slow)
+    ((sensors, motion, length),) = _core.most_likely_noises([begun])
+    without = regression.likelihood([0.0], quiet.sensors, slow)
     drift = Motion(*motion).white - known
     if without - length < DRIFTS or drift <= max(LARGE * known, KINEMATIC * float(sensors[0])):
         return quiet

@@ -14,7 +14,6 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.errors import engine_input
 from twinloop.identification.description import shortest
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.chains import Chain
@@ -191,8 +190,7 @@ def unexplained_noise(
         start = (max(first / dt, slow[0]), gust, 10.0 * dt)
         regression = _unexplained(runs, signals, chain)
         problems.append((regression, [0.0], np.maximum(chain.rough, low), start, low, slow))
-    with engine_input():
-        found = _core.most_likely_noises(problems, workers)
+    found = _core.most_likely_noises(problems, workers)
     return [
         (chain.with_noise(sensors, motion), length)
         for chain, (sensors, motion, length) in zip(chains, found, strict=True)
@@ -209,8 +207,7 @@ def _unexplained(runs: Sequence[Run], signals: Signals, chain: Chain) -> _core.R
             turned = kinematic_step(run.states, signals, chain.form) - run.states[:-1]
             readings[1:] -= np.cumsum(turned[:, list(chain.states)], axis=0)
         records.append((readings, run.weights[:, list(chain.states)], nothing, nothing, nothing))
-    with engine_input():
-        return _core.Regression(len(chain.states), signals.dt, chain.form, records)
+    return _core.Regression(len(chain.states), signals.dt, chain.form, records)
 
 
 def _coarse(judge: Callable[[float], float]) -> float:
