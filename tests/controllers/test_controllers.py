@@ -249,16 +249,3 @@ def test_a_copy_goes_on_in_the_midst_of_a_run_and_shares_no_memory(pendulum_sign
     other.reset()
     afresh = family.controller(original.genes, EXCITED, HELD)
     assert same_bits(copied(other).command(*rows[0]), afresh.command(*rows[0]))
-
-
-def test_a_run_that_is_too_long_to_repeat_is_not_copied(pendulum_signals, pendulum_controller, monkeypatch):
-    monkeypatch.setattr("twinloop.controllers.family.MOST_HEARD", 3)
-    controller = pendulum_controller.bind(pendulum_signals).controller([1.0, 1.0, 0.1])
-    for _ in range(3):
-        controller.command([0.1, 0.0], [1.0, 0.0])
-    copy.copy(controller)
-    controller.command([0.1, 0.0], [1.0, 0.0])
-    with pytest.raises(tl.NotAvailable, match=r"at most 3 periods .* found 4; copy it sooner"):
-        copy.deepcopy(controller)
-    controller.reset()
-    copy.copy(controller)

@@ -217,6 +217,7 @@ def calls(world):
             {"parameters": w.gains[0], "excitation": w.excitation[0], "hold_back": w.hold_back},
         ),
         "Controller.reset": (w.family.controller(w.gains[0]).reset, {}),
+        "Controller.copied": (w.family.controller(w.gains[0]).copied, {}),
         "Controller.command": (
             w.family.controller(w.gains[0]).command,
             {"state": w.start, "target": w.target},

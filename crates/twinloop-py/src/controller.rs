@@ -180,6 +180,12 @@ impl PyController {
         raised()
     }
 
+    fn copied(&self, py: Python<'_>) -> Result<Self> {
+        let controller = self.lock(py)?.copied();
+        raised()?;
+        Ok(Self(Mutex::new(controller)))
+    }
+
     fn command<'py>(
         &self,
         py: Python<'py>,

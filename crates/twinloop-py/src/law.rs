@@ -85,4 +85,11 @@ impl ForeignController for PythonController {
             command.copy_from_slice(&found);
         }
     }
+
+    fn copied(&self) -> Box<dyn ForeignController> {
+        let copy = |controller: &Py<PyAny>| {
+            call(|py| Ok(py.import("copy")?.call_method1("deepcopy", (controller,))?.unbind()))
+        };
+        Box::new(Self(self.0.as_ref().and_then(copy)))
+    }
 }

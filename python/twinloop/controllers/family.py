@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,13 +16,11 @@ from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats, floats, number
 from twinloop._ground.values import Value
 from twinloop.controllers.gains import FixedGain, Gain
-from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import Signals
 
 AT_A_BOUND = 0.01
 """Share of its range within which a gain counts as at a bound."""
-MOST_HEARD = 100_000
-"""Periods of a run after which a controller can no longer be copied: what it has heard would fill the memory."""
 
 
 @runtime_checkable
@@ -236,11 +233,8 @@ class Controller:
         self.family = family
         self.genes = genes
         self.excitation = excitation
-        self.hold_back = hold_back
         held = None if hold_back is None else hold_back.engine
         self._law = family.engine.controller(genes, excitation, held)
-        # State and target of each period of the run: what a copy must hear to be where this controller is.
-        self._periods, self._heard = 0, array("d")
         self.reset()
 
     @property
@@ -251,7 +245,6 @@ class Controller:
     def reset(self) -> None:
         """Clears the memory and restarts the excitation; call it at the start of every run."""
         self._law.reset()
-        self._periods, self._heard = 0, array("d")
 
     def command(self, state: ArrayLike, target: ArrayLike) -> Floats:
         """The command for the coming period.
@@ -268,7 +261,7 @@ class Controller:
         """
         n_x = self.family.signals.n_x
         reading, goal = floats("State", state, (n_x,)), floats("Target", target, (n_x,))
-        return self._answer(reading, goal)
+        return self._law.command(reading, goal)
 
     def commands(self, states: Floats, targets: Floats) -> Floats:
         """The commands of a whole run, from rest.
@@ -290,28 +283,13 @@ class Controller:
                 f" each, found the shapes {states.shape} and {targets.shape}; record each period."
             )
         self.reset()
-        return np.array([self._answer(*row) for row in zip(states, targets, strict=True)])
-
-    def _answer(self, state: Floats, target: Floats) -> Floats:
-        if self._periods < MOST_HEARD:
-            self._heard.frombytes(state.tobytes() + target.tobytes())
-        self._periods += 1
-        return self._law.command(state, target)
+        return np.array([self._law.command(*row) for row in zip(states, targets, strict=True)])
 
     def __copy__(self) -> Controller:
-        """A controller with a memory of its own, in the midst of the same run; it hears again what this one heard.
-
-        Raises:
-            NotAvailable: the run has taken too long for that.
-        """
-        if self._periods > MOST_HEARD:
-            raise NotAvailable(
-                f"Controller: expected at most {MOST_HEARD} periods of a run to repeat in a copy, found"
-                f" {self._periods}; copy it sooner, or make another one of its family."
-            )
-        copied = Controller(self.family, self.genes, self.excitation, self.hold_back)
-        for state, target in np.array(self._heard).reshape(self._periods, 2, self.family.signals.n_x):
-            copied._answer(state, target)
+        """The controller in the midst of the same run, with a memory of its own."""
+        copied = object.__new__(Controller)
+        copied.__dict__.update(self.__dict__)
+        copied._law = self._law.copied()
         return copied
 
     def __deepcopy__(self, memo: dict[int, object]) -> Controller:

@@ -44,6 +44,12 @@ impl<V: Vector> Controllers<V> {
         own.then(|| Self { gains: self.gains.clone(), memory: self.memory.clone(), foreign: vec![] })
     }
 
+    /// The same in the midst of the same run, with a memory of their own.
+    pub fn copied(&self) -> Self {
+        let foreign = self.foreign.iter().map(|controller| controller.copied()).collect();
+        Self { gains: self.gains.clone(), memory: self.memory.clone(), foreign }
+    }
+
     /// Back to the start of a run.
     pub fn reset(&mut self) {
         self.memory.fill(V::splat(0.0));

@@ -20,6 +20,9 @@ pub trait ForeignController: Send {
 
     /// Writes the command (n_u) for a state and a target (n_x); to be called once a period.
     fn command(&mut self, state: &[f64], target: &[f64], command: &mut [f64]);
+
+    /// The same in the midst of the same run, with a memory of its own.
+    fn copied(&self) -> Box<dyn ForeignController>;
 }
 
 /// A controller for each lane.

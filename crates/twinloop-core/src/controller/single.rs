@@ -50,6 +50,18 @@ impl Controller {
         Ok(Self { excitation: lanes(excitation), hold_back, ..self })
     }
 
+    /// The same in the midst of the same run, with a memory of its own.
+    pub fn copied(&self) -> Self {
+        Self {
+            family: self.family.clone(),
+            parameters: self.parameters.clone(),
+            running: self.running.copied(),
+            excitation: self.excitation.clone(),
+            hold_back: self.hold_back.clone(),
+            period: self.period,
+        }
+    }
+
     /// The parameter vector (size).
     pub fn parameters(&self) -> impl Iterator<Item = f64> {
         self.parameters.iter().map(|lane| lane.lane(0))

@@ -92,6 +92,10 @@ impl ForeignController for One {
     fn command(&mut self, state: &[f64], target: &[f64], command: &mut [f64]) {
         command.copy_from_slice(&self.0.command(state, target).unwrap());
     }
+
+    fn copied(&self) -> Box<dyn ForeignController> {
+        Box::new(Self(self.0.copied()))
+    }
 }
 
 /// Adds a constant of its own to the first state of each lane: the command that its gain asks for, and nothing else.
