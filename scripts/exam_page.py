@@ -1,7 +1,7 @@
 """Writes the tables of docs/exam.md out of the exam's code: python scripts/exam_page.py.
 
-Who sits the exam stands in `twinloop_exam.learners`, on what in `twinloop_exam.systems`. What stands outside of the markers
-is written by people.
+Who sits the exam stands in `twinloop_exam.learners`, on what in `twinloop_exam.systems`. All the rest of the page is
+written by hand.
 """
 
 import sys

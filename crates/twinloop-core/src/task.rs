@@ -29,11 +29,11 @@ impl Task {
                 initial.len()
             ));
         }
-        if !initial.iter().chain(&target).all(|x| x.is_finite()) || !(1..=Self::MOST_STEPS).contains(&steps) {
-            return invalid(format!(
-                "task: expected finite states and 1 to {} steps, found {steps}",
-                Self::MOST_STEPS
-            ));
+        if let Some(x) = initial.iter().chain(&target).find(|x| !x.is_finite()) {
+            return invalid(format!("task: expected finite states, found {x}"));
+        }
+        if !(1..=Self::MOST_STEPS).contains(&steps) {
+            return invalid(format!("task: expected 1 to {} steps, found {steps}", Self::MOST_STEPS));
         }
         Ok(Self { initial, target, steps })
     }
