@@ -85,7 +85,7 @@ impl<'a> Model<'a> {
 
     /// Moves the states of a run on by the period whose command is remembered already.
     #[inline(always)]
-    pub(crate) fn advance<V: Vector>(
+    fn advance<V: Vector>(
         &self,
         workspace: &mut ModelWorkspace<V>,
         state: &mut [V],
@@ -151,7 +151,7 @@ pub struct ModelWorkspace<V: Vector> {
     /// What the actuators hold, where there are any.
     line: Option<Line<V>>,
     /// What motion has filled, where it fills anything.
-    pub(crate) storage: Option<Box<Storage<V>>>,
+    storage: Option<Box<Storage<V>>>,
     /// What sensors may read yet.
     recent: Recent,
     /// Of a rigid body: the states and the quaternion of its angles behind them; the states of a stage.

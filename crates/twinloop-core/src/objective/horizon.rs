@@ -1,7 +1,8 @@
 //! Errors of free runs of some steps from every recorded state, under the recorded commands.
 //!
-//! A test is walked through in the order of time: actuators and hidden states move on by each recorded command once,
-//! whatever the states are (what motion fills, by each recorded state), and so every run starts with the memory that the system had there (Ljung 1999, section 3.2).
+//! A test is walked through in the order of time: actuators and hidden states move on by each recorded command (what
+//! motion fills, by each recorded state), and so every run starts with the memory that the system had there (Ljung 1999,
+//! section 3.2).
 
 use std::collections::VecDeque;
 
@@ -25,18 +26,12 @@ pub(super) fn after_steps(model: Model<'_>, selected: &SelectedTests, horizon: u
         let (mut squares, mut count) = (0.0, 0);
         for (states, command) in recorded.windows(2).zip(experiment.commands.chunks_exact(n_u)) {
             let command = scalars(command);
-            model.remember(&mut workspace, &command);
-            running.push_back((scalars(&states[0]), workspace.storage.clone()));
-            for (state, storage) in &mut running {
-                // What motion has filled is of the run, and not of the test.
-                std::mem::swap(storage, &mut workspace.storage);
-                model.advance(&mut workspace, state, &command);
-                std::mem::swap(storage, &mut workspace.storage);
+            running.push_back((scalars(&states[0]), workspace));
+            for (state, workspace) in &mut running {
+                model.step(workspace, state, &command);
             }
-            if let Some((_, along)) = running.back() {
-                // The last one began where the test is.
-                workspace.storage = along.clone();
-            }
+            // The last one began where the test is.
+            workspace = running[running.len() - 1].1.clone();
             if running.len() == horizon {
                 let last = running.pop_front().map(|(state, _)| state).unwrap_or_default();
                 for (i, (&predicted, &read)) in last.iter().zip(&states[1]).enumerate() {
