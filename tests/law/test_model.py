@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from oracles import EXACT, model_step, same_bits
 from strategies import exact_programs, program_text, rows
-from twinloop import _core
+from twinloop import InvalidInput, _core
 
 SCALES, DERIVATIVES = [1.0, 4.0], [None, 0]
 
@@ -96,6 +96,27 @@ def test_a_program_of_another_shape_is_no_model(rig):
         _core.Model(program, "acceleration", rig)
     with pytest.raises(ValueError, match='found "jump"'):
         _core.Model(program, "jump", rig)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ([], True, None, 0.3, [], False, 0.0),
+        ([0], True, 0.0, 0.3, [0], False, 0.0),
+        ([0], True, None, 0.3, [], True, 0.0),
+        ([0], True, None, 0.3, [], False, 0.1),
+        ([], True, None, 0.3, [0], False, 0.0),
+        ([], True, 0.0, 0.3, [0], False, -0.1),
+        ([], True, 0.0, 0.3, [9], False, 0.0),
+        ([], True, 0.0, 0.0, [0], False, 0.0),
+    ],
+)
+def test_commands_or_states_fill_a_hidden_state_and_only_states_settle_or_turn_it(rig, wrong):
+    program = _core.Program.parse(program_text(5, 2, 7, [["r5 = r4 + 0.0"]]))
+    for right in (([0], True, None, 0.3, [], False, 0.0), ([], False, 0.5, 0.3, [1], True, 0.0)):
+        assert _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2, [right]).hidden == [right]
+    with pytest.raises(InvalidInput, match="hidden state: expected"):
+        _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2, [wrong])
 
 
 def test_rows_of_another_width_are_refused(rig):

@@ -67,7 +67,7 @@ impl Actuation {
         if !hidden.is_sorted_by_key(Hidden::moves) {
             return invalid("hidden states: expected those that commands fill before those that states fill");
         }
-        let turning: Vec<usize> = (0..hidden.len()).filter(|&i| hidden[i].turning()).collect();
+        let turning: Vec<usize> = (0..hidden.len()).filter(|&i| hidden[i].turns().is_some()).collect();
         let paired = |pair: &[usize]| matches!(pair, &[i, j] if j == i + 1 && hidden[i] == hidden[j]);
         if !turning.chunks(2).all(paired) {
             return invalid(
@@ -86,10 +86,8 @@ impl Actuation {
     /// Lag of each actuator, then time of each hidden state, then the time in which each that has a partner turns, s.
     pub fn times(&self) -> Vec<f64> {
         let lags = self.actuators.iter().map(|actuator| actuator.lag);
-        let turning = self.hidden.iter().filter(|hidden| hidden.turning());
-        lags.chain(self.hidden.iter().map(|hidden| hidden.time))
-            .chain(turning.map(|hidden| hidden.turns))
-            .collect()
+        let times = self.hidden.iter().map(|hidden| hidden.time);
+        lags.chain(times).chain(self.hidden.iter().filter_map(Hidden::turns)).collect()
     }
 
     /// The same, each on so many lanes, lane by lane.
@@ -106,8 +104,8 @@ impl Actuation {
         let mut other = self.clone();
         let (lags, rest) = times.split_at(self.actuators.len());
         let (rest, turns) = rest.split_at(self.hidden.len());
-        let turning = other.hidden.iter_mut().filter(|hidden| hidden.turning());
-        turning.zip(turns).for_each(|(hidden, &time)| hidden.turns = time);
+        let turning = other.hidden.iter_mut().filter_map(Hidden::turns_mut);
+        turning.zip(turns).for_each(|(turns, &time)| *turns = time);
         other.actuators.iter_mut().zip(lags).for_each(|(actuator, &lag)| actuator.lag = lag);
         other.hidden.iter_mut().zip(rest).for_each(|(hidden, &time)| hidden.time = time);
         if self.is_direct() { Ok(other) } else { other.validated(self.actuators.len(), usize::MAX) }
@@ -138,15 +136,14 @@ impl<V: Vector> Line<V> {
         // Lane by lane: there is one line a run, and arithmetic on vectors would be compiled for each of them.
         let (decays, gains) = fading(times, dt);
         let (decays, gains): (Vec<V>, Vec<V>) = (vectors(&decays), vectors(&gains));
-        let effects = || zeros(commands + filled_by_commands(hidden).count());
+        let hidden: Vec<_> =
+            (commands..).zip(hidden).map_while(|(i, one)| Filling::new(one, decays[i], gains[i])).collect();
+        let effects = || zeros(commands + hidden.len());
         Self {
             memory: zeros(commands),
             effects: [effects(), effects(), effects()],
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
-            hidden: (commands..)
-                .zip(filled_by_commands(hidden))
-                .map(|(i, one)| Filling::new(one, decays[i], gains[i]))
-                .collect(),
+            hidden,
             halves: decays,
             factors: factors.to_vec(),
             actuators: actuators.clone(),
@@ -190,11 +187,6 @@ impl<V: Vector> Line<V> {
         }
         self.started = true;
     }
-}
-
-/// The hidden states that commands fill; those that states fill come after them.
-fn filled_by_commands(hidden: &[Hidden]) -> impl Iterator<Item = &Hidden> {
-    hidden.iter().take_while(|one| !one.moves())
 }
 
 /// For each time constant: the decay over half a period, e^(−dt / 2 time) or 0 for a time of 0, and the gain of its input.
@@ -246,6 +238,7 @@ pub fn checked_effects(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hidden::Source;
 
     fn of(actuator: Actuator) -> Actuation {
         Actuation { actuators: vec![actuator], hidden: vec![] }
@@ -281,15 +274,8 @@ mod tests {
     fn a_hidden_state_fills_and_fades_as_its_equation_says() {
         let (time, dt, scale) = (0.3, 0.02, 2.0);
         for squared in [false, true] {
-            let hidden = Hidden {
-                commands: vec![0, 1],
-                states: vec![],
-                squared,
-                rest: Some(0.25),
-                settled: false,
-                time,
-                turns: 0.0,
-            };
+            let source = Source::Commands { commands: vec![0, 1], rest: Some(0.25) };
+            let hidden = Hidden { source, squared, time };
             let actuation = Actuation { actuators: vec![Actuator::DIRECT; 2], hidden: vec![hidden] };
             // Ten periods of 3 and 1, then ten at rest.
             let (full, rest): (f64, f64) = if squared { (1.25, 0.5) } else { (1.0, 0.25) };
@@ -313,13 +299,9 @@ mod tests {
     #[test]
     fn parts_that_fit_no_commands_are_refused() {
         let hidden = |commands: Vec<usize>, time: f64| Hidden {
-            commands,
-            states: vec![],
+            source: Source::Commands { commands, rest: None },
             squared: true,
-            rest: None,
-            settled: false,
             time,
-            turns: 0.0,
         };
         for wrong in
             [hidden(vec![], 1.0), hidden(vec![1], 1.0), hidden(vec![0], 0.0), hidden(vec![0], f64::NAN)]

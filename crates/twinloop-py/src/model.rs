@@ -5,12 +5,12 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, AnyDynamics, Form, Hidden, OwnedModel, Periods, RigidBody, Signals, checked_effects,
-    state_of,
+    Actuation, Actuator, AnyDynamics, Form, Hidden, OwnedModel, Periods, RigidBody, Signals, Source,
+    checked_effects, state_of,
 };
 
 use crate::arrays::{Cube, Matrix, Vector, rows, to_matrix, to_vector, vector};
-use crate::error::{Result, given};
+use crate::error::{Result, given, misuse};
 use crate::program::PyProgram;
 use crate::rows::Rows;
 use crate::workers::{PyWorkers, or_default};
@@ -73,7 +73,7 @@ impl PyModel {
         #[pyo3(from_py_with = given)] offsets: Vec<f64>,
     ) -> Result<Self> {
         let acts = actuators.is_some() || !hidden.is_empty();
-        let actuation = acts.then(|| actuation(actuators.unwrap_or_default(), hidden));
+        let actuation = acts.then(|| actuation(actuators.unwrap_or_default(), hidden)).transpose()?;
         let model = OwnedModel::new(program.0.clone(), form.parse()?, signals.0.clone(), actuation)?;
         Ok(Self(if offsets.is_empty() { model } else { model.with_offsets(&offsets)? }))
     }
@@ -117,9 +117,6 @@ impl PyModel {
     /// (commands, squared, rest, time, states, settled, turns) of each hidden state.
     #[getter]
     fn hidden(&self) -> Vec<HiddenParts> {
-        let parts = |h: &Hidden| {
-            (h.commands.clone(), h.squared, h.rest, h.time, h.states.clone(), h.settled, h.turns)
-        };
         self.0.frame().actuation().hidden.iter().map(parts).collect()
     }
 
@@ -176,20 +173,38 @@ type ActuatorParts = (f64, usize, Option<f64>);
 /// Commands, whether squared, rest, time, states, whether settled, in which it turns.
 type HiddenParts = (Vec<usize>, bool, Option<f64>, f64, Vec<usize>, bool, f64);
 
-fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Actuation {
+fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Result<Actuation> {
     let actuator = |(lag, delay, rest)| Actuator { lag, delay, rest };
-    let filled = |(commands, squared, rest, time, states, settled, turns)| Hidden {
-        commands,
-        states,
-        squared,
-        rest,
-        settled,
-        time,
-        turns,
-    };
-    Actuation {
+    Ok(Actuation {
         actuators: actuators.into_iter().map(actuator).collect(),
-        hidden: hidden.into_iter().map(filled).collect(),
+        hidden: hidden.into_iter().map(filled).collect::<Result<_>>()?,
+    })
+}
+
+/// A hidden state of its parts; commands or states fill it, and not both.
+fn filled((commands, squared, rest, time, states, settled, turns): HiddenParts) -> Result<Hidden> {
+    let turns = (turns != 0.0).then_some(turns);
+    let source = match (commands.is_empty(), states.is_empty(), rest) {
+        (false, true, _) if !settled && turns.is_none() => Source::Commands { commands, rest },
+        (true, false, Some(rest)) => Source::States { states, rest, settled, turns },
+        _ => {
+            return Err(misuse(format!(
+                "hidden state: expected commands, or states with a rest, that fill it, and only with states that it is \
+                 settled or turns, found commands {commands:?}, states {states:?}, rest {rest:?}"
+            )));
+        }
+    };
+    Ok(Hidden { source, squared, time })
+}
+
+/// The parts of a hidden state.
+fn parts(hidden: &Hidden) -> HiddenParts {
+    let Hidden { source, squared, time } = hidden;
+    match source.clone() {
+        Source::Commands { commands, rest } => (commands, *squared, rest, *time, vec![], false, 0.0),
+        Source::States { states, rest, settled, turns } => {
+            (vec![], *squared, Some(rest), *time, states, settled, turns.unwrap_or(0.0))
+        }
     }
 }
 
@@ -205,6 +220,6 @@ pub fn command_effects<'py>(
     commands: Matrix<'py>,
 ) -> Result<[Bound<'py, PyArray2<f64>>; 3]> {
     let commands = rows("commands", &commands, actuators.len())?.concat();
-    let (found, columns) = checked_effects(actuation(actuators, hidden), &vector(&scales), dt, &commands)?;
+    let (found, columns) = checked_effects(actuation(actuators, hidden)?, &vector(&scales), dt, &commands)?;
     Ok(found.map(|values| to_matrix(py, columns, values)))
 }

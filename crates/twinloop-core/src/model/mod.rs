@@ -85,12 +85,7 @@ impl<'a> Model<'a> {
 
     /// Moves the states of a run on by the period whose command is remembered already.
     #[inline(always)]
-    fn advance<V: Vector>(
-        &self,
-        workspace: &mut ModelWorkspace<V>,
-        state: &mut [V],
-        command: &[V],
-    ) {
+    fn advance<V: Vector>(&self, workspace: &mut ModelWorkspace<V>, state: &mut [V], command: &[V]) {
         let ModelWorkspace { bank, stages, line, storage, turned, seen, .. } = workspace;
         let effects = match line {
             None => [command; 3],

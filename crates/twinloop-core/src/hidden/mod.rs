@@ -1,0 +1,141 @@
+//! Hidden states that commands or motion fill and that fade: what many periods of thrust, heat, current or speed leave in
+//! a machine and no sensor reads.
+
+mod filling;
+mod storage;
+
+pub(crate) use filling::Filling;
+pub(crate) use storage::Storage;
+
+use crate::error::{Result, invalid};
+
+/// A hidden state h of a model: dh/dt = mean over its sources of what each gives − the same at rest − h / time.
+///
+/// Each source gives itself, or its square, in units of its scale; h is an input of the model's program after the commands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hidden {
+    /// What fills it.
+    pub source: Source,
+    /// Whether the source does so with squares.
+    pub squared: bool,
+    /// Its time constant, s.
+    pub time: f64,
+}
+
+/// What fills a hidden state, and what it is at the start of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// Some of the commands; it is 0 at the start of a run.
+    Commands {
+        /// Which, by number.
+        commands: Vec<usize>,
+        /// The mean at which it neither fills nor empties; none: that of the first period.
+        rest: Option<f64>,
+    },
+    /// Some of the states.
+    ///
+    /// Two neighbours may turn into each other, as the place and the speed of a mass on a spring do: then −h₂ / turns is
+    /// added to the first one's slope, and h₁ / turns to the second one's.
+    States {
+        /// Which, by number.
+        states: Vec<usize>,
+        /// The mean at which it neither fills nor empties.
+        rest: f64,
+        /// Whether a run begins with it settled at what fills it then, and not empty.
+        settled: bool,
+        /// In which it and its partner turn by one radian, s; none: it has no partner.
+        turns: Option<f64>,
+    },
+}
+
+impl Hidden {
+    /// Refuses what is no such state of so many commands and states.
+    pub fn validated(self, commands: usize, states: usize) -> Result<Self> {
+        let positive = |time: f64| time.is_finite() && time > 0.0;
+        let some_of =
+            |places: &[usize], count| !places.is_empty() && places.iter().all(|&place| place < count);
+        let fits = match &self.source {
+            Source::Commands { commands: filling, rest } => {
+                some_of(filling, commands) && rest.is_none_or(f64::is_finite)
+            }
+            Source::States { states: filling, rest, turns, .. } => {
+                some_of(filling, states) && rest.is_finite() && turns.is_none_or(positive)
+            }
+        };
+        if fits && positive(self.time) {
+            return Ok(self);
+        }
+        invalid(format!(
+            "hidden state: expected some of {commands} commands or of {states} states, a finite rest, and times above \
+             0 s, found {self:?}"
+        ))
+    }
+
+    /// Whether states fill it.
+    pub(crate) fn moves(&self) -> bool {
+        matches!(self.source, Source::States { .. })
+    }
+
+    /// In which it and its partner turn by one radian, s; none where it has no partner.
+    pub(crate) fn turns(&self) -> Option<f64> {
+        match self.source {
+            Source::Commands { .. } => None,
+            Source::States { turns, .. } => turns,
+        }
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn turns_mut(&mut self) -> Option<&mut f64> {
+        match &mut self.source {
+            Source::Commands { .. } => None,
+            Source::States { turns, .. } => turns.as_mut(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(source: Source) -> Hidden {
+        Hidden { source, squared: true, time: 0.3 }
+    }
+
+    fn of_commands(commands: Vec<usize>, rest: Option<f64>) -> Hidden {
+        of(Source::Commands { commands, rest })
+    }
+
+    fn of_states(states: Vec<usize>, rest: f64, turns: Option<f64>) -> Hidden {
+        of(Source::States { states, rest, settled: true, turns })
+    }
+
+    #[test]
+    fn what_fits_the_commands_and_states_of_a_model_is_accepted() {
+        for right in [
+            of_commands(vec![0], None),
+            of_commands(vec![0], Some(0.25)),
+            of_states(vec![0, 1], 0.25, None),
+            of_states(vec![1], 0.25, Some(0.04)),
+        ] {
+            assert_eq!(right.clone().validated(1, 2), Ok(right));
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        for wrong in [
+            of_commands(vec![], None),
+            of_commands(vec![1], None),
+            of_commands(vec![0], Some(f64::NAN)),
+            of_states(vec![], 0.25, None),
+            of_states(vec![2], 0.25, None),
+            of_states(vec![1], f64::INFINITY, None),
+            of_states(vec![1], 0.25, Some(0.0)),
+            of_states(vec![1], 0.25, Some(f64::NAN)),
+            Hidden { time: 0.0, ..of_states(vec![1], 0.25, None) },
+            Hidden { time: f64::INFINITY, ..of_commands(vec![0], None) },
+        ] {
+            assert!(wrong.clone().validated(1, 2).is_err(), "{wrong:?}");
+        }
+    }
+}

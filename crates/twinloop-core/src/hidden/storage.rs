@@ -1,0 +1,344 @@
+//! What states fill, in the course of a run: integrated with the states, point after point.
+
+use super::{Hidden, Source};
+use crate::lanes::{Vector, numbers, vectors};
+
+/// The hidden states of a model that its own states fill, with what a program sees of commands and of them.
+#[derive(Clone)]
+pub(crate) struct Storage<V> {
+    stored: Stored,
+    seen: Vec<V>,
+}
+
+impl<V: Vector> Storage<V> {
+    /// At the start of a run, of those among some hidden states that states fill, if there are any; the times of all, then
+    /// those in which they turn, are given lane by lane, and steps of the integrator in s, `staged` if they are of Runge and
+    /// Kutta.
+    #[inline(never)]
+    pub fn new(
+        hidden: &[Hidden],
+        factors: &[f64],
+        times: &[f64],
+        dt: f64,
+        staged: bool,
+    ) -> Option<Box<Self>> {
+        let stored = Stored::new(hidden, factors, times, V::LANES, dt, staged)?;
+        Some(Box::new(Self { stored, seen: vec![] }))
+    }
+
+    /// What a program sees at the integrator's next point: effects of commands, then what is stored.
+    #[inline(never)]
+    pub fn see(&mut self, state: &[V], effects: &[V]) -> &[V] {
+        let mut seen = numbers(effects);
+        seen.extend(self.stored.see(&numbers(state)));
+        self.seen = vectors(&seen);
+        &self.seen
+    }
+}
+
+/// What fills one of them.
+#[derive(Clone)]
+struct Inflow {
+    states: Vec<usize>,
+    squared: bool,
+    rest: f64,
+    settled: bool,
+}
+
+impl Inflow {
+    /// Of a hidden state that states fill.
+    fn of(hidden: &Hidden) -> Option<Self> {
+        match &hidden.source {
+            Source::Commands { .. } => None,
+            Source::States { states, rest, settled, .. } => {
+                Some(Self { states: states.clone(), squared: hidden.squared, rest: *rest, settled: *settled })
+            }
+        }
+    }
+
+    /// What flows in on one lane of several, beyond its rest.
+    fn at(&self, states: &[f64], factors: &[f64], lanes: usize, lane: usize) -> f64 {
+        let given = self.states.iter().map(|&i| states[i * lanes + lane] * factors[i]);
+        let sum: f64 = given.map(|given| if self.squared { given * given } else { given }).sum();
+        sum * (1.0 / self.states.len() as f64) - self.rest
+    }
+}
+
+/// What a stored number turns into.
+#[derive(Clone, Copy)]
+struct Partner {
+    /// Its place among the numbers stored.
+    place: usize,
+    /// How much of it leaves for the partner's every unit, 1 / s: below 0 for the second of a pair.
+    rate: f64,
+}
+
+/// What states have filled, in the course of a run.
+///
+/// Lane by lane: few laws have any, and arithmetic on vectors would be compiled for each of them. There is a number for
+/// each hidden state and lane, in this order.
+#[derive(Clone)]
+struct Stored {
+    inflows: Vec<Inflow>,
+    /// One over the scale of each state.
+    factors: Vec<f64>,
+    lanes: usize,
+    /// Step of the integrator, s, and whether it is one of Runge and Kutta; else one by the rule of trapezoids.
+    dt: f64,
+    staged: bool,
+    /// Time constant of each number, s.
+    times: Vec<f64>,
+    partners: Vec<Option<Partner>>,
+    now: Vec<f64>,
+    /// Slope at the last point seen, and the weighted sum of those of the step.
+    slope: Vec<f64>,
+    sum: Vec<f64>,
+    /// The next point is of this stage of the integrator; none: it is the first of the run.
+    stage: Option<usize>,
+}
+
+impl Stored {
+    /// At the start of a run, of those among some hidden states that states fill, whose times are given lane by lane.
+    fn new(
+        hidden: &[Hidden],
+        factors: &[f64],
+        times: &[f64],
+        lanes: usize,
+        dt: f64,
+        staged: bool,
+    ) -> Option<Self> {
+        let first = hidden.iter().position(Hidden::moves)?;
+        let (times, turns) = times.split_at(hidden.len() * lanes);
+        let times = times[first * lanes..].to_vec();
+        let empty = vec![0.0; times.len()];
+        Some(Self {
+            inflows: hidden.iter().filter_map(Inflow::of).collect(),
+            factors: factors.to_vec(),
+            lanes,
+            dt,
+            staged,
+            partners: partners(&hidden[first..], turns, lanes),
+            times,
+            now: empty.clone(),
+            slope: empty.clone(),
+            sum: empty,
+            stage: None,
+        })
+    }
+
+    /// The numbers at the integrator's next point, at which the states are these.
+    fn see(&mut self, state: &[f64]) -> Vec<f64> {
+        let inflow = self.inflow(state);
+        if self.stage.is_none() {
+            self.settle(&inflow);
+        }
+        let points = self.points(&inflow);
+        self.slope = (0..points.len()).map(|i| self.slope_at(i, &points, &inflow)).collect();
+        if self.staged {
+            self.sum_up();
+        } else {
+            self.now.clone_from(&points);
+        }
+        self.stage = Some(if self.staged { (self.stage.unwrap_or(0) + 1) % SIXTHS.len() } else { 0 });
+        points
+    }
+
+    /// What flows into each number.
+    fn inflow(&self, state: &[f64]) -> Vec<f64> {
+        let lanes = self.lanes;
+        let of = |i: usize| self.inflows[i / lanes].at(state, &self.factors, lanes, i % lanes);
+        (0..self.now.len()).map(of).collect()
+    }
+
+    /// Fills those that a run begins with settled, so that they stay as they are under this inflow.
+    fn settle(&mut self, inflow: &[f64]) {
+        for i in (0..self.now.len()).filter(|i| self.inflows[i / self.lanes].settled) {
+            self.now[i] = match self.partners[i] {
+                Some(_) => self.solved(i, 0.0, 1.0, inflow),
+                None => inflow[i] * self.times[i],
+            };
+        }
+    }
+
+    /// The numbers at the next point, from those at the start of the step.
+    fn points(&self, inflow: &[f64]) -> Vec<f64> {
+        let stage = self.stage.unwrap_or(0);
+        if self.staged && stage > 0 {
+            let ahead = NEXT[stage - 1] * self.dt;
+            self.now.iter().zip(&self.slope).map(|(now, slope)| now + slope * ahead).collect()
+        } else if self.staged || self.stage.is_none() {
+            self.now.clone()
+        } else {
+            self.by_trapezoids(inflow)
+        }
+    }
+
+    /// The numbers at the end of a step. What it has added is known once the state there is.
+    fn by_trapezoids(&self, inflow: &[f64]) -> Vec<f64> {
+        let half = 0.5 * self.dt;
+        let known = |i: usize| self.now[i] + half * (self.slope[i] + inflow[i]);
+        let added: Vec<f64> = (0..self.now.len()).map(known).collect();
+        (0..self.now.len()).map(|i| self.solved(i, 1.0, half, &added)).collect()
+    }
+
+    /// Slope of one number at a point.
+    fn slope_at(&self, i: usize, points: &[f64], inflow: &[f64]) -> f64 {
+        let slope = inflow[i] - points[i] / self.times[i];
+        self.partners[i].map_or(slope, |partner| slope - points[partner.place] * partner.rate)
+    }
+
+    /// Adds the slope of this stage to the sum of the step, and moves on after the last stage.
+    fn sum_up(&mut self) {
+        let stage = self.stage.unwrap_or(0);
+        for i in 0..self.now.len() {
+            let weighted = self.slope[i] * SIXTHS[stage];
+            self.sum[i] = if stage > 0 { self.sum[i] + weighted } else { weighted };
+            if stage == SIXTHS.len() - 1 {
+                self.now[i] += self.sum[i] * (self.dt / 6.0);
+            }
+        }
+    }
+
+    /// One of what solves `own` h + `share` (h / time + what it turns into) = `right`, for each of them.
+    fn solved(&self, i: usize, own: f64, share: f64, right: &[f64]) -> f64 {
+        let fades = own + share / self.times[i];
+        let Some(Partner { place, rate }) = self.partners[i] else { return right[i] / fades };
+        let (others, turned) = (own + share / self.times[place], share * rate);
+        (right[i] * others - turned * right[place]) / (fades * others + turned * turned)
+    }
+}
+
+/// The partner of each number; those that turn come in pairs. The times in which they do are given lane by lane.
+fn partners(hidden: &[Hidden], turns: &[f64], lanes: usize) -> Vec<Option<Partner>> {
+    let mut partners = Vec::with_capacity(hidden.len() * lanes);
+    let mut turning = 0;
+    for (k, kind) in hidden.iter().enumerate() {
+        if kind.turns().is_none() {
+            partners.resize(partners.len() + lanes, None);
+            continue;
+        }
+        let (other, side) = if turning % 2 == 0 { (k + 1, 1.0) } else { (k - 1, -1.0) };
+        let times = &turns[turning * lanes..][..lanes];
+        let on_lane =
+            |(lane, time): (usize, &f64)| Partner { place: other * lanes + lane, rate: side / time };
+        partners.extend(times.iter().enumerate().map(on_lane).map(Some));
+        turning += 1;
+    }
+    partners
+}
+
+/// Shares of a step from its start to the next stage's point, and the weights of the stages, as the integrator has them.
+const NEXT: [f64; 3] = [0.5, 0.5, 1.0];
+const SIXTHS: [f64; 4] = [1.0, 2.0, 2.0, 1.0];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Wide;
+
+    const DT: f64 = 0.02;
+    const TIMES: [f64; 2] = [0.3, 0.05];
+
+    fn filled_by_the_second(squared: bool, settled: bool, turns: Option<f64>) -> Hidden {
+        Hidden { source: Source::States { states: vec![1], rest: 0.25, settled, turns }, squared, time: 0.3 }
+    }
+
+    /// What a state of 4 (1 + t), in units of 4, has filled by a time: h' = 1 + t − rest − h / T, or with (1 + t)².
+    fn exact(t: f64, time: f64, squared: bool, settled: bool) -> f64 {
+        // A particular solution a + b t + c t², and what fades of the difference at the start.
+        let (first, second, third) = if squared { (0.75, 2.0, 1.0) } else { (0.75, 1.0, 0.0) };
+        let c = third * time;
+        let b = (second - 2.0 * c) * time;
+        let a = (first - b) * time;
+        let begun = if settled { 0.75 * time } else { 0.0 };
+        a + b * t + c * t * t + (begun - a) * (-t / time).exp()
+    }
+
+    fn state(t: f64) -> [Wide<f64, 2>; 2] {
+        [Wide::splat(7.0), Wide::splat(4.0 * (1.0 + t))]
+    }
+
+    #[test]
+    fn what_a_moving_state_fills_is_what_its_equation_says_on_every_lane() {
+        for (squared, settled) in [(false, false), (false, true), (true, false), (true, true)] {
+            for (staged, close) in [(true, 2e-5), (false, 2e-3)] {
+                let hidden = filled_by_the_second(squared, settled, None);
+                let mut storage =
+                    Storage::<Wide<f64, 2>>::new(&[hidden], &[1.0, 0.25], &TIMES, DT, staged).unwrap();
+                let effects = [Wide::splat(-1.0)];
+                for k in 0..40 {
+                    let t = f64::from(k) * DT;
+                    let shares: &[f64] = if staged { &[0.0, 0.5, 0.5, 1.0] } else { &[0.0] };
+                    let seen: Vec<_> = shares
+                        .iter()
+                        .map(|share| storage.see(&state(t + share * DT), &effects).to_vec())
+                        .collect();
+                    for (lane, time) in TIMES.into_iter().enumerate() {
+                        let found = seen[0][1].lane(lane);
+                        assert_eq!(seen[0][0].lane(lane), -1.0);
+                        let expected = exact(t, time, squared, settled);
+                        assert!(
+                            (found - expected).abs() < close,
+                            "{squared} {settled} {staged} {k}: {found} {expected}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_pair_turns_and_fades_as_its_equations_say() {
+        let (time, turns) = (0.5, 0.04);
+        for settled in [false, true] {
+            for (staged, close) in [(true, 2e-4), (false, 2e-3)] {
+                let one = Hidden { time, ..filled_by_the_second(false, settled, Some(turns)) };
+                let pair = [one.clone(), one];
+                let times = [time, time, time, time, turns, turns, turns, turns];
+                let mut storage =
+                    Storage::<Wide<f64, 2>>::new(&pair, &[1.0, 0.25], &times, 0.1 * DT, staged).unwrap();
+                // The complex number z = h1 + i h2 obeys z' = (1 + i) (0.75 + t) - (1 / time - i / turns) z.
+                let mut z = [0.0, 0.0];
+                let slope = |z: [f64; 2], t: f64| {
+                    [0.75 + t - z[0] / time - z[1] / turns, 0.75 + t - z[1] / time + z[0] / turns]
+                };
+                if settled {
+                    let (fades, turned) = (1.0 / time, 1.0 / turns);
+                    let det = fades * fades + turned * turned;
+                    z = [0.75 * (fades - turned) / det, 0.75 * (fades + turned) / det];
+                    assert!(slope(z, 0.0).iter().all(|rate| rate.abs() < 1e-12));
+                }
+                for k in 0..300 {
+                    let t = f64::from(k) * 0.1 * DT;
+                    let shares: &[f64] = if staged { &[0.0, 0.5, 0.5, 1.0] } else { &[0.0] };
+                    let seen: Vec<_> =
+                        shares.iter().map(|s| storage.see(&state(t + s * 0.1 * DT), &[]).to_vec()).collect();
+                    for (part, expected) in z.into_iter().enumerate() {
+                        for lane in 0..2 {
+                            let found = seen[0][part].lane(lane);
+                            assert!(
+                                (found - expected).abs() < close,
+                                "{settled} {staged} {k}: {found} {expected}"
+                            );
+                        }
+                    }
+                    // A hundred small steps of the midpoint rule.
+                    for part in 0..100 {
+                        let (h, now) = (1e-3 * DT, t + f64::from(part) * 1e-3 * DT);
+                        let first = slope(z, now);
+                        let second =
+                            slope([z[0] + 0.5 * h * first[0], z[1] + 0.5 * h * first[1]], now + 0.5 * h);
+                        z = [z[0] + h * second[0], z[1] + h * second[1]];
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_commands_fill_is_no_storage() {
+        let source = Source::Commands { commands: vec![0], rest: None };
+        let by_commands = Hidden { source, squared: true, time: 0.3 };
+        assert!(Storage::<Wide<f64, 2>>::new(&[by_commands], &[1.0], &TIMES, DT, true).is_none());
+    }
+}
