@@ -74,6 +74,8 @@ pub trait Isa {
     type Of4: Vector;
     /// 8 lanes.
     type Of8: Vector;
+    /// 8 lanes of numbers that are only compared: nothing waits for them, so the widest registers serve best.
+    type Compared8: Vector;
     /// 32 lanes.
     type Of32: Vector;
     /// 64 lanes.
@@ -95,6 +97,7 @@ mod x86 {
         type Of1 = Scalar;
         type Of4 = Wide<[f64; 4], 1>;
         type Of8 = Wide<[f64; 8], 1>;
+        type Compared8 = Self::Of8;
         type Of32 = Wide<[f64; 32], 1>;
         type Of64 = Wide<[f64; 64], 1>;
     }
@@ -103,6 +106,7 @@ mod x86 {
         type Of1 = Scalar;
         type Of4 = Wide<__m256d, 1>;
         type Of8 = Wide<__m256d, 2>;
+        type Compared8 = Self::Of8;
         type Of32 = Wide<__m256d, 8>;
         type Of64 = Wide<__m256d, 16>;
     }
@@ -112,6 +116,7 @@ mod x86 {
         type Of4 = Wide<__m256d, 1>;
         // Two registers and not one of 512 bits: what the next step waits for is there sooner, and the code is that of AVX2.
         type Of8 = Wide<__m256d, 2>;
+        type Compared8 = Wide<__m512d, 1>;
         type Of32 = Wide<__m512d, 4>;
         type Of64 = Wide<__m512d, 8>;
     }
@@ -122,6 +127,7 @@ impl Isa for Baseline {
     type Of1 = Scalar;
     type Of4 = Wide<f64, 4>;
     type Of8 = Wide<f64, 8>;
+    type Compared8 = Self::Of8;
     type Of32 = Wide<f64, 32>;
     type Of64 = Wide<f64, 64>;
 }

@@ -112,13 +112,13 @@ impl Kernel for Confront<'_> {
         let Self { blocks, candidate, first } = self;
         let columns = blocks.columns;
         if let Some(lanes) = blocks.lanes.get(first * columns..(first + 1) * columns)
-            && Excess::<W::Of8>::of(lanes, candidate).is_some_and(|excess| excess.dominates())
+            && Excess::<W::Compared8>::of(lanes, candidate).is_some_and(|excess| excess.dominates())
         {
             return Verdict::Dominated { block: first };
         }
         let mut beaten = Vec::new();
         for (block, lanes) in blocks.lanes.chunks_exact(columns).enumerate() {
-            let Some(excess) = Excess::<W::Of8>::of(lanes, candidate) else {
+            let Some(excess) = Excess::<W::Compared8>::of(lanes, candidate) else {
                 continue;
             };
             if excess.dominates() {
