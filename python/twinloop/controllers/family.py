@@ -276,11 +276,16 @@ class Controller:
         Raises:
             InvalidInput: other shapes, or numbers that are not finite.
         """
-        finite = np.isfinite(states).all() and np.isfinite(targets).all()
-        if states.shape != targets.shape or states.shape[1:] != (self.family.signals.n_x,) or not finite:
+        n_x = self.family.signals.n_x
+        if states.shape != targets.shape or states.shape[1:] != (n_x,):
             raise InvalidInput(
-                f"Controller.commands: expected as many finite states as targets of {self.family.signals.n_x} numbers"
-                f" each, found the shapes {states.shape} and {targets.shape}; record each period."
+                f"Controller.commands: expected as many states as targets, of {n_x} numbers each, found the shapes"
+                f" {states.shape} and {targets.shape}; record each period."
+            )
+        if not (np.isfinite(states).all() and np.isfinite(targets).all()):
+            raise InvalidInput(
+                "Controller.commands: expected finite states and targets, found NaN or an infinite one; cut the record"
+                " before it."
             )
         self.reset()
         return np.array([self._law.command(*row) for row in zip(states, targets, strict=True)])
