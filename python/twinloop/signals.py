@@ -258,9 +258,9 @@ class Signals(Value, Recorded, kind="signals"):
         return tuple(i for i, name in enumerate(self.state_names) if name not in given)
 
     @cached_property
-    def periods(self) -> list[tuple[int, float]]:
+    def periods(self) -> tuple[tuple[int, float], ...]:
         """Places and periods of the states that wrap."""
-        return [(i, state.period) for i, state in enumerate(self.states) if state.period is not None]
+        return tuple((i, state.period) for i, state in enumerate(self.states) if state.period is not None)
 
     def difference(self, a: ArrayLike, b: ArrayLike) -> Floats:
         """The difference a − b; for a periodic state the short way, at most half a period in either direction.

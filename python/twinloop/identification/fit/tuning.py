@@ -77,7 +77,7 @@ def tune(
         for place in (place for place, constant in enumerate(free) if constant in held):
             covariance = np.insert(np.insert(covariance, place, 0.0, axis=0), place, 0.0, axis=1)
     fit = Fit(tuned, tuple(observer), chi_squared, readings, covariance)
-    return fit, [bounded_model(one, limits) for one in drawn] if limits else drawn
+    return fit, [bounded_model(one, limits) for one in drawn]
 
 
 def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals) -> list[list[int]]:
