@@ -53,7 +53,8 @@ class Committee:
         members = [fit.model, *_structures(context, hypothesis, base, draws, size)]
         while len(members) < size and draws:
             members.append(draws.pop())
-        # The others first: gains are tuned on the first few members, and should suit laws that differ.
+        # The others first: gains are tuned on the first few members, and should suit laws that differ, not draws of
+        # one law's constants.
         members = [members[0], *others, *members[1:]]
         if hypothesis.offsets.any():
             # What flies them from here on is read as the runs were.
