@@ -13,7 +13,7 @@ from twinloop.law.forms import EULER
 
 LAGGING = 12.0
 """What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
-HIDING = 30.0
+HIDING = 60.0
 """What a hidden state must gain: its time, its kind, and what a search may find by luck."""
 STORING = 10.0
 """What each hidden state must gain besides where states fill one, with the choice among all that may."""
