@@ -1,5 +1,7 @@
 """Evidence puts hypotheses in an order, and what they hold beside terms has to pay."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from twinloop.identification.description import TIE
 from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, STORING, Evidence, by_evidence, price
+from twinloop.identification.identify import Found, decided
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
 LENGTHS = st.one_of(st.floats(-1e4, 1e4), st.sampled_from([0.0, 0.5 * TIE, 2.0 * TIE, -0.5 * TIE]))
@@ -59,6 +62,27 @@ def test_lengths_of_smoothed_states_and_of_readings_do_not_compare():
     assert evidence(5.0, smoothed=True) > evidence(0.0)
     assert evidence(-1.0, smoothed=True) > evidence(0.0, smoothed=True)
     assert not evidence(1.0, smoothed=True) > evidence(0.0, smoothed=True)
+
+
+@dataclass(frozen=True)
+class Started:
+    evidence: Evidence
+    start: int
+    searches: int = 1
+
+
+def test_a_law_that_has_to_be_ahead_is_believed_only_where_it_is():
+    def hypothesis(length, start, **changes):
+        return Started(evidence(length, **changes), start)
+
+    known = [hypothesis(0.0, 10), hypothesis(40.0, 10)]
+    for length, ahead, believed in ((-25.0, 0.0, 0), (-25.0, 30.0, 10), (-35.0, 30.0, 0), (5.0, 0.0, 10)):
+        anew = hypothesis(length, 0)
+        found = decided(Found(anew), known, ahead=ahead)
+        assert found.best.start == believed
+        assert list(found.rivals) == (known if believed == 0 else known[1:])
+    # One that runs away is worth nothing, however far it is ahead.
+    assert decided(Found(hypothesis(-1e6, 0, stable=False)), known, ahead=30.0).best.start == 10
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 
 from twinloop._ground.elementary import log
@@ -14,11 +14,21 @@ from twinloop.law.forms import EULER
 LAGGING = 12.0
 """What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
 HIDING = 60.0
-"""What a hidden state must gain: its time, its kind, and what a search may find by luck."""
+"""What a hidden state must gain: its time, its kind, and what a search may find by luck.
+
+Those that stand in for what is not in the law at all gain some tens of units, the same after each flight; those of a
+machine hundreds, and more with each flight.
+"""
 STORING = 10.0
 """What each hidden state must gain besides where states fill one, with the choice among all that may."""
 CORRELATED = 16.0
 """What a correlated disturbance must gain, each: its size, its correlation time, and the choice of having one."""
+ANEW = 30.0
+"""What a law that is found anew must gain beside the one that was known before, tuned on the same readings.
+
+The terms of the one were chosen after the last flight, those of the other before: so they have foretold it. And noise
+is not quite what a likelihood takes it for; beyond the flights, laws that few units tell apart differ by much.
+"""
 STEPPING = 12.0
 """What a law of a step must gain, increments or one of Euler: it holds for that step alone."""
 
@@ -47,6 +57,14 @@ class Evidence:
     def stage(self) -> tuple[bool, ...]:
         """How far it was worked out; a model that diverges is worth nothing."""
         return self.fitted, self.stable, self.stable and self.smoothed
+
+    def less(self, worth: float) -> Evidence:
+        """The same of a hypothesis that has to gain something first.
+
+        Args:
+            worth: what it has to, in units of χ².
+        """
+        return replace(self, length=self.length + worth)
 
     def __gt__(self, other: Evidence) -> bool:
         """Whether this hypothesis is believed rather than the other; of two whose models diverge neither is."""

@@ -16,7 +16,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import by_evidence
+from twinloop.identification.evidence import ANEW
 from twinloop.identification.fit.committee import Committee
 from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
@@ -149,7 +149,8 @@ def identify_runs(
             searches[number] = decided(searches[number], propose(context, searches[number].best))
             keep(replace(under_way, searches=tuple(searches)))
     first, *others = searches
-    found = decided(first, [found for other in others for found in (other.best, *other.rivals)])
+    known = [found for other in others for found in (other.best, *other.rivals)]
+    found = decided(first, known, ahead=ANEW)
     context.watch("committee")
     return concluded(context, found, under_way.said)
 
@@ -164,15 +165,16 @@ def goes_on(searches: Sequence[Found], number: int) -> bool:
     return not (known and any(other.best.evidence > own.evidence for other in searches[:number]))
 
 
-def decided(found: Found, proposed: Iterable[Hypothesis]) -> Found:
+def decided(found: Found, proposed: Iterable[Hypothesis], ahead: float = 0.0) -> Found:
     """What is believed after one more proposal, and its rivals: those that last and are not believed.
 
     Args:
         found: before it.
         proposed: the hypotheses that it gives.
+        ahead: what the believed one has to be ahead of all of them by, in units of χ².
     """
-    several = [found.best, *proposed]
-    best = max(several, key=by_evidence)
+    before, several = found.best, [found.best, *proposed]
+    best = max(several, key=lambda one: one.evidence.less(ahead) if one is before else one.evidence)
     others = (other for other in several[1:] if other is not best and other.evidence.stable)
     # What is drawn from here on is nothing that one of those that are not believed has drawn.
     drawn = max(other.searches for other in several if other.start == best.start)
