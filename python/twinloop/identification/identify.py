@@ -150,7 +150,7 @@ def identify_runs(
             keep(replace(under_way, searches=tuple(searches)))
     first, *others = searches
     known = [found for other in others for found in (other.best, *other.rivals)]
-    found = decided(first, known, ahead=ANEW)
+    found = decided(first, known, ahead=ANEW if options.steady else 0.0)
     context.watch("committee")
     return concluded(context, found, under_way.said)
 

@@ -79,6 +79,7 @@ class IdentificationOptions:
         passes: number of selections of terms; from the second on with states that the model has smoothed.
         committee_size: models that judge tests, the best included.
         parts: whether, as long as there is one run, models of its parts are members too.
+        steady: whether a law found anew must be clearly ahead of the one known before, tuned on all flights.
         earlier_twin: whether the earlier twin is kept if it follows all flights and the new
             one does not.
         rough: whether a linear law is learnt beside one that does not explain the flights.
@@ -129,6 +130,7 @@ class IdentificationOptions:
     passes: int = 2
     committee_size: int = 8
     parts: bool = True
+    steady: bool = True
     earlier_twin: bool = True
     rough: bool = True
     causes: bool = True
