@@ -8,7 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from twinloop.identification.description import TIE
-from twinloop.identification.evidence import HIDING, LAGGING, STEPPING, STORING, Evidence, by_evidence, price
+from twinloop.identification.evidence import (
+    HIDING,
+    LAGGING,
+    STANDING_IN,
+    STEPPING,
+    STORING,
+    Evidence,
+    by_evidence,
+    price,
+)
 from twinloop.identification.identify import Found, decided
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
@@ -101,6 +110,15 @@ def test_a_law_that_has_to_be_ahead_is_believed_only_where_it_is():
 )
 def test_what_is_there_beside_terms_is_paid_for(form, actuation, expected):
     assert price(form, actuation, APART, STATES) == pytest.approx(expected)
+
+
+def test_a_tuned_hidden_state_that_commands_alone_fill_pays_for_standing_in():
+    for hidden, paid in ((CLIMB, STANDING_IN), ((TWIST,), 0.0), (PUSHED, 0.0), ((), 0.0)):
+        searched, tuned = (
+            price("acceleration", Actuation(AT_ONCE.actuators, hidden), APART, STATES, tuned=tuned)
+            for tuned in (False, True)
+        )
+        assert tuned - searched == pytest.approx(paid)
 
 
 def test_each_group_of_commands_that_lags_pays_and_commands_of_one_group_pay_once():

@@ -13,11 +13,13 @@ from twinloop.law.forms import EULER
 
 LAGGING = 12.0
 """What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
-HIDING = 60.0
-"""What a hidden state must gain: its time, its kind, and what a search may find by luck.
+HIDING = 30.0
+"""What a hidden state must gain: its time, its kind, and what a search may find by luck."""
+STANDING_IN = 30.0
+"""What one that commands alone fill must gain besides, once it is tuned.
 
 Those that stand in for what is not in the law at all gain some tens of units, the same after each flight; those of a
-machine hundreds, and more with each flight.
+machine hundreds, and more with each flight. Until then they may lead to others, which are not found without them.
 """
 STORING = 10.0
 """What each hidden state must gain besides where states fill one, with the choice among all that may."""
@@ -77,7 +79,9 @@ by_evidence = attrgetter("evidence")
 """Of several hypotheses `max(several, key=by_evidence)` is the first that none of those after it beats."""
 
 
-def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], states: int) -> float:
+def price(
+    form: str, actuation: Actuation, alike: Sequence[Sequence[int]], states: int, tuned: bool = False
+) -> float:
     """What a hypothesis pays for besides its terms and its disturbances, in units of χ².
 
     Args:
@@ -85,12 +89,14 @@ def price(form: str, actuation: Actuation, alike: Sequence[Sequence[int]], state
         actuation: between commands and its law.
         alike: groups of commands; those of a group share one lag and one delay, and pay for them once.
         states: how many may fill a hidden state, empty or settled at the start, beside a group of commands or none.
+        tuned: whether its constants were tuned on predictions.
     """
     lagging = sum(any(not actuation.actuators[i].direct for i in group) for group in alike)
     return (
         STEPPING * (form == "increment" or form in EULER)
         + LAGGING * lagging
         + HIDING * bool(actuation.hidden)
+        + STANDING_IN * (tuned and bool(actuation.hidden) and not actuation.stored)
         + bool(actuation.stored) * STORING * len(actuation.hidden)
         + len(actuation.stored) * 2.0 * float(log(2.0 * states * (1 + len(alike))))
     )

@@ -109,12 +109,14 @@ class Hypothesis(Recorded, kind="hypothesis"):
     @property
     def evidence(self) -> Evidence:
         """What the readings say for it."""
+        paid = price(self.form, self.actuation, self.alike, len(self.offsets), tuned=self.fit is not None)
         if self.fit is not None:
-            length = self.fit.length + price(self.form, self.actuation, self.alike, len(self.offsets))
+            length = self.fit.length + paid
             return Evidence(fitted=True, stable=self.fit.stable, smoothed=False, length=length)
         correlated = CORRELATED * sum(found.chain.motion.correlated > 0.0 for found in self.sums)
-        length = self.length + correlated + price(self.form, self.actuation, self.alike, len(self.offsets))
-        return Evidence(fitted=False, stable=True, smoothed=self.smoothed, length=length)
+        return Evidence(
+            fitted=False, stable=True, smoothed=self.smoothed, length=self.length + correlated + paid
+        )
 
     def next_unit(self, unit: Unit) -> Unit:
         """The part of an identification's unit of work from which the next search draws."""
