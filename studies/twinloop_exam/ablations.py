@@ -87,7 +87,9 @@ ABLATIONS: dict[str, Ablation] = {
     "second-pass": Ablation("a second selection on smoothed states", {"passes": 1}),
     "parts": Ablation("models of parts of a single flight", {"parts": False}),
     "committee": Ablation("a committee: the best model only", {"committee_size": 1, "tuning_members": 1}),
-    "steady": Ablation("a lead that a law found anew needs over the one known before", {"steady": False}),
+    "steady": Ablation(
+        "a lead that a law found anew needs over the one known before for each term more", {"steady": False}
+    ),
     "earlier-twin": Ablation(
         "the earlier twin kept where the new one explains less", {"earlier_twin": False}
     ),

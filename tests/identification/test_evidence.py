@@ -18,7 +18,7 @@ from twinloop.identification.evidence import (
     by_evidence,
     price,
 )
-from twinloop.identification.identify import Found, decided
+from twinloop.identification.identify import Found, decided, lead
 from twinloop.law.actuation import Actuation, Actuator, HiddenState
 
 LENGTHS = st.one_of(st.floats(-1e4, 1e4), st.sampled_from([0.0, 0.5 * TIE, 2.0 * TIE, -0.5 * TIE]))
@@ -78,6 +78,7 @@ class Started:
     evidence: Evidence
     start: int
     searches: int = 1
+    terms: int = 1
 
 
 def test_a_law_that_has_to_be_ahead_is_believed_only_where_it_is():
@@ -90,6 +91,11 @@ def test_a_law_that_has_to_be_ahead_is_believed_only_where_it_is():
         found = decided(Found(anew), known, ahead=ahead)
         assert found.best.start == believed
         assert list(found.rivals) == (known if believed == 0 else known[1:])
+    # Each term more than the known law has needs its own lead; what has as many terms, or fewer, needs none.
+    for more, ahead in ((3, 36.0), (1, 12.0), (0, 0.0), (-2, 0.0)):
+        weaker, stronger = Started(evidence(9.0), 10, terms=40), Started(evidence(1.0), 10, terms=5)
+        assert lead(Started(evidence(), 0, terms=5 + more), [weaker, stronger]) == ahead
+    assert lead(hypothesis(0.0, 0), []) == 0.0
     # One that runs away is worth nothing, however far it is ahead.
     assert decided(Found(hypothesis(-1e6, 0, stable=False)), known, ahead=30.0).best.start == 10
 

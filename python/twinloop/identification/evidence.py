@@ -25,8 +25,8 @@ STORING = 10.0
 """What each hidden state must gain besides where states fill one, with the choice among all that may."""
 CORRELATED = 16.0
 """What a correlated disturbance must gain, each: its size, its correlation time, and the choice of having one."""
-ANEW = 30.0
-"""What a law that is found anew must gain beside the one that was known before, tuned on the same readings.
+ANEW = 12.0
+"""What a law that is found anew must gain for each term that it has more than the one known before.
 
 The terms of the one were chosen after the last flight, those of the other before: so they have foretold it. And noise
 is not quite what a likelihood takes it for; beyond the flights, laws that few units tell apart differ by much.

@@ -102,6 +102,11 @@ class Hypothesis(Recorded, kind="hypothesis"):
         return self.candidates.pool
 
     @property
+    def terms(self) -> int:
+        """Number of terms, of all sums."""
+        return sum(len(found.weights) for found in self.sums)
+
+    @property
     def length(self) -> float:
         """Description length of the sums."""
         return total(self.sums)

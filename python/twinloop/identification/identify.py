@@ -16,7 +16,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Unit
 from twinloop.identification.context import Context
-from twinloop.identification.evidence import ANEW
+from twinloop.identification.evidence import ANEW, by_evidence
 from twinloop.identification.fit.committee import Committee
 from twinloop.identification.forms import likeliest
 from twinloop.identification.hypothesis import Hypothesis
@@ -150,7 +150,7 @@ def identify_runs(
             keep(replace(under_way, searches=tuple(searches)))
     first, *others = searches
     known = [found for other in others for found in (other.best, *other.rivals)]
-    found = decided(first, known, ahead=ANEW if options.steady else 0.0)
+    found = decided(first, known, ahead=lead(first.best, known) if options.steady else 0.0)
     context.watch("committee")
     return concluded(context, found, under_way.said)
 
@@ -163,6 +163,18 @@ def goes_on(searches: Sequence[Found], number: int) -> bool:
     own = searches[number].best
     known = own.fit is not None and not own.actuation.hidden
     return not (known and any(other.best.evidence > own.evidence for other in searches[:number]))
+
+
+def lead(anew: Hypothesis, known: Sequence[Hypothesis]) -> float:
+    """What a law that was found anew has to be ahead of the one known before by, in units of χ².
+
+    Args:
+        anew: the law.
+        known: what was made of the one known before; none where nothing was known.
+    """
+    if not known:
+        return 0.0
+    return ANEW * max(0, anew.terms - max(known, key=by_evidence).terms)
 
 
 def decided(found: Found, proposed: Iterable[Hypothesis], ahead: float = 0.0) -> Found:

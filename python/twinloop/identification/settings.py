@@ -79,7 +79,8 @@ class IdentificationOptions:
         passes: number of selections of terms; from the second on with states that the model has smoothed.
         committee_size: models that judge tests, the best included.
         parts: whether, as long as there is one run, models of its parts are members too.
-        steady: whether a law found anew must be clearly ahead of the one known before, tuned on all flights.
+        steady: whether a law found anew must be ahead of the one known before, tuned on all flights, by a margin
+            for each term that it has more.
         earlier_twin: whether the earlier twin is kept if it follows all flights and the new
             one does not.
         rough: whether a linear law is learnt beside one that does not explain the flights.
