@@ -182,6 +182,14 @@ def test_what_is_said_excuses_a_lost_campaign_and_a_miss():
     assert verdicts(one)[13] is False
 
 
+def test_that_gains_elsewhere_are_still_open_is_said_of_a_twin_that_more_flights_made_worse():
+    one = copy.deepcopy(good())
+    one["flights"][4].update(error=2.5, noted=["identity"])
+    assert verdicts(one)[8] is False
+    one["flights"][4].update(noted=["elsewhere", "identity"])
+    assert verdicts(one)[8] is True
+
+
 def test_the_worst_campaigns_come_first():
     ones = [campaign([], seed=seed, optimum_under_noise=1.0 / (1.0 + seed)) for seed in (0, 3, 1, 2)]
     assert [one["seed"] for one in bars.worst(ones)] == [3, 2, 1]

@@ -178,8 +178,9 @@ def _learning_repeated(campaigns: Sequence[Measured]) -> Found:
 
 def _forgetting(campaigns: Sequence[Measured]) -> Found:
     whole = [one for one in campaigns if len(one["flights"]) >= 5]
-    worse = [one for one in whole if _learnt(one) > 2.0]
-    silent = sum(believed(one["flights"][4]) for one in worse)
+    worse = [one["flights"][4] for one in whole if _learnt(one) > 2.0]
+    # Of gains that have not flown it is said where what is learnt is still open.
+    silent = sum(believed(row) and "elsewhere" not in row.get("noted", ()) for row in worse)
     return Found(f"{len(worse)} of {len(whole)}, {silent} silent", silent == 0, float(silent))
 
 

@@ -194,6 +194,7 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
             "empty": honesty.empty_equations(twin, flown),
             "missed": honesty.misses(plant, twin, flown),
             "serious": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if one.serious}),
+            "noted": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if not one.serious}),
             "follows": lesson.follows,
             "misfit": lesson.misfit,
             "form": lesson.form,

@@ -12,6 +12,7 @@ from twinloop.campaign.data.readings import derived, froze, ratio, repeats
 from twinloop.campaign.data.sent import exchanged, other_commands
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of, distinct
+from twinloop.campaign.identify_and_plan.elsewhere import Elsewhere
 from twinloop.campaign.identify_and_plan.misses import Miss, unexplained
 
 DT, STEPS = 0.02, 200
@@ -369,3 +370,26 @@ def test_sensors_of_their_own_and_exact_steps_are_not_computed_from_each_other()
         x = np.array([x[0] + DT * rate, rate])
         states.append(x)
     assert list(derived([np.array(states)])) == []
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (Elsewhere(32, 8, 8), None),
+        (
+            Elsewhere(32, 9, 8),
+            "Of 32 controllers .* under 9 laws of the committee differ by more than a fifth",
+        ),
+        (Elsewhere(20, 0, 6), "under 6 the law differs from that of before the last flight by more"),
+        (Elsewhere(4, 2, 4), "under 2 laws of the committee differ and under 4 the law differs from"),
+        (Elsewhere(), None),
+    ],
+)
+def test_it_is_said_where_much_of_the_box_of_gains_is_still_open(found, words):
+    said = diagnostics_of([flown(), flown(1)], SIGNALS, STEPS, Findings(True, elsewhere=found))
+    assert [remark.code for remark in said] == ["elsewhere"] * (words is not None)
+    assert words is None or (re.search(words, said[0].sentence) and not said[0].serious)
+    # Of a twin that does not even follow its own flights that is no news.
+    assert "elsewhere" not in [
+        remark.code for remark in diagnostics_of([flown()], SIGNALS, STEPS, Findings(False, elsewhere=found))
+    ]

@@ -9,12 +9,15 @@ from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.sent import from_other_controllers
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.identify_and_plan.elsewhere import NOWHERE, Elsewhere
 from twinloop.campaign.identify_and_plan.misses import Miss
 from twinloop.campaign.identify_and_plan.selection import distinct
 from twinloop.campaign.identify_and_plan.track_record import NEARLY, missed_in_a_row
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 
+MANY = 0.25
+"""Share of the drawn controllers under which laws part, above which it is said."""
 NAMED = 3
 """States that are named of those that a free run misses, those that it misses most."""
 
@@ -32,6 +35,7 @@ class Findings:
         without_test: whether the flights that it does not follow are all without a test, replayed without a controller.
         pieces: steps of those in which each flight is followed; empty: all in whole.
         disturbed: states with disturbances that would take free runs of a right twin as far; empty: none would.
+        elsewhere: under how many controllers what is learnt is still open.
     """
 
     follows: bool
@@ -42,6 +46,7 @@ class Findings:
     without_test: bool = False
     pieces: Sequence[int] = ()
     disturbed: Sequence[str] = ()
+    elsewhere: Elsewhere = NOWHERE
 
 
 def diagnostics_of(
@@ -69,8 +74,9 @@ def diagnostics_of(
     if not found.follows:
         explained = any(remark.serious for remark in said)
         said += _does_not_follow(explained, found.without_test, found.disturbed)
-    elif found.misses:
-        said += _free_run(found.misses, len(experiments), signals)
+    else:
+        said += _free_run(found.misses, len(experiments), signals) if found.misses else ()
+        said += _elsewhere(found.elsewhere)
     said += [*_model_error(found.recurring), *_copies(experiments), *_none_complete(experiments, steps)]
     return [*said, *_missed_predictions(experiments)]
 
@@ -114,6 +120,22 @@ def _does_not_follow(explained: bool, without_test: bool, disturbed: Sequence[st
         "does-not-follow",
         f"In free run the twin does not follow the runs that it was learnt from: {cause}.",
     )
+
+
+def _elsewhere(found: Elsewhere) -> Iterator[Remark]:
+    """Under how many controllers laws part that follow the flights about equally well, or the law still changes."""
+    whats = [
+        (found.apart, "laws of the committee differ"),
+        (found.changed, "the law differs from that of before the last flight"),
+    ]
+    said = [f"under {count} {what}" for count, what in whats if count > MANY * found.drawn]
+    if said:
+        yield note(
+            "elsewhere",
+            f"Of {found.drawn} controllers drawn from the whole box of gains, {' and '.join(said)} by more than a fifth"
+            " of the motion, or only one of two diverges. The flights so far do not tell what such gains do: trust the"
+            " twin near the gains that flew.",
+        )
 
 
 def _in_pieces(experiments: Sequence[Experiment], pieces: Sequence[int], dt: float) -> Iterator[Remark]:

@@ -112,7 +112,8 @@ class Learner:
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
             answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
         identified = answer.identified
-        lesson = lesson_of(answer, is_rough(identified), book, flights, selected, self.workers)
+        model = None if earlier is None else earlier.model
+        lesson = lesson_of(answer, is_rough(identified), book, flights, selected, model, self.workers)
         before, models, ensembles = (
             ((), (), ()) if asked is None else (asked.lessons, asked.models, asked.ensembles)
         )

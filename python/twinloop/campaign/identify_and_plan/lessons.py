@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.data.levels import levels_said
 from twinloop.campaign.data.sent import other_commands
 from twinloop.campaign.history import Experiment, Lesson
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of
+from twinloop.campaign.identify_and_plan.elsewhere import elsewhere
 from twinloop.campaign.identify_and_plan.selection import Selected, shortened
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
 from twinloop.campaign.logbook import Logbook
@@ -24,6 +26,7 @@ def lesson_of(
     book: Logbook,
     flights: Sequence[Experiment],
     selected: Sequence[Selected],
+    before: _core.Model | None,
     workers: _core.Workers,
 ) -> Lesson:
     """The record of what was learnt.
@@ -34,11 +37,12 @@ def lesson_of(
         book: of the campaign.
         flights: of the book, without single readings that are wrong.
         selected: what was learnt from.
+        before: the law that was known before the last of the flights; None: none was.
         workers: how the work is carried out.
     """
     identified, signals = answer.identified, book.setup.signals
     free = free_errors(identified.members[0], book, workers, identified.noise(signals))
-    found = findings(answer, book, flights, [each.length for each in free], workers)
+    found = findings(answer, book, flights, [each.length for each in free], before, workers)
     explained = answer.follows and not found.misses and not rough
     actuators = claimed(identified.actuation, signals, explained)
     return Lesson(
@@ -74,6 +78,7 @@ def findings(
     book: Logbook,
     flights: Sequence[Experiment],
     pieces: Sequence[int],
+    before: _core.Model | None,
     workers: _core.Workers,
 ) -> Findings:
     """What an answer is beside the flights that it was learnt from.
@@ -83,6 +88,7 @@ def findings(
         book: of the campaign.
         flights: of the book, without single readings that are wrong.
         pieces: steps of those in which each experiment is followed.
+        before: the law that was known before the last of the flights; None: none was.
         workers: how the work is carried out.
     """
     identified, setup = answer.identified, book.setup
@@ -99,4 +105,5 @@ def findings(
         without_test=bool(lost) and all(run.test is None for run in lost),
         pieces=pieces,
         disturbed=[names[gust.states[0]] for gust in gusts],
+        elsewhere=elsewhere(answer.believed, before, setup, Unit(setup.seed).part(len(flights), 4), workers),
     )

@@ -1,0 +1,82 @@
+"""Elsewhere: under how many of all the controllers that could fly what is learnt is still open.
+
+Flights are made where gains are good, so laws that follow them equally well may part under other gains, and a law may
+change there from flight to flight. Who takes the twin away, to tune for another task for example, should know of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twinloop import _core
+from twinloop._ground.streams import Unit
+from twinloop.campaign.identify_and_plan.following import squares
+from twinloop.campaign.setup import Setup
+
+DRAWN = 32
+"""Controllers that are drawn uniformly from the box of gains."""
+APART = 0.04
+"""Mean square of what two laws differ by, over that of the motion, from which they part: a fifth of the motion."""
+
+
+class Elsewhere(NamedTuple):
+    """How far laws agree under controllers that were drawn from the box of gains.
+
+    Two laws part under a controller where they differ by more than a fifth of the motion, or only one of them diverges.
+
+    Args:
+        drawn: controllers under which not all of the committee diverge.
+        apart: of these, those under which the middle one of the other members parts from the first.
+        changed: of these, those under which the law known before the last flight parts from the first.
+    """
+
+    drawn: int = 0
+    apart: int = 0
+    changed: int = 0
+
+
+NOWHERE = Elsewhere()
+"""Where nothing was compared."""
+
+
+def elsewhere(
+    members: Sequence[_core.Model],
+    before: _core.Model | None,
+    setup: Setup,
+    unit: Unit,
+    workers: _core.Workers,
+) -> Elsewhere:
+    """Flies all members, and the law known before, without noise under drawn controllers.
+
+    Args:
+        members: of the committee, the best first.
+        before: the law known before the last flight; None: none was.
+        setup: of the campaign.
+        unit: of work, from which the controllers are drawn.
+        workers: how the work is carried out.
+    """
+    family = setup.family
+    genes = family.from_unit(unit.stream("candidates").uniforms(DRAWN, family.size))
+
+    def flown(model: _core.Model) -> _core.Runs:
+        return _core.rollout(model, setup.setting, genes, setup.task, workers=workers)
+
+    first, *others = (flown(member) for member in members)
+    lasts = np.any([run.lasted == setup.steps for run in (first, *others)], axis=0)
+    parted = np.array([_part(first, other, setup) for other in others]).reshape(-1, DRAWN)
+    # The middle one; a law of which there is no other parts from none.
+    apart = 2 * parted.sum(axis=0) > len(parted)
+    changed = np.zeros(DRAWN, dtype=bool) if before is None else _part(first, flown(before), setup)
+    return Elsewhere(int(lasts.sum()), int((lasts & apart).sum()), int((lasts & changed).sum()))
+
+
+def _part(first: _core.Runs, other: _core.Runs, setup: Setup) -> NDArray[np.bool_]:
+    """Under which controllers two laws part (m,)."""
+    off = squares(first.states, other.states, setup.limits).mean(axis=(1, 2))
+    moved = squares(first.states, first.states[:, :1], setup.limits).mean(axis=(1, 2))
+    lasts = [run.lasted == setup.steps for run in (first, other)]
+    return np.asarray(np.where(lasts[0] & lasts[1], off > APART * moved, lasts[0] != lasts[1]))

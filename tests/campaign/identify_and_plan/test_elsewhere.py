@@ -1,0 +1,78 @@
+"""Under controllers drawn from the whole box of gains laws are compared flight by flight."""
+
+import numpy as np
+import pytest
+
+import twinloop as tl
+from strategies import program_text
+from twinloop import _core
+from twinloop._ground.streams import Unit
+from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, Elsewhere, elsewhere
+from twinloop.law.flight import fly
+
+SIGNALS = tl.Signals(
+    [tl.State("angle", "rad", 1.0), tl.State("rate", "rad/s", 5.0, derivative_of="angle")],
+    [tl.Command("torque", "N m", (-10.0, 10.0), scale=1.0)],
+    0.02,
+)
+GAINS = {"angle.kp": (0.0, 60.0), "angle.ki": (0.0, 9.0), "angle.kd": (0.0, 20.0)}
+UNIT, WORKERS = Unit(3).part(2, 4), _core.Workers(2)
+
+
+def setup():
+    controller = tl.controllers.PID(axes=[("angle", "rate")], gains=GAINS)
+    return tl.Campaign(
+        SIGNALS, controller=controller, initial_state=[0.5, 0.0], target_state=[0.0, 0.0], duration=2.0, progress=None
+    ).setup  # fmt: skip
+
+
+def law(damping):
+    """rate' = torque − damping · rate: damped ones follow, others swing ever more or run away."""
+    lines = [["r3 = r1 * " + repr(-damping), "r3 = r3 + r2"]]
+    return _core.Model(_core.Program.parse(program_text(3, 1, 4, lines)), "acceleration", SIGNALS.engine)
+
+
+def slowly(members, before, asked):
+    """The same, one flight after the other."""
+    genes = asked.family.from_unit(UNIT.stream("candidates").uniforms(DRAWN, asked.family.size))
+    scales = np.array([1.0, 5.0])
+
+    def part(one, two):
+        lasts = [run.ended == "completed" for run in (one, two)]
+        if not all(lasts):
+            return any(lasts)
+        off, moved = one.states - two.states, one.states - one.states[0]
+        return np.square(off / scales).mean() > 0.04 * np.square(moved / scales).mean()
+
+    drawn = apart = changed = 0
+    for each in genes:
+        test = tl.Test(asked.family, each, asked.initial_state, asked.target_state, asked.steps)
+        first, *others, known = (fly(model, test, limits=asked.limits) for model in (*members, before))
+        if any(run.ended == "completed" for run in (first, *others)):
+            drawn += 1
+            parted = [part(first, other) for other in others]
+            apart += sum(parted) > len(parted) / 2
+            changed += part(first, known)
+    return Elsewhere(drawn, apart, changed)
+
+
+@pytest.mark.parametrize(
+    ("dampings", "before"),
+    [((1.0, 1.02, 0.98), 1.1), ((1.0, 6.0, 0.98, 5.0), 4.0), ((-1.0, 1.0, -3.0), -6.0), ((-9.0, -9.5), -9.0)],
+)
+def test_laws_part_where_their_flights_do(dampings, before):
+    members, asked = [law(each) for each in dampings], setup()
+    found = elsewhere(members, law(before), asked, UNIT, WORKERS)
+    assert found == slowly(members, law(before), asked)
+    assert found == elsewhere(members, law(before), asked, UNIT, _core.Workers(1))
+
+
+def test_what_is_known_well_is_the_same_everywhere_and_what_is_not_is_apart():
+    near, far = law(1.0), law(8.0)
+    assert elsewhere([near, law(1.01)], law(1.02), setup(), UNIT, WORKERS)[1:] == (0, 0)
+    assert elsewhere([near, far, far], near, setup(), UNIT, WORKERS).apart > DRAWN / 2
+    assert elsewhere([near, near], far, setup(), UNIT, WORKERS).changed > DRAWN / 2
+
+
+def test_a_single_law_parts_from_none():
+    assert elsewhere([law(1.0)], None, setup(), UNIT, WORKERS)[1:] == (0, 0)
