@@ -1,13 +1,17 @@
 """Under controllers drawn from the whole box of gains laws are compared flight by flight."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import twinloop as tl
 from strategies import program_text
 from twinloop import _core
+from twinloop._ground.steps import unwatched
 from twinloop._ground.streams import Unit
-from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, Elsewhere, elsewhere
+from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, Elsewhere, elsewhere, lasting_under
+from twinloop.campaign.identify_and_plan.learning import Learner
 from twinloop.law.flight import fly
 
 SIGNALS = tl.Signals(
@@ -76,3 +80,37 @@ def test_what_is_known_well_is_the_same_everywhere_and_what_is_not_is_apart():
 
 def test_a_single_law_parts_from_none():
     assert elsewhere([law(1.0)], None, setup(), UNIT, WORKERS)[1:] == (0, 0)
+
+
+def test_a_law_lasts_under_as_many_of_the_drawn_controllers_as_it_does_one_by_one():
+    asked, laws = setup(), [law(each) for each in (1.0, -1.0, -9.0)]
+    genes = asked.family.from_unit(UNIT.stream("candidates").uniforms(DRAWN, asked.family.size))
+    tests = [
+        tl.Test(asked.family, each, asked.initial_state, asked.target_state, asked.steps) for each in genes
+    ]
+    counted = [
+        sum(fly(model, test, limits=asked.limits).ended == "completed" for test in tests) for model in laws
+    ]
+    assert lasting_under(laws, asked, UNIT, WORKERS) == counted
+    assert counted[0] == DRAWN and counted[2] < DRAWN / 2  # both kinds are there
+
+
+@pytest.mark.parametrize(
+    ("explained", "damping", "missed", "doubted"),
+    [
+        (False, 1.0, [], True),
+        (True, 1.0, ["rate"], False),
+        (True, -9.0, ["rate"], True),
+        # Where nothing speaks against a law its machine may well diverge under most controllers.
+        (True, -9.0, [], False),
+    ],
+)
+def test_a_law_is_doubted_where_a_model_error_may_be_what_explains_it_and_it_is_wild(
+    explained, damping, missed, doubted
+):
+    asked = setup()
+    learner = Learner(asked, asked.options, WORKERS, unwatched)
+    answer = SimpleNamespace(
+        explained=explained, believed=[law(damping)], misses=lambda flights, setup, workers: missed
+    )
+    assert learner._doubted(answer, [None, None]) is doubted

@@ -141,6 +141,17 @@ def test_the_one_beside_is_second_in_the_committee():
     assert found.believed == ["r", "n"]
 
 
+@pytest.mark.parametrize("foretold", [None, "linear", "nonlinear"])
+def test_one_that_diverges_under_most_controllers_is_neither_believed_nor_beside(foretold):
+    nonlinear, rough = answer([[0.1, 0.2]], name="n"), answer([[0.3, 0.4]], name="r")
+    found = better_of(nonlinear, rough, foretold, (False, True))
+    assert found.identified.model == "r" and list(found.believed) == ["r"]
+    assert better_of(nonlinear, rough, foretold, (True, False)).identified.model == "n"
+    # One that does not follow the flights is not believed for that.
+    lost = answer([[0.8, 0.9]], follows=False, name="lost")
+    assert better_of(nonlinear, lost, foretold, (False, True)).identified.model == "n"
+
+
 def test_two_laws_survive_their_record():
     both = TwoLaws(3, law(1.0), law(2.0))
     again = TwoLaws.from_record(both.to_record(), SIGNALS)

@@ -59,19 +59,37 @@ def elsewhere(
         unit: of work, from which the controllers are drawn.
         workers: how the work is carried out.
     """
-    family = setup.family
-    genes = family.from_unit(unit.stream("candidates").uniforms(DRAWN, family.size))
-
-    def flown(model: _core.Model) -> _core.Runs:
-        return _core.rollout(model, setup.setting, genes, setup.task, workers=workers)
-
-    first, *others = (flown(member) for member in members)
+    first, *others = _flown(members, setup, unit, workers)
     lasts = np.any([run.lasted == setup.steps for run in (first, *others)], axis=0)
     parted = np.array([_part(first, other, setup) for other in others]).reshape(-1, DRAWN)
     # The middle one; a law of which there is no other parts from none.
     apart = 2 * parted.sum(axis=0) > len(parted)
-    changed = np.zeros(DRAWN, dtype=bool) if before is None else _part(first, flown(before), setup)
+    known = [] if before is None else _flown([before], setup, unit, workers)
+    changed = _part(first, known[0], setup) if known else np.zeros(DRAWN, dtype=bool)
     return Elsewhere(int(lasts.sum()), int((lasts & apart).sum()), int((lasts & changed).sum()))
+
+
+def lasting_under(
+    models: Sequence[_core.Model], setup: Setup, unit: Unit, workers: _core.Workers
+) -> list[int]:
+    """Under how many of the drawn controllers each model does not diverge.
+
+    Args:
+        models: to be compared.
+        setup: of the campaign.
+        unit: of work, from which the controllers are drawn.
+        workers: how the work is carried out.
+    """
+    return [int((run.lasted == setup.steps).sum()) for run in _flown(models, setup, unit, workers)]
+
+
+def _flown(
+    models: Sequence[_core.Model], setup: Setup, unit: Unit, workers: _core.Workers
+) -> list[_core.Runs]:
+    """Runs of each model under the drawn controllers, without noise."""
+    family = setup.family
+    genes = family.from_unit(unit.stream("candidates").uniforms(DRAWN, family.size))
+    return [_core.rollout(model, setup.setting, genes, setup.task, workers=workers) for model in models]
 
 
 def _part(first: _core.Runs, other: _core.Runs, setup: Setup) -> NDArray[np.bool_]:

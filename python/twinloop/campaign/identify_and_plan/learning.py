@@ -8,9 +8,11 @@ from functools import partial
 
 from twinloop import _core
 from twinloop._ground.steps import Watch
+from twinloop._ground.streams import Unit
 from twinloop.campaign.data.levels import levels_of
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.answer import Answer
+from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, lasting_under
 from twinloop.campaign.identify_and_plan.knowledge import Knowledge
 from twinloop.campaign.identify_and_plan.lessons import lesson_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
@@ -108,7 +110,7 @@ class Learner:
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
-        if not answer.explained and self.options.plain != self.options:
+        if self._doubted(answer, flights) and self.options.plain != self.options:
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
             answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
         identified = answer.identified
@@ -132,6 +134,21 @@ class Learner:
             learnt, ensembles=(*ensembles, Ensemble.of(Knowledge(self.setup, book, learnt).twin()))
         )
 
+    def _doubted(self, answer: Answer, flights: Sequence[Experiment]) -> bool:
+        """Whether a law does not explain the flights; or only what may be a model error explains them, and it is wild.
+
+        Whatever may disturb explains much. A law that needs it, and diverges under most controllers of the box, such as
+        one with a hidden state that stands in for a load behind a gap, is no better than a linear one for that.
+        """
+        if not answer.explained:
+            return True
+        (lasting,) = lasting_under(answer.believed[:1], self.setup, self._drawn(flights), self.workers)
+        return 2 * lasting < DRAWN and bool(answer.misses(flights, self.setup, self.workers))
+
+    def _drawn(self, flights: Sequence[Experiment]) -> Unit:
+        """Of work, from which controllers of the whole box are drawn."""
+        return Unit(self.setup.seed).part(len(flights), 4)
+
     def _of_two(
         self,
         answer: Answer,
@@ -146,7 +163,9 @@ class Learner:
         both = TwoLaws(len(flights), answer.identified.model, rough.identified.model)
         now = Two((*before.laws, both), rough.identified)
         foretold = better_foretold(now.laws, flights, self.setup.limits, self.workers)
-        return better_of(answer, rough, foretold), now
+        laws = [both.nonlinear, both.linear]
+        lasting = lasting_under(laws, self.setup, self._drawn(flights), self.workers)
+        return better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting]), now
 
     def _identification(self, selected: Sequence[Selected]) -> partial[Identified]:
         """Identification of what is learnt from; what it lacks are options and a number."""
@@ -194,25 +213,29 @@ def or_lasted_before(rough: Answer, earlier: Identified, answered: Callable[...,
     return known if known.believable else rough
 
 
-def better_of(answer: Answer, rough: Answer, foretold: Kind | None) -> Answer:
+def better_of(
+    answer: Answer, rough: Answer, foretold: Kind | None, lasting: Sequence[bool] = (True, True)
+) -> Answer:
     """Of two laws that do not explain the flights the one to believe, with the other one beside it.
 
-    The one to believe follows the flights, and lasts on each of them. Where that is so of both, or of neither, it is
-    the one that has foretold flights better which it had not learnt; as long as there are none, the one that misses
-    less of those that it has. Gains have to be good on both: a linear law may rank them even where it follows badly.
-    But one that diverges where a flight did not says nothing of gains, nor does a nonlinear one that even misses more
-    of the flights that it was learnt from than a linear one.
+    The one to believe follows the flights, lasts on each of them, and under half as many controllers of the box as the
+    other one does, at least. Where that is so of both, or of neither, it is the one that has foretold flights
+    better which it had not learnt; as long as there are none, the one that misses less of those that it has. Gains have
+    to be good on both: a linear law may rank them even where it follows badly. But one that diverges where a flight did
+    not says nothing of gains, nor does a nonlinear one that even misses more of the flights that it was learnt from
+    than a linear one.
 
     Args:
         answer: what all terms make of the flights.
         rough: what linear terms make of them.
         foretold: which kind has foretold flights better; None where no flight tells.
+        lasting: whether each of the two lasts under half as many drawn controllers as the other one, at least.
     """
-    rank, of_rough = (answer.follows, answer.lasts), (rough.follows, rough.lasts)
+    rank, of_rough = (answer.follows, answer.lasts, lasting[0]), (rough.follows, rough.lasts, lasting[1])
     if foretold is None:
         foretold = "linear" if rough.worst < answer.worst else "nonlinear"
     if of_rough > rank or (of_rough == rank and rough.follows and foretold == "linear"):
-        worth = answer.believable and answer.worst < rough.worst
+        worth = answer.believable and lasting[0] and answer.worst < rough.worst
         return rough.beside(answer) if worth else rough
     return answer.beside(rough) if rough.lasts else answer
 
