@@ -59,13 +59,14 @@ def elsewhere(
         unit: of work, from which the controllers are drawn.
         workers: how the work is carried out.
     """
-    first, *others = _flown(members, setup, unit, workers)
+    known = [] if before is None else [before]
+    runs = _flown([*members, *known], setup, unit, workers)
+    first, *others = runs[: len(members)]
     lasts = np.any([run.lasted == setup.steps for run in (first, *others)], axis=0)
     parted = np.array([_part(first, other, setup) for other in others]).reshape(-1, DRAWN)
     # The middle one; a law of which there is no other parts from none.
     apart = 2 * parted.sum(axis=0) > len(parted)
-    known = [] if before is None else _flown([before], setup, unit, workers)
-    changed = _part(first, known[0], setup) if known else np.zeros(DRAWN, dtype=bool)
+    changed = _part(first, runs[-1], setup) if known else np.zeros(DRAWN, dtype=bool)
     return Elsewhere(int(lasts.sum()), int((lasts & apart).sum()), int((lasts & changed).sum()))
 
 

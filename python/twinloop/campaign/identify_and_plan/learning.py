@@ -142,12 +142,12 @@ class Learner:
         """
         if not answer.explained:
             return True
-        (lasting,) = lasting_under(answer.believed[:1], self.setup, self._drawn(flights), self.workers)
+        (lasting,) = lasting_under(answer.believed[:1], self.setup, self._drawn(flights, 0), self.workers)
         return 2 * lasting < DRAWN and bool(answer.misses(flights, self.setup, self.workers))
 
-    def _drawn(self, flights: Sequence[Experiment]) -> Unit:
-        """Of work, from which controllers of the whole box are drawn."""
-        return Unit(self.setup.seed).part(len(flights), 4)
+    def _drawn(self, flights: Sequence[Experiment], number: int) -> Unit:
+        """Of work, from which controllers of the whole box are drawn for one of the looks at them."""
+        return Unit(self.setup.seed).part(len(flights), 4, number)
 
     def _of_two(
         self,
@@ -164,7 +164,7 @@ class Learner:
         now = Two((*before.laws, both), rough.identified)
         foretold = better_foretold(now.laws, flights, self.setup.limits, self.workers)
         laws = [both.nonlinear, both.linear]
-        lasting = lasting_under(laws, self.setup, self._drawn(flights), self.workers)
+        lasting = lasting_under(laws, self.setup, self._drawn(flights, 1), self.workers)
         return better_of(answer, rough, foretold, [2 * each >= max(lasting) for each in lasting]), now
 
     def _identification(self, selected: Sequence[Selected]) -> partial[Identified]:
