@@ -118,17 +118,12 @@ def held_out(plant: Plant, count: int = COUNT) -> HeldOut:
         if run.ended == "completed" and moved:
             tests.append(test)
             states.append(true_states(run))
-            again = plant.truth.run(replace(test, initial_state=hardly_off(plant, test)))
+            again = plant.truth.run(replace(test, initial_state=_hardly_off(plant, test)))
             repeated.append(_error(plant.truth.signals, again, states[-1]) <= REPEATED)
     return HeldOut(tests, states, tried, repeated)
 
 
-def hardly_off(plant: Plant, test: Test) -> Floats:
-    """A start off by `OFF` of each state's scale, one state up and the next one down.
-
-    Args:
-        plant: that flies.
-        test: whose start it is.
-    """
+def _hardly_off(plant: Plant, test: Test) -> Floats:
+    """A start off by `OFF` of each state's scale, one state up and the next one down."""
     scales = np.array([state.scale for state in plant.truth.signals.states])
     return np.asarray(test.initial_state + OFF * scales * np.resize([1.0, -1.0], len(scales)))

@@ -110,7 +110,7 @@ class Learner:
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
-        if self._doubted(answer, flights) and self.options.plain != self.options:
+        if self.options.plain != self.options and self._doubted(answer, flights):
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
             answer, two = self._of_two(answer, answered(rough, number=2), two, answered, flights)
         identified = answer.identified
