@@ -64,6 +64,8 @@ def test_the_levels_of_a_relay_are_found(levels):
 def test_commands_that_are_sent_as_they_are_or_keep_their_mean_have_none():
     assert levels_of([flight(lambda wanted: wanted)], SIGNALS) == ()
     assert levels_of([flight(modulated())], SIGNALS) == ()
+    # At or beyond its bounds in most periods: 19 of 20 pulses are the nearest level.
+    assert levels_of([flight(modulated(), {**FIRST, "warmth.kp": 0.4, "warmth.kd": 0.5})], SIGNALS) == ()
     # At its bounds most of the time, with next to nothing in between.
     assert levels_of([flight(lambda wanted: wanted, {**FIRST, "warmth.kp": 0.5})], SIGNALS) == ()
     assert levels_of([SimpleNamespace(test=None, trajectory=None)], SIGNALS) == ()

@@ -44,24 +44,37 @@ def levels_of(experiments: Sequence[Experiment], signals: Signals) -> Levels:
     found: list[tuple[float, ...]] = [()] * signals.n_u
     for i in few:
         if np.any(off, axis=0)[i]:
-            asked = np.concatenate([gave[:, i] for _, gave in pairs])
-            found[i] = _levels(seen[i], sent[:, i], asked, signals.commands[i].bounds)
+            of_flights = [(was_sent[:, i], gave[:, i]) for was_sent, gave in pairs]
+            found[i] = _levels(seen[i], of_flights, signals.commands[i].bounds)
     return tuple(found) if any(found) else ()
 
 
-def _levels(seen: Floats, sent: Floats, asked: Floats, bounds: Bounds) -> tuple[float, ...]:
+def _levels(seen: Floats, flights: Sequence[tuple[Floats, Floats]], bounds: Bounds) -> tuple[float, ...]:
     """The levels of one command, none if it has none.
 
     Args:
         seen: values that were sent, rising.
-        sent: in each period of all flights (n,).
-        asked: by the controller in the same periods (n,).
+        flights: of each what was sent in each period, and what the controller gave (n,).
         bounds: of the command, levels themselves as long as nothing speaks against it: flights may not have shown them.
     """
+    sent, asked = (np.concatenate(parts) for parts in zip(*flights, strict=True))
     candidates = [np.union1d(seen, bounds), seen]
     alike = [float(np.mean(nearest(values, asked) == sent)) for values in candidates]
     best = int(np.argmax(alike))
-    return tuple(candidates[best].tolist()) if alike[best] >= ALIKE else ()
+    if alike[best] < ALIKE:
+        return ()
+    # A controller that asks for hardly anything between levels makes such pulses look like the nearest ones.
+    kept = np.concatenate([_that_keep_the_mean(candidates[best], gave) for _, gave in flights])
+    return () if float(np.mean(kept == sent)) > alike[best] else tuple(candidates[best].tolist())
+
+
+def _that_keep_the_mean(values: Floats, asked: Floats) -> Floats:
+    """Pulses in which a command of so many values is sent if what each leaves is carried on to the next (n,)."""
+    span, left, pulses = float(values[-1] - values[0]), 0.0, np.empty_like(asked)
+    for k, command in enumerate(asked):
+        pulses[k] = nearest(values, command + left)
+        left = float(np.clip(command + left - pulses[k], -span, span))
+    return pulses
 
 
 def levels_said(model: _core.Model, signals: Signals) -> list[Remark]:
