@@ -23,7 +23,7 @@ from twinloop_exam.version import version
 from twinloop_exam.zoo import honesty
 from twinloop_exam.zoo.held_out import COUNT, HeldOut, held_out
 from twinloop_exam.zoo.honesty import Flight
-from twinloop_exam.zoo.optima import best_quality
+from twinloop_exam.zoo.optima import best_quality, under_noise
 from twinloop_exam.zoo.plant import Plant
 from twinloop_exam.zoo.plants import plant as plant_named
 
@@ -164,6 +164,7 @@ def _flown(plant: Plant, system: Any, campaign: Campaign, test: Test) -> tuple[M
         "left": violated(flight, system.signals),
         "flown": plant.judged(flight, test),
         "gains_quality": plant.true_quality(test.genes),
+        "gains_in_noise": under_noise(plant, test.genes),
         "gains": test.parameters,
         "measured": measured,
     }
@@ -180,6 +181,7 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
     return _plain(
         {
             "best_test": None if best is None else plant.true_quality(best.genes),
+            "best_test_in_noise": None if best is None else under_noise(plant, best.genes),
             **accuracy._asdict(),
             "found": structures,
             "false": [name for name in structures if name not in plant.has],
