@@ -282,6 +282,14 @@ class Model:
     def with_offsets(self, offsets: Sequence[float]) -> Model:
         """The same model, read so much later (n_x,), s: only states that others give may be."""
     @property
+    def reports(self) -> tuple[list[tuple[int, int, int, int]], list[tuple[int, int, float, float]]]:
+        """What is given of its readings, as `with_reports` takes it; empty where all are given as they are."""
+    def with_reports(
+        self, held: Sequence[tuple[int, int, int, int]], computed: Sequence[tuple[int, int, float, float]]
+    ) -> Model:
+        """The same model, of whose readings so much is given: of slow sensors (state, periods, first, age), and of
+        rates that are computed (state, of, kept, share)."""
+    @property
     def levels(self) -> list[list[float]]:
         """Of each command, rising; empty where all are sent as they are."""
     def with_levels(self, levels: Sequence[Sequence[float]]) -> Model:

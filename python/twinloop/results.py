@@ -36,6 +36,7 @@ from twinloop.law.law import Law
 from twinloop.law.linear.margins import LoopMargins, Margins
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import CorrelatedDisturbance, Noise
+from twinloop.law.reports import Computed, Held
 
 __all__ = [
     "Actuation",
@@ -47,6 +48,7 @@ __all__ = [
     "Checks",
     "ClosedCurves",
     "Column",
+    "Computed",
     "CorrelatedDisturbance",
     "Correlations",
     "Cost",
@@ -62,6 +64,7 @@ __all__ = [
     "Flights",
     "Frequency",
     "GainSlope",
+    "Held",
     "HiddenState",
     "HoldBack",
     "Iteration",

@@ -56,6 +56,7 @@ ABLATIONS: dict[str, Ablation] = {
     "cleaning": Ablation("single wrong readings ignored before anything is learnt", {"cleaning": False}),
     "outliers": Ablation("readings ignored that are far from their predictions", {"outliers": False}),
     "offsets": Ablation("offsets of late or early sensors", {"offsets": False}),
+    "reports": Ablation("slow sensors, and rates computed of readings", {"reports": False}),
     "noise-from-above": Ablation("the search of the noise from above as well", {"noise_from_above": False}),
     "gusts": Ablation("correlated disturbances, such as gusts", {"gusts": False}),
     "disturbance-price": Ablation("a price on correlated disturbances", {"price_disturbances": False}),

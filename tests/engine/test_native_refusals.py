@@ -175,6 +175,10 @@ def calls(world):
         "Model": (_core.Model, {"program": w.law, **learnt, "actuators": w.actuators, "hidden": []}),
         "Model.shape": (_core.Model.shape, learnt),
         "Model.with_offsets": (w.model.with_offsets, {"offsets": [0.0] * w.n_x}),
+        "Model.with_reports": (
+            w.model.with_reports,
+            {"held": [(0, 3, 1, 2)], "computed": [(w.n_x - 1, 0, 0.5, 2.0)]},
+        ),
         "Model.with_levels": (w.model.with_levels, {"levels": [[0.0, 1.0]] * w.n_u}),
         "Model.states_of": (w.model.states_of, {"readings": w.states[1:]}),
         "Model.with_constants": (w.model.with_constants, {"constants": w.constants, "lags": [0.2] * w.n_u}),

@@ -19,7 +19,7 @@ FRONTS = {
     "autopilots": "declared files sweep",
     "campaign": "assessment campaign_file certificate cost from_logs history keeping presets remaining setup",
     "campaign/coevolution": "method search",
-    "campaign/data": "declared levels readings sent",
+    "campaign/data": "declared levels readings reports sent",
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "rivals steps unseen use"
@@ -41,13 +41,13 @@ FRONTS = {
     "identification/search": (
         "behind_a_law directions hidden moderation noise problem selection structure walks"
     ),
-    "identification/sensors": "chains euler_steps noise offsets",
+    "identification/sensors": "chains euler_steps noise offsets reported",
     "identification/terms": (
         "bounds candidates denominators directions formulas friction hinges joints libraries pool priors "
         "sizes"
     ),
     "law": (
-        "accuracy actuation equations expressions flight flown forms law levels noise parsing pieces twin "
+        "accuracy actuation equations expressions flight flown forms law levels noise parsing pieces reports twin "
         "uncertainty"
     ),
     "law/exports": "environment export gymnasium_source taking",

@@ -49,6 +49,7 @@ mod objective;
 pub mod pareto;
 mod plants;
 mod regression;
+mod reports;
 mod rng;
 mod rollout;
 mod rows;
@@ -104,6 +105,7 @@ pub use controller::{
 };
 pub use excitation::{Excitation, HoldBack};
 pub use look_ahead::{Ahead, Leaving, LookAhead};
+pub use reports::{Report, Reports};
 pub use rollout::{Commands, Seen, Start, Watch, rollout};
 pub use rows::{run_rows, step_rows};
 pub use selected::{Experiment, SelectedTests};

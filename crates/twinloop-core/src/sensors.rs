@@ -3,12 +3,14 @@
 //! A late sensor reads what was a while ago: between two states of the run it follows the cubic through both and through
 //! their rates, an attitude as a quaternion (Hairer, Nørsett, Wanner 1993, section II.6). An early one reads what will
 //! be, as far as rates tell that go on as they did over the last period. Before a run nothing changed but by its rates.
+//! What is given of readings (`reports`) may be something else again.
 
 use std::collections::VecDeque;
 
 use crate::attitude::{angles, quaternion, turning};
 use crate::error::{Result, invalid};
 use crate::lanes::{Scalar, Vector};
+use crate::reports::{Memory, Reports};
 use crate::signals::{RigidBody, Signals};
 
 /// By how much later than others each state is read.
@@ -24,6 +26,7 @@ pub struct Sensors {
     /// Whether nothing but a model moves the state.
     driven: Vec<bool>,
     body: Option<RigidBody>,
+    reports: Reports,
 }
 
 impl Sensors {
@@ -52,24 +55,32 @@ impl Sensors {
                 None => groups.push((periods, vec![state])),
             }
         }
-        if groups.is_empty() {
-            return Ok(Self::default());
-        }
         let rate = |state| signals.derivative_of.iter().position(|&of| of == Some(state));
         Ok(Self {
-            offsets: offsets.to_vec(),
+            offsets: if groups.is_empty() { vec![] } else { offsets.to_vec() },
             groups,
             dt,
             rates: (0..states).map(rate).collect(),
             driven: (0..states).map(|state| !signals.is_given(state)).collect(),
             body: signals.kinematics,
+            reports: Reports::default(),
         })
     }
 
-    /// Whether every state is read as it is.
+    /// The same, of whose readings so much is given.
+    pub fn with_reports(self, reports: Reports) -> Self {
+        Self { reports, ..self }
+    }
+
+    /// What is given of their readings.
+    pub fn reports(&self) -> &Reports {
+        &self.reports
+    }
+
+    /// Whether every state is read, and given, as it is.
     #[inline(always)]
     pub fn in_time(&self) -> bool {
-        self.groups.is_empty()
+        self.groups.is_empty() && self.reports.is_none()
     }
 
     /// Of each state, s; empty where all are in time.
@@ -77,14 +88,19 @@ impl Sensors {
         &self.offsets
     }
 
-    /// Puts what is read (n_x) at a state that a run has come to. To be called at each state in turn.
+    /// Puts what is given of readings (n_x) at a state that a run has come to. To be called at each state in turn.
     pub(crate) fn read<V: Vector>(&self, recent: &mut Recent, state: &[V], reading: &mut [V]) {
         reading.copy_from_slice(state);
         recent.lanes.resize_with(V::LANES, Lane::default);
         for (l, lane) in recent.lanes.iter_mut().enumerate() {
             let state: Vec<Scalar> = state.iter().map(|value| Scalar::splat(value.lane(l))).collect();
+            let mut given = state.clone();
             for (i, found) in self.read_lane(lane, state) {
-                set_lane(&mut reading[i], l, found.lane(0));
+                given[i] = found;
+            }
+            self.reports.give(&mut lane.given, &mut given);
+            for (reading, given) in reading.iter_mut().zip(&given) {
+                set_lane(reading, l, given.lane(0));
             }
         }
     }
@@ -209,11 +225,12 @@ pub(crate) struct Recent {
     lanes: Vec<Lane>,
 }
 
-/// The last states of a run, the newest at the end.
+/// The last states of a run, the newest at the end, and how many there were.
 #[derive(Clone, Default)]
 struct Lane {
     states: VecDeque<Vec<Scalar>>,
     seen: usize,
+    given: Memory,
 }
 
 impl Lane {

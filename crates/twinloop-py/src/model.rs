@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use twinloop_core::{
-    Actuation, Actuator, AnyDynamics, Form, Hidden, OwnedModel, Periods, RigidBody, Signals, Source,
+    Actuation, Actuator, AnyDynamics, Form, Hidden, OwnedModel, Periods, Report, RigidBody, Signals, Source,
     checked_effects, state_of,
 };
 
@@ -94,6 +94,34 @@ impl PyModel {
         self.0.frame().levels().each().to_vec()
     }
 
+    /// The same model, of whose readings so much is given: (state, periods, first, age) of slow sensors, and
+    /// (state, of, kept, share) of rates that are computed.
+    fn with_reports(
+        &self,
+        #[pyo3(from_py_with = given)] held: Vec<HeldParts>,
+        #[pyo3(from_py_with = given)] computed: Vec<ComputedParts>,
+    ) -> Result<Self> {
+        let held =
+            held.into_iter().map(|(state, every, first, age)| (state, Report::Held { every, first, age }));
+        let computed = computed
+            .into_iter()
+            .map(|(state, of, kept, share)| (state, Report::Computed { of, kept, share }));
+        Ok(Self(self.0.with_reports(held.chain(computed).collect())?))
+    }
+
+    /// What is given of its readings, as `with_reports` takes it.
+    #[getter]
+    fn reports(&self) -> (Vec<HeldParts>, Vec<ComputedParts>) {
+        let (mut held, mut computed) = (vec![], vec![]);
+        for &(state, report) in self.0.frame().sensors().reports().each() {
+            match report {
+                Report::Held { every, first, age } => held.push((state, every, first, age)),
+                Report::Computed { of, kept, share } => computed.push((state, of, kept, share)),
+            }
+        }
+        (held, computed)
+    }
+
     /// By how much later than others each state is read, s; empty where all are read in time.
     #[getter]
     fn offsets(&self) -> Vec<f64> {
@@ -170,6 +198,10 @@ impl PyModel {
 
 /// Lag, delay, rest.
 type ActuatorParts = (f64, usize, Option<f64>);
+/// State, periods from one new reading to the next, period of the first one after the start, and how old they are.
+type HeldParts = (usize, usize, usize, usize);
+/// State, the other one, and what is kept of the last value and added of its change.
+type ComputedParts = (usize, usize, f64, f64);
 /// Commands, whether squared, rest, time, states, whether settled, in which it turns.
 type HiddenParts = (Vec<usize>, bool, Option<f64>, f64, Vec<usize>, bool, f64);
 

@@ -229,7 +229,8 @@ def _repeated(twin: Twin, setup: Setup, test: Test, gusts: bool) -> list[float]:
     """Qualities that would be measured if a flight were repeated, on the twin; NaN for one that diverges."""
     draws: list[tuple[Floats | None, Floats | None]] = [(None, None)]
     if twin.noise is not None:
-        noise, moves = twin.noise.drawn(REPEATS, test.steps, Unit(setup.seed).part(0).stream("repeats"))
+        stream = Unit(setup.seed).part(0).stream("repeats")
+        noise, moves = twin.noise.drawn(REPEATS, test.steps, stream, twin.law.reports)
         draws = [(seen, moved if gusts else None) for seen, moved in zip(noise, moves, strict=True)]
     values = []
     for seen, moved in draws:

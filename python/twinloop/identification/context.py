@@ -18,6 +18,7 @@ from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.terms.directions import Direction
 from twinloop.identification.terms.pool import Pool
 from twinloop.law.levels import Levels
+from twinloop.law.reports import Reports
 from twinloop.signals import Signals
 
 SEARCHED_ANEW = 4
@@ -39,6 +40,7 @@ class Context:
         rests: commands whose effect may be there at the start of a run (n_u,).
         axes: directions in which the controller moves alike commands.
         levels: in which commands of controllers are sent (n_u,); none where all are sent as they are.
+        reports: what is given of readings (n_x,); none where all are given as they are.
         earlier: what was learnt from fewer runs.
         watch: called with each step that begins.
         as_integrated: whether chains that step bear what integration leaves, too: where forms are compared, what a
@@ -53,6 +55,7 @@ class Context:
     rests: Sequence[Floats] = ()
     axes: Sequence[Direction] = ()
     levels: Levels = ()
+    reports: Reports = ()
     earlier: Identified | None = None
     watch: Watch = unwatched
     as_integrated: bool = False

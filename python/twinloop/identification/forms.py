@@ -118,6 +118,18 @@ def likeliest(context: Context) -> tuple[str, list[Remark]]:
     return best.form, [_said(context, best, other)]
 
 
+def briefly_described(context: Context, runs: Sequence[Run], start: int) -> float:
+    """Description length of runs by what a short search finds under the form that is believed at first.
+
+    Args:
+        context: of the identification.
+        runs: that are described.
+        start: its number.
+    """
+    brief, form = context.brief(runs), first_form(context.options, context.signals)
+    return from_both_sides(brief, begun(brief, form, brief.first_pool(), start)).length
+
+
 def brief_look(
     context: Context,
     form: str,

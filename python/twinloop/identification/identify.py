@@ -15,6 +15,7 @@ from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop._ground.steps import Watch, unwatched
 from twinloop._ground.streams import Unit
+from twinloop.identification.ages import aged
 from twinloop.identification.context import Context
 from twinloop.identification.evidence import ANEW, by_evidence
 from twinloop.identification.fit.committee import Committee
@@ -36,10 +37,12 @@ from twinloop.identification.proposals.terms import terms
 from twinloop.identification.proposals.undisturbed import undisturbed
 from twinloop.identification.records import Run
 from twinloop.identification.remarks import held_at_bounds, late_sensors, other_noise, remarks
+from twinloop.identification.sensors.reported import as_sensed, with_their_noise
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.identification.starts import starts
 from twinloop.identification.terms.directions import Direction
 from twinloop.law.levels import Levels
+from twinloop.law.reports import Held, Reports, old
 from twinloop.records import Recorded
 from twinloop.remarks import Remark
 from twinloop.signals import Signals
@@ -76,12 +79,14 @@ class UnderWay(Recorded, kind="identification"):
         form: what outputs mean.
         said: remarks on that.
         searches: one for each start that was made, in their order.
+        ages: of readings when they are given (n_x), in periods; none where all are given as they are.
     """
 
     runs: tuple[Run, ...]
     form: str
     said: tuple[Remark, ...]
     searches: tuple[Found, ...] = ()
+    ages: tuple[int, ...] = ()
 
 
 def identify_runs(
@@ -92,6 +97,7 @@ def identify_runs(
     rests: Sequence[Floats] = (),
     axes: Sequence[Direction] = (),
     levels: Levels = (),
+    reports: Reports = (),
     seed: int = 0,
     iteration: int = 0,
     earlier: Identified | None = None,
@@ -109,6 +115,7 @@ def identify_runs(
         rests: commands whose effect may be there at the start of a run (n_u,).
         axes: directions in which the controller moves alike commands.
         levels: in which commands of controllers are sent (n_u,); none where all are sent as they are.
+        reports: what is given of readings (n_x,); none where all are given as they are.
         seed: of the campaign.
         iteration: of the campaign, which tells its random numbers from those of others.
         earlier: what was learnt from fewer runs; its terms are candidates again.
@@ -120,9 +127,9 @@ def identify_runs(
     Returns:
         What was learnt, the same bits wherever it went on from.
     """
-    continued = [run.continued(signals) for run in runs]
+    logged, reports = [run.continued(signals) for run in runs], reports if options.reports else ()
     context = Context(
-        continued,
+        [as_sensed(run, reports, signals) for run in logged],
         signals,
         options,
         Unit(seed, (iteration,)),
@@ -130,15 +137,21 @@ def identify_runs(
         rests=rests,
         axes=axes,
         levels=levels,
+        reports=reports,
         earlier=earlier,
         watch=watch,
     )
     if under_way is None:
+        reports = aged(context, logged)
+        context = replace(context, runs=[as_sensed(run, reports, signals) for run in logged])
         context = cleaned(context) if options.cleaning else context
         form, said = likeliest(context)
-        under_way = UnderWay(tuple(context.runs), form, tuple(said))
+        ages = tuple(report.age if isinstance(report, Held) else 0 for report in reports)
+        under_way = UnderWay(tuple(context.runs), form, tuple(said), ages=ages)
         keep(under_way)
-    context = replace(context, runs=under_way.runs).under(under_way.form)
+    context = replace(context, runs=under_way.runs, reports=old(reports, under_way.ages)).under(
+        under_way.form
+    )
     searches = list(under_way.searches)
     for number, start in enumerate(starts(context, under_way.form)):
         if number == len(searches):
@@ -209,7 +222,7 @@ def concluded(context: Context, found: Found, said: Sequence[Remark]) -> Identif
         members=seated.members,
         pool=pool,
         sums=sums,
-        chains=list(seated.observer),
+        chains=with_their_noise(seated.observer, context.reports),
         actuation=best.actuation,
         offsets=best.offsets,
         chi_squared=fit.chi_squared,

@@ -16,10 +16,8 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import log
 from twinloop.identification.context import Context
 from twinloop.identification.description import shorter
-from twinloop.identification.forms import first_form
+from twinloop.identification.forms import briefly_described
 from twinloop.identification.records import Run, guessed_noise
-from twinloop.identification.search.selection import from_both_sides
-from twinloop.identification.starts import begun
 from twinloop.signals import Signals
 
 STANDS_OUT = 5.0
@@ -128,20 +126,14 @@ def cleaned(context: Context) -> Context:
     trials = suspects(context.runs, scales)[:TRIED]
     if not trials:
         return context
-    runs, length = list(context.runs), _length(context, context.runs, CLEANING)
+    runs, length = list(context.runs), briefly_described(context, context.runs, CLEANING)
     for number, suspect in enumerate(trials, 1):
         tried = [*runs]
         tried[suspect.run] = ignoring(tried[suspect.run], suspect, context.signals)
-        alone = _length(context, tried, CLEANING + number) + IGNORING + _stated(runs, suspect)
+        alone = briefly_described(context, tried, CLEANING + number) + IGNORING + _stated(runs, suspect)
         if shorter(alone, length):
             runs, length = tried, alone
     return replace(context, runs=runs)
-
-
-def _length(context: Context, runs: Sequence[Run], start: int) -> float:
-    """Description length of what a short search finds."""
-    brief, form = context.brief(runs), first_form(context.options, context.signals)
-    return from_both_sides(brief, begun(brief, form, brief.first_pool(), start)).length
 
 
 def ignoring(run: Run, suspect: Suspect, signals: Signals) -> Run:

@@ -17,6 +17,8 @@ from twinloop.signals import Signals
 
 ORDERS = (3, 4, 5, 6)
 """Orders of the differences in which noise is looked for."""
+SLOW = 0.6
+"""Share of a state's rows that are readings at most, if its sensor is slow."""
 HELD = 2.0**-47
 """Share of a reading that its rounding may take, with a tenth of it (`BEST_SENSOR`) the rounding of a sum or two."""
 HELD_IN_SQUARES = 2.0**-23
@@ -157,6 +159,14 @@ def guessed_noise(runs: Sequence[Run], scales: Floats) -> Floats:
         guess = np.where(found < FALLS * guess, found, guess)
     least = rounding(runs, scales)
     answer: Floats = np.where(np.isfinite(guess), np.maximum(guess, least), least)
+    for i in range(len(scales)):
+        # Of a slow sensor what lies between its readings is a polynomial by itself.
+        new = [run.weights[:, i] > 0.0 for run in runs]
+        if any(rows.any() for rows in new) and max(map(np.mean, new)) < SLOW:
+            read = [
+                Run.of(run.states[rows, i : i + 1], run.commands) for run, rows in zip(runs, new, strict=True)
+            ]
+            answer[i] = guessed_noise(read, scales[[i]])[0]
     return answer
 
 

@@ -70,6 +70,7 @@ class IdentificationOptions:
         hidden: whether a hidden state is searched that commands drive and that decays, such as a climb or heat.
         storage: whether hidden states are searched that measured states drive, such as the twist of a joint.
         offsets: whether sensors may be late or early against those of the driven states.
+        reports: whether sensors may be slow, and declared derivatives computed of readings.
         cleaning: whether single wrong readings are ignored before anything is learnt.
         outliers: whether readings far from the predictions of a tuned model are ignored.
         tuning: whether constants are tuned on predictions.
@@ -122,6 +123,7 @@ class IdentificationOptions:
     hidden: bool = True
     storage: bool = True
     offsets: bool = True
+    reports: bool = True
     cleaning: bool = True
     outliers: bool = True
     tuning: bool = True

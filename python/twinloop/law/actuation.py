@@ -11,6 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats, at_least_zero, number, whole
 from twinloop.errors import InvalidInput
+from twinloop.law.reports import reports_of, with_reports
 from twinloop.records import Record, Recorded, with_names
 from twinloop.signals import Signals
 
@@ -205,7 +206,8 @@ def delayed(model: _core.Model, signals: Signals, periods: float = 1.0) -> _core
     slower = _core.Model(
         model.program, model.form, signals.engine, late, list(actuation.hidden), model.offsets
     )
-    return slower.with_levels(model.levels) if model.levels else slower
+    slower = slower.with_levels(model.levels) if model.levels else slower
+    return with_reports(slower, reports_of(model, signals.n_x))
 
 
 def _check_actuator(actuator: Actuator, where: str) -> None:

@@ -16,7 +16,8 @@ from twinloop.law.expressions import SMALLEST_DIVISOR, Expressions
 from twinloop.law.flown import Span
 from twinloop.law.forms import DERIVATIVES
 from twinloop.law.law import Law
-from twinloop.law.levels import in_words
+from twinloop.law.levels import in_words as levels_in_words
+from twinloop.law.reports import in_words as reports_in_words
 from twinloop.law.spread import Spread, spreads, varying_in
 from twinloop.law.writing import EXACT, TEXT, Term, Writer
 from twinloop.signals import Signals
@@ -123,7 +124,10 @@ class Equations:
                 f"±: standard deviation of a constant over the {len(self.members)} models of the committee, or"
                 " over as many of them as have the term, where a number of them is given"
             )
-        lines += self._actuators() + self._offsets() + in_words(self.law.levels, self.signals)
+        lines += self._actuators() + self._offsets()
+        lines += levels_in_words(self.law.levels, self.signals) + reports_in_words(
+            self.law.reports, self.signals
+        )
         if self.flown:
             lines.append(f"flown: {', '.join(map(str, self.flown))}; beyond, the law is extrapolated")
         return [part for line in lines for part in _comment(line)]

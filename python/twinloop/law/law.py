@@ -11,12 +11,13 @@ from twinloop._ground.values import Value
 from twinloop.law.actuation import Actuation
 from twinloop.law.expressions import UPRIGHT, Expressions, Node
 from twinloop.law.levels import Levels
+from twinloop.law.reports import Reports, reports_of, with_reports
 from twinloop.signals import RigidBody, Signals
 
 
 @dataclass(frozen=True, eq=False)
 class Law(Value):
-    """Equations, kinematics, actuators, hidden states, sensors' offsets and the integrator of a twin.
+    """Equations, kinematics, actuators, hidden states, sensors and the integrator of a twin.
 
     The inputs of the expressions are the states, the effects of the commands in units of their scales, and the hidden
     states. With the form "acceleration", outputs are the derivatives of the driven states. They are integrated by one
@@ -33,6 +34,7 @@ class Law(Value):
         actuation: actuators and hidden states.
         offsets: delay of each state's readings against those of the driven states (n_x,), s.
         levels: in which commands of controllers are sent (n_u,); none where all are sent as they are.
+        reports: what is given of readings (n_x,); none where all are given as they are.
     """
 
     signals: Signals
@@ -42,6 +44,7 @@ class Law(Value):
     actuation: Actuation
     offsets: tuple[float, ...]
     levels: Levels = ()
+    reports: Reports = ()
 
     @staticmethod
     def of(model: _core.Model, signals: Signals) -> Law:
@@ -59,7 +62,8 @@ class Law(Value):
         actuation = Actuation.of(model, signals)
         offsets = tuple(model.offsets) or (0.0,) * signals.n_x
         levels = tuple(map(tuple, model.levels))
-        return Law(signals, model.form, expressions, outputs, actuation, offsets, levels)
+        reports = reports_of(model, signals.n_x)
+        return Law(signals, model.form, expressions, outputs, actuation, offsets, levels, reports)
 
     def model(self) -> _core.Model:
         """The engine's model of this law, which roll-outs run."""
@@ -72,7 +76,7 @@ class Law(Value):
             self.actuation.hidden,
             self.offsets,
         )
-        return model.with_levels(self.levels) if self.levels else model
+        return with_reports(model.with_levels(self.levels) if self.levels else model, self.reports)
 
     @property
     def inputs(self) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from twinloop import _core
 from twinloop._ground.arrays import Floats, at_least_zero, number
 from twinloop._ground.elementary import exp
+from twinloop.law.reports import Reports, given
 from twinloop.records import Record, Recorded
 
 
@@ -83,9 +84,9 @@ class Noise(Recorded, kind="noise"):
             self, correlated=tuple(each for each in self.correlated if each.states[0] not in states)
         )
 
-    def drawn(self, draws: int, steps: int, stream: _core.Stream) -> tuple[Floats, Floats]:
-        """Draws of sensor noise (draws, steps + 1, n_x) and of disturbances of the states (draws, steps, n_x)."""
-        noise = self.sensors * stream.normals(draws, steps + 1, len(self.sensors))
+    def drawn(self, draws: int, steps: int, stream: _core.Stream, reports: Reports) -> tuple[Floats, Floats]:
+        """Draws of sensor noise, as it is given (draws, steps + 1, n_x), and of disturbances (draws, steps, n_x)."""
+        noise = given(reports, self.sensors * stream.normals(draws, steps + 1, len(self.sensors)))
         return noise, self.disturbance(draws, steps, stream)
 
     def disturbance(self, draws: int, steps: int, stream: _core.Stream) -> Floats:

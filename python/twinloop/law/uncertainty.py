@@ -13,6 +13,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
+from twinloop.law.reports import reports_of
 from twinloop.signals import Signals
 from twinloop.test import Test
 
@@ -44,7 +45,8 @@ def committee_runs(
         What is read but for the sensors' noise (members × draws, n + 1, n_x), NaN after a run has diverged, and that
         noise.
     """
-    seen, moved = noise.drawn(draws, test.steps, Unit(seed).part(0).stream("band"))
+    reports = reports_of(members[0], limits.signals.n_x)
+    seen, moved = noise.drawn(draws, test.steps, Unit(seed).part(0).stream("band"), reports)
     runs = [drawn_runs(member, test, limits, noise=seen, disturbance=moved).read for member in members]
     return np.concatenate(runs), np.tile(seen, (len(runs), 1, 1))
 

@@ -15,6 +15,7 @@ from twinloop._ground.arrays import Floats
 from twinloop._ground.streams import Unit
 from twinloop.controllers import Family
 from twinloop.flights import candidates, qualities
+from twinloop.law.reports import Reports, given, reports_of
 from twinloop.planning.gusts import UNMOVED, Gusts, Moved
 from twinloop.planning.leaving import risk_of
 from twinloop.planning.quality import Quality
@@ -184,7 +185,7 @@ class Judge:
         flight would give. Where `off` is given flights begin elsewhere, as far as it says (n_x,), drawn like noise.
         Excitations are held back as `hold_back` says.
         """
-        noise = self.noise(sds, draws)
+        noise = self.noise(sds, draws, reports_of(members[0], self.signals.n_x))
         offsets = (
             None if off is None else off * self.unit.part(0).stream("off_start").normals(draws, len(off))
         )
@@ -223,12 +224,12 @@ class Judge:
         share = np.isinf(judged.qualities).any(axis=1).mean(axis=1)
         return [member for i, member in enumerate(members) if i == 0 or share[i] < 0.5]
 
-    def noise(self, sds: Floats, draws: int) -> Floats | None:
-        """The same draws of sensor noise for everybody (draws, n + 1, n_x); None for a single, quiet flight."""
+    def noise(self, sds: Floats, draws: int, reports: Reports) -> Floats | None:
+        """The same draws of sensor noise for everybody, as it is given (draws, n + 1, n_x); None for a quiet flight."""
         if draws < 2:
             return None
         stream = self.unit.part(0).stream("sensors")
-        return sds * stream.normals(draws, self.task.steps + 1, self.signals.n_x)
+        return given(reports, sds * stream.normals(draws, self.task.steps + 1, self.signals.n_x))
 
     def flights(
         self,

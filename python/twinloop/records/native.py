@@ -20,6 +20,8 @@ MODEL_KEYS = ("program", "form", "actuators", "hidden")
 ACTUATOR_KEYS = ("lag", "delay", "rest")
 HIDDEN_KEYS = ("commands", "squared", "rest", "time")
 MOTION_KEYS = ("states", "settled")
+HELD_KEYS = ("state", "every", "first", "age")
+COMPUTED_KEYS = ("state", "of", "kept", "share")
 
 
 def read_program(value: object, where: str) -> _core.Program:
@@ -29,7 +31,7 @@ def read_program(value: object, where: str) -> _core.Program:
 
 
 def model_record(model: _core.Model) -> dict[str, Any]:
-    """A model without its signals: program, form, actuators, hidden states, sensors' offsets, levels of commands."""
+    """A model without its signals: program, form, actuators, hidden states, sensors' offsets and reports, levels."""
     record: dict[str, Any] = {
         "program": str(model.program),
         "form": model.form,
@@ -40,6 +42,12 @@ def model_record(model: _core.Model) -> dict[str, Any]:
         record["offsets"] = model.offsets
     if model.levels:
         record["levels"] = model.levels
+    held, computed = model.reports
+    if held or computed:
+        record["reports"] = {
+            "held": [dict(zip(HELD_KEYS, one, strict=True)) for one in held],
+            "computed": [dict(zip(COMPUTED_KEYS, one, strict=True)) for one in computed],
+        }
     return record
 
 
@@ -51,7 +59,7 @@ def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Mo
         raise InvalidInput(
             f"Record {where}: expected the signals of the model beside the record, found none; pass them."
         )
-    found = keys(value, MODEL_KEYS, where, optional=("offsets", "levels"))
+    found = keys(value, MODEL_KEYS, where, optional=("offsets", "levels", "reports"))
     program = read_program(found["program"], f"{where}.program")
     actuators = [
         _actuator(item, f"{where}.actuators[{i}]")
@@ -71,7 +79,29 @@ def read_model(value: object, where: str, given: tuple[object, ...]) -> _core.Mo
     ]
     form = read_text(found["form"], f"{where}.form")
     model = _core.Model(program, form, signals, actuators or None, hidden, offsets)
-    return model.with_levels(levels) if levels else model
+    model = model.with_levels(levels) if levels else model
+    return (
+        model.with_reports(*_reports(found["reports"], f"{where}.reports")) if "reports" in found else model
+    )
+
+
+def _reports(
+    value: object, where: str
+) -> tuple[list[tuple[int, int, int, int]], list[tuple[int, int, float, float]]]:
+    """What is given of readings, as the engine takes it, which checks it."""
+    found, held, computed = keys(value, ("held", "computed"), where), [], []
+    for i, item in enumerate(read_list(found["held"], f"{where}.held")):
+        at = f"{where}.held[{i}]"
+        one = keys(item, HELD_KEYS, at)
+        state, every, first, age = (_count(read_whole(one[key], f"{at}.{key}"), at) for key in HELD_KEYS)
+        held.append((state, every, first, age))
+    for i, item in enumerate(read_list(found["computed"], f"{where}.computed")):
+        at = f"{where}.computed[{i}]"
+        one = keys(item, COMPUTED_KEYS, at)
+        state, of = (_count(read_whole(one[key], f"{at}.{key}"), at) for key in COMPUTED_KEYS[:2])
+        kept, share = (read_number(one[key], f"{at}.{key}") for key in COMPUTED_KEYS[2:])
+        computed.append((state, of, kept, share))
+    return held, computed
 
 
 def _actuator(value: object, where: str) -> tuple[float, int, float | None]:

@@ -7,6 +7,7 @@ use crate::actuators::Actuation;
 use crate::error::{Result, invalid};
 use crate::levels::Levels;
 use crate::lgp::Learnt;
+use crate::reports::{Report, Reports};
 use crate::sensors::Sensors;
 use crate::signals::Signals;
 
@@ -43,8 +44,21 @@ impl OwnedModel {
 
     /// The same, of which each state is read so many s later (n_x).
     pub fn with_offsets(&self, offsets: &[f64]) -> Result<Self> {
-        let frame = (*self.frame).clone().with_sensors(Sensors::new(offsets, &self.signals)?);
-        Ok(Self { frame: Arc::new(frame), ..self.clone() })
+        self.read_by(offsets, self.frame.sensors().reports().clone())
+    }
+
+    /// The same, of whose readings so much is given.
+    pub fn with_reports(&self, reports: Vec<(usize, Report)>) -> Result<Self> {
+        let reports = Reports::new(reports, self.signals.states())?;
+        match self.frame.sensors().offsets() {
+            [] => self.read_by(&vec![0.0; self.signals.states()], reports),
+            offsets => self.read_by(offsets, reports),
+        }
+    }
+
+    fn read_by(&self, offsets: &[f64], reports: Reports) -> Result<Self> {
+        let sensors = Sensors::new(offsets, &self.signals)?.with_reports(reports);
+        Ok(Self { frame: Arc::new((*self.frame).clone().with_sensors(sensors)), ..self.clone() })
     }
 
     /// The same, with controllers' commands sent in levels, or none of a command that is sent as it is (n_u).

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.identification.records import Run, guessed_noise
+from twinloop.law.reports import Held
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -23,7 +25,11 @@ COUNTS = 1.5
 LIKE = 0.8
 """Share of the stretches in which a sensor repeats itself that are as long as most of them, where it is slow."""
 DERIVED = 1e-3
-"""Share of a rate's noise by which it may be off what another state's readings say, where it is computed of them."""
+"""Share of what noise adds to a rate by which it may be off what another's readings say, if it is computed of them."""
+REPEATED = 0.5
+"""Share of its readings that differ at most, of a sensor that rounds."""
+EXACT = 0.02
+"""Share by which a slow change may come out of a filter larger or smaller than it is, where it gives a rate."""
 FORGETS = 0.999
 """Share of its last value that such a filter keeps at most."""
 MOST_ROWS = 0.95
@@ -54,20 +60,20 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
             )
     records = [run.states for run in runs]
     for i, state in enumerate(signals.states):
-        periods = repeats([states[:, i] for states in records])
-        if periods > 1:
+        held = repeats([states[:, i] for states in records])
+        if held is not None:
             yield note(
                 "repeated-readings",
-                f"{state.name} repeats every reading: it gives a new one each {periods} periods"
-                f" ({periods * signals.dt:.3g} s). To the twin it is a late sensor and a noisy one; log what an"
-                " estimator makes of it, or choose the sensor's own period for dt.",
+                f"{state.name} repeats every reading: it gives a new one each {held.every} periods"
+                f" ({held.every * signals.dt:.3g} s). So it does on the twin, which learns from new ones alone. If an"
+                " estimator makes more of it, log that.",
             )
-    for i, j in derived(records):
+    for one in derived(records):
         names = signals.state_names
         yield note(
             "derived-rate",
-            f"{names[i]} is computed from the readings of {names[j]}, as a filtered difference of them: both have the"
-            " same noise, which a law can take for motion. Log what a sensor of its own reads, if there is one.",
+            f"{names[one.rate]} is computed from the readings of {names[one.of]}, as a filtered difference of them, and"
+            f" {_taken(one, signals)}. Log what a sensor of its own reads, if there is one.",
         )
     for j, command in enumerate(signals.commands):
         sent = [run.commands[:, j] for run in runs]
@@ -84,6 +90,29 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
             "Readings change from row to row as much as over whole runs: they contain only noise; check"
             " the sensors, their units, and that the period is not far too long.",
         )
+
+
+def _taken(one: Derived, signals: Signals) -> str:
+    """What a twin makes of a rate that is computed."""
+    if is_rate(one, signals):
+        return "so it is on the twin, which learns from those readings alone"
+    name, of = signals.state_names[one.rate], signals.state_names[one.of]
+    return (
+        "has their noise, which a law can take for motion: declare it"
+        f" (State({name!r}, …, derivative_of={of!r})), in the unit of {of} a second, and the twin computes it, too"
+    )
+
+
+def is_rate(one: Derived, signals: Signals) -> bool:
+    """Whether what is computed is the declared derivative of what it is computed of.
+
+    Args:
+        one: what is computed, and how.
+        signals: of the system.
+    """
+    slow = one.share * signals.dt / (1.0 - one.kept)
+    declared = signals.states[one.rate].derivative_of == signals.state_names[one.of]
+    return declared and abs(slow - 1.0) <= EXACT
 
 
 def froze(readings: Floats) -> bool:
@@ -107,22 +136,42 @@ def froze(readings: Floats) -> bool:
     return bool(usual > 0.0 and beside and min(beside) > at_once)
 
 
-def repeats(records: Sequence[Floats]) -> int:
-    """The number of periods in which a slow sensor gives a new reading; 1 where it gives one in each.
+def repeats(records: Sequence[Floats]) -> Held | None:
+    """When a slow sensor gives new readings; None where it gives one in each period.
 
     Args:
         records: of one state, a run each (n + 1,).
     """
-    fresh = [np.flatnonzero(np.diff(readings) != 0.0) for readings in records]
+    fresh = [np.flatnonzero(np.diff(readings) != 0.0) + 1 for readings in records]
     lengths = np.concatenate([np.diff(rows) for rows in fresh])
     if len(lengths) < FEWEST:
-        return 1
+        return None
     usual = int(np.bincount(lengths).argmax())
-    return usual if np.mean(lengths == usual) >= LIKE else 1
+    if usual < 2 or np.mean(lengths == usual) < LIKE:
+        return None
+    # Runs may begin at any time between two readings.
+    first = sorted((int(rows[0]) - 1) % usual + 1 for rows in fresh if len(rows))
+    return Held(usual, first[len(first) // 2])
 
 
-def derived(records: Sequence[Floats]) -> Iterator[tuple[int, int]]:
-    """States that are computed from the noisy readings of another one as a filtered difference, each with that one.
+class Derived(NamedTuple):
+    """A state that is a filtered difference of the readings of another: r[k] = kept r[k-1] + share (x[k] - x[k-1]).
+
+    Args:
+        rate: its place.
+        of: that of the other.
+        kept: below 1.
+        share: in its unit over the other's.
+    """
+
+    rate: int
+    of: int
+    kept: float
+    share: float
+
+
+def derived(records: Sequence[Floats]) -> Iterator[Derived]:
+    """States that are computed from the noisy or rounded readings of another one as a filtered difference.
 
     Args:
         records: of all states, a run each (n + 1, n_x).
@@ -130,9 +179,11 @@ def derived(records: Sequence[Floats]) -> Iterator[tuple[int, int]]:
     runs = [Run.of(states, np.zeros((len(states) - 1, 1))) for states in records]
     sizes = np.max([np.abs(states).max(axis=0) for states in records], axis=0)
     noise = np.sqrt(guessed_noise(runs, np.where(sizes > 0.0, sizes, 1.0)))
-    # What is exact, or never moves, says nothing of how it was made.
-    read = [i for i in range(records[0].shape[1]) if 0.0 < NOISY * sizes[i] < noise[i]]
-    for i in read:
+    noise = np.maximum(noise, [count([states[:, i] for states in records]) for i in range(len(sizes))])
+    moving = [i for i, size in enumerate(sizes) if size > 0.0]
+    # What is exact says nothing of what is made of it.
+    read = [i for i in moving if NOISY * sizes[i] < noise[i]]
+    for i in moving:
         for j in (j for j in read if j != i):
             columns = [np.stack([x[:-1, i], x[1:, j], x[:-1, j]], axis=1) for x in records]
             rows, wanted = np.concatenate(columns), np.concatenate([x[1:, i] for x in records])
@@ -149,9 +200,22 @@ def derived(records: Sequence[Floats]) -> Iterator[tuple[int, int]]:
             kept = (right[0] * squares[1] - right[1] * across) / determinant
             share = (right[1] * squares[0] - right[0] * across) / determinant
             left = np.sort(np.abs(wanted - kept * last - share * change))
+            found = Derived(i, j, max(0.0, kept / float(sizes[i])), share / float(sizes[j]))
             # A filter may begin anywhere.
-            if left[int(MOST_ROWS * len(left))] < DERIVED * noise[i] and kept < FORGETS * sizes[i]:
-                yield i, j
+            passed = DERIVED * found.share * float(noise[j])
+            if left[int(MOST_ROWS * len(left))] < passed and found.kept < FORGETS:
+                yield found
+
+
+def count(records: Sequence[Floats]) -> float:
+    """What a rounded sensor's reading changes by at least, 0 for one that is not: hardly any of its readings repeats.
+
+    Args:
+        records: of one state, a run each (n + 1,).
+    """
+    readings = np.concatenate(records)
+    values = np.unique(readings)
+    return float(np.diff(values).min()) if 1 < len(values) < REPEATED * len(readings) else 0.0
 
 
 def ratio(records: Sequence[Floats]) -> float:

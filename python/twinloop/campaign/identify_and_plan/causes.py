@@ -39,8 +39,10 @@ from twinloop.campaign.replaying import cut, start_of
 from twinloop.identification.identified import Identified
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.offsets import moved
+from twinloop.identification.sensors.reported import as_sensed
 from twinloop.identification.settings import IdentificationOptions
 from twinloop.law.flight import drawn_runs
+from twinloop.law.reports import reports_of
 from twinloop.signals import Signals
 
 Predictions = Sequence[tuple[Floats, Floats, Floats]]
@@ -58,15 +60,18 @@ LATEST = 12
 
 
 def runs_of(identified: Identified, experiments: Sequence[Experiment], signals: Signals) -> list[Run]:
-    """Flights as a twin takes them: with all sensors read at once.
+    """Flights as a twin takes them: with all sensors read at once, and without what is computed of readings.
 
     Args:
         identified: with the sensors' offsets.
         experiments: that were flown.
         signals: of the system.
     """
-    runs = [Run.of(run.trajectory.states, run.trajectory.commands).continued(signals) for run in experiments]
-    return moved(runs, signals, identified.offsets)
+    reports = reports_of(identified.model, signals.n_x)
+    logged = [
+        Run.of(run.trajectory.states, run.trajectory.commands).continued(signals) for run in experiments
+    ]
+    return moved([as_sensed(run, reports, signals) for run in logged], signals, identified.offsets)
 
 
 def observed(

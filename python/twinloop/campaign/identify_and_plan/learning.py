@@ -10,6 +10,7 @@ from twinloop import _core
 from twinloop._ground.steps import Watch
 from twinloop._ground.streams import Unit
 from twinloop.campaign.data.levels import levels_of
+from twinloop.campaign.data.reports import reports_in
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.answer import Answer
 from twinloop.campaign.identify_and_plan.elsewhere import DRAWN, lasting_under
@@ -176,6 +177,7 @@ class Learner:
             rests=resting_commands(self.setup, [one.experiment for one in selected]),
             axes=self._axes(),
             levels=levels_of([one.experiment for one in selected], self.setup.signals),
+            reports=reports_in([one.experiment.trajectory for one in selected], self.setup.signals),
             seed=self.setup.seed,
             workers=self.workers,
             watch=self.watch,

@@ -21,6 +21,7 @@ from twinloop.campaign.replaying import as_flown, lengths_of
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
 from twinloop.law.pieces import held
+from twinloop.law.reports import reports_of
 from twinloop.test import Test
 
 DRAWS = 8
@@ -161,9 +162,10 @@ def expected_misses(
         which the free run may be anywhere.
     """
     found = np.empty((len(flights), limits.signals.n_x))
+    reports = reports_of(model, limits.signals.n_x)
     for j, flight in enumerate(flights):
         steps = flight.trajectory.steps
-        seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"))
+        seen, moved = noise.drawn(DRAWS, steps, unit.part(j).stream("repeats"), reports)
         runs = drawn_runs(
             model,
             _begun_as_read(as_flown(model, flight, lengths[j])),

@@ -18,6 +18,7 @@ from twinloop.identification.search.structure import Sum
 from twinloop.identification.sensors.chains import Chain
 from twinloop.identification.sensors.noise import exact
 from twinloop.identification.terms.bounds import bounded_solution
+from twinloop.law.reports import with_reports
 
 PLAUSIBLE = 1.5
 """Multiple of the best model's χ² up to which another structure is a member."""
@@ -61,6 +62,8 @@ class Committee:
             members = [member.with_offsets(hypothesis.offsets.tolist()) for member in members]
         if context.levels:
             members = [member.with_levels(context.levels) for member in members]
+        if context.reports:
+            members = [with_reports(member, context.reports) for member in members]
         self.members, self.observer, self.of_parts = members, observer, bool(others)
 
 

@@ -51,6 +51,7 @@ def augmented(law: Law) -> Law:
         Actuation(law.actuation.actuators, law.actuation.hidden[: len(law.actuation.hidden) - count]),
         (*law.offsets, *[0.0] * count),
         law.levels,
+        (*law.reports, *[None] * count) if law.reports else (),
     )
 
 

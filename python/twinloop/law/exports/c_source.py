@@ -9,6 +9,7 @@ from twinloop.law.exports.c_outputs import functions_c, outputs_c
 from twinloop.law.exports.c_sensors import sensor_c, sensor_header
 from twinloop.law.exports.c_step import attitude_c, step_c
 from twinloop.law.exports.c_words import listed, number
+from twinloop.law.exports.left_out import left_out
 from twinloop.law.law import Law
 
 
@@ -39,9 +40,10 @@ def _header(law: Law, name: str, precision: str) -> str:
         for state, offset in zip(signals.state_names, law.offsets, strict=True)
         if offset != 0.0
     ]
+    others = [f"   {_comment(line)}" for line in left_out(law)]
     return "\n".join([
         f"/* A twin learnt by Twinloop {__version__}: one period of {signals.dt:g} s a call, no allocation.",
-        "   States:", *states, "   Commands:", *commands, *late, "*/",
+        "   States:", *states, "   Commands:", *commands, *late, *others, "*/",
         f"#ifndef {big}_H", f"#define {big}_H", "",
         f"#define {big}_STATES {signals.n_x}",
         f"#define {big}_COMMANDS {signals.n_u}",

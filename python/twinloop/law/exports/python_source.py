@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from twinloop._core import __version__
+from twinloop.law.exports.left_out import left_out
 from twinloop.law.exports.sensor_source import sensor_layout, sensor_source
 from twinloop.law.exports.step_source import step_source
 from twinloop.law.forms import DERIVATIVES, EULER
@@ -214,6 +215,7 @@ def layout(law: Law, actuated: bool) -> list[str]:
         for name, offset in zip(signals.state_names, law.offsets, strict=True)
         if offset != 0.0
     ]
+    lines += [f"# {line}." for line in left_out(law)]
     lines += sensor_layout(law)
     if law.form == "acceleration" and signals.kinematics is not None:
         lines.append(f"SUBSTEPS = {signals.substeps}  # of the integrator, in a period")

@@ -1,0 +1,81 @@
+"""Ages: how old the readings of slow sensors are when they are given, searched before anything else is learnt.
+
+A position from satellites, or from a camera, is that of a while ago. What drives the state is read in time, so the
+description of the readings is shortest at the true age.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from twinloop.identification.context import Context
+from twinloop.identification.description import shorter
+from twinloop.identification.forms import briefly_described
+from twinloop.identification.records import Run
+from twinloop.identification.sensors.reported import as_sensed
+from twinloop.law.reports import Held, Reports, old, reports_of
+
+LONGEST = 2.0
+"""Periods of the sensor that a reading is old at most."""
+COARSE = 0.25
+"""Step of the first ages that are tried, in such periods."""
+PRICE = 12.0
+"""What an age must gain in χ²: its number, and the choice of having one."""
+AGING = 500
+"""Number of the first trial, by which what it draws is told from what others draw."""
+
+
+def aged(context: Context, logged: Sequence[Run]) -> Reports:
+    """What is given of readings, with how old it is.
+
+    Sensors that are as slow as one another are one receiver's, and give readings of the same age.
+
+    Args:
+        context: of the identification, with what is given of readings.
+        logged: runs as they were logged.
+    """
+    reports, known = context.reports, context.earlier
+    if known is not None and context.settled:
+        before = reports_of(known.model, context.signals.n_x)
+        return old(
+            reports, [one.age if isinstance(one, Held) else 0 for one in before or [None] * len(reports)]
+        )
+    for every in dict.fromkeys(report.every for report in reports if isinstance(report, Held)):
+        reports = _of_one(context, logged, reports, every)
+    return reports
+
+
+def _of_one(context: Context, logged: Sequence[Run], reports: Reports, every: int) -> Reports:
+    """The same with the age of what gives a reading in so many periods."""
+    longest, step = int(LONGEST * every), max(1, round(COARSE * every))
+    lengths: dict[int, float] = {}
+
+    def length(age: int) -> float:
+        if age not in lengths:
+            tried = with_age(reports, every, age)
+            # The same readings count at any age.
+            runs = [as_sensed(run, tried, context.signals, ignored=longest) for run in logged]
+            price = PRICE if age else 0.0
+            lengths[age] = price + briefly_described(context, runs, AGING + age)
+        return lengths[age]
+
+    best = 0
+    for age in range(step, longest + 1, step):
+        if shorter(length(age), length(best)):
+            best = age
+        elif age - best >= 2 * step and best:
+            break
+    while best and step > 1:
+        step = (step + 1) // 2
+        for age in (best - step, best + step):
+            if 0 < age <= longest and shorter(length(age), length(best)):
+                best = age
+    return with_age(reports, every, best)
+
+
+def with_age(reports: Reports, every: int, age: int) -> Reports:
+    """The same with an age of what gives a reading in so many periods."""
+    return tuple(
+        report._replace(age=age) if isinstance(report, Held) and report.every == every else report
+        for report in reports
+    )
