@@ -14,6 +14,7 @@ from twinloop.law.law import Law
 from twinloop.law.linear.attitude import angles, quaternion, turning
 from twinloop.law.linear.dual import Dual
 from twinloop.law.linear.jacobian import jacobian
+from twinloop.law.linear.reports import as_given
 from twinloop.law.linear.sensors import as_read
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.linear.storage import fading, filling, settled
@@ -44,7 +45,7 @@ def linearised(law: Law, state: Floats, command: Floats, discrete: bool) -> Line
     plain = _period(law, state, command) if discrete else _instant(law, state, command)
     factors = 1.0 / np.array([each.size for each in law.signals.commands])
     point = np.concatenate([state, factors * command, settled(law, state)])
-    found = as_read(law, plain, _wrapped(law, point))
+    found = as_given(law.reports, as_read(law, plain, _wrapped(law, point)), law.signals.dt)
     if not (np.isfinite(found.A).all() and np.isfinite(found.B).all() and np.isfinite(found.drift).all()):
         raise NotAvailable(
             "Linearisation: expected a law with finite derivatives at the point, found one that overflows or has a"
