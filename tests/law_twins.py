@@ -92,14 +92,19 @@ TWINS = {
     "semi-implicit Euler": lambda: twin_of(PENDULUM, "semi-implicit-euler"),
     "semi-implicit Euler, actuators and hidden states": lambda: twin_of(
         FILLED, "semi-implicit-euler", inputs=5, offsets=(0.003, 0.0),
-        actuators=[(0.08, 2, None), (0.0, 1, 2.0)], hidden=[((0, 1), True, None, 0.7, (), False, 0.0)],
+        actuators=[(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)], hidden=[((0, 1), True, None, 0.7, (), False, 0.0)],
     ),
     "actuators and hidden states": lambda: twin_of(
         FILLED, inputs=5, offsets=(0.003, 0.0),
-        actuators=[(0.08, 2, None), (0.0, 1, 2.0)], hidden=[((0, 1), True, None, 0.7, (), False, 0.0)],
+        actuators=[(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)], hidden=[((0, 1), True, None, 0.7, (), False, 0.0)],
     ),
     "a lag at rest": lambda: twin_of(
-        FILLED, inputs=5, actuators=[(0.03, 0, 0.5), (0.2, 0, None)], hidden=[((1,), False, 0.25, 2.0, (), False, 0.0)],
+        FILLED, inputs=5, actuators=[(0.03, 0, 0.5, 0.0), (0.2, 0, None, 0.0)],
+        hidden=[((1,), False, 0.25, 2.0, (), False, 0.0)],
+    ),
+    "limited rates": lambda: twin_of(
+        FILLED, inputs=5, actuators=[(0.08, 1, None, 0.4), (0.0, 0, 0.5, 0.7)],
+        hidden=[((1,), False, 0.25, 2.0, (), False, 0.0)],
     ),
     "an angle that wraps": lambda: twin_of(TURNING, signals=WRAPPING),
     "an angle that wraps, step by step": lambda: twin_of(
@@ -113,11 +118,11 @@ TWINS = {
     ),
     "kinematics, semi-implicit Euler": lambda: twin_of(
         ["r7 = r6 * 2.0", "r8 = r3 * r5", "r9 = sin(r0)"], "semi-implicit-euler", BODY, inputs=7,
-        actuators=[(0.04, 1, 0.5)],
+        actuators=[(0.04, 1, 0.5, 0.0)],
     ),
     "kinematics in several steps": lambda: twin_of(
         ["r7 = r6 * 20.0", "r8 = r3 * r5", "r8 = r8 * -0.3", "r9 = sin(r0)"], signals=FAST_BODY, inputs=7,
-        actuators=[(0.04, 1, 0.5)],
+        actuators=[(0.04, 1, 0.5, 0.0)],
     ),
 }  # fmt: skip
 STORED = [
@@ -131,7 +136,7 @@ def stored_twin():
     """A pendulum whose torque twists a joint, and whose speed does."""
     lines = ["r6 = sin(r0)", "r6 = r6 * -9.0", "r7 = r4 * 3.0", "r6 = r6 + r7", "r7 = r5 * 20.0", "r6 = r6 - r7",
              "r7 = r5 * r3", "r6 = r6 + r7"]  # fmt: skip
-    return twin_of(lines, inputs=6, actuators=[(0.08, 1, None), (0.0, 0, None)], hidden=STORED)
+    return twin_of(lines, inputs=6, actuators=[(0.08, 1, None, 0.0), (0.0, 0, None, 0.0)], hidden=STORED)
 
 
 ALL = pytest.mark.parametrize("which", TWINS)

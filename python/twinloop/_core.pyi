@@ -12,7 +12,7 @@ _Instruction = tuple[str, int, int, int | float | None]
 """(operation, destination, first, second): a register an int, a constant a float, no operand None."""
 _Counters = tuple[int, int, int, int, int, int]
 """Seed, iteration, generation, evaluations, spared offspring, generations with a capped archive."""
-_Actuator = tuple[float, int, float | None]
+_Actuator = tuple[float, int, float | None, float]
 """Lag (s), delay (periods), and the command whose effect is there at the start of a run; None: the first one."""
 _Hidden = tuple[Sequence[int], bool, float | None, float, Sequence[int], bool, float]
 """Commands, whether squares fill it, the mean at rest (scaled; None: of the first period), time (s), states that fill

@@ -78,6 +78,7 @@ ABLATIONS: dict[str, Ablation] = {
     "contacts": Ablation("stops, backlash and other terms that begin at a place", {"contacts": False}),
     "friction": Ablation("dry friction", {"friction": False}),
     "lags": Ablation("lags and delays", {"lags": False}),
+    "ramps": Ablation("limited rates of actuators", {"ramps": False}),
     "apart": Ablation("separate lags of alike commands", {"apart": False}),
     "at-once": Ablation("lags dropped that are tuned to nearly 0", {"at_once": False}),
     "hidden": Ablation("a hidden state that commands drive", {"hidden": False}),

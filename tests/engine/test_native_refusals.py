@@ -62,7 +62,7 @@ class World:
         head = f"program inputs={n_x + n_u} outputs={n_x} registers={2 * n_x + n_u}\npage 1\n"
         self.law = _core.Program.parse(head + "\n".join(constants) + "\n")
         self.constants = [0.25] * n_x
-        self.actuators = [(0.1 * dt, 1, 0.0)] * n_u
+        self.actuators = [(0.1 * dt, 1, 0.0, 0.0)] * n_u
         self.model = _core.Model(self.law, "absolute", self.signals, self.actuators)
         self.start, self.target = np.zeros(n_x), np.full(n_x, 0.5)
         self.task = _core.Task(self.start, self.target, 4)

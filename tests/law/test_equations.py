@@ -260,7 +260,9 @@ def perturbed(law, share):
     """The law with each constant, lag, time and offset a little larger."""
     program = str(law.model().program)
     program = re.sub(r"-?\d+\.\d+(?:e-?\d+)?", lambda m: repr(float(m[0]) * (1.0 + share)), program)
-    actuators = [(each.lag * (1.0 + share), each.delay, each.rest) for each in law.actuation.actuators]
+    actuators = [
+        (each.lag * (1.0 + share), each.delay, each.rest, each.ramp) for each in law.actuation.actuators
+    ]
     hidden = [each._replace(time=each.time * (1.0 + share)) for each in law.actuation.hidden]
     offsets = [offset * (1.0 + share) for offset in law.offsets]
     signals = law.signals
@@ -310,8 +312,9 @@ def test_each_line_of_every_form_is_read_by_sympy_and_has_its_deviation(which, d
     if digits == 17:
         return
     head, body = text.split("\n\n")
-    lags = {each for each in law.actuation.actuators if each.lag > 0.0}
-    assert head.count("±") == 1 + len(lags) + np.count_nonzero(law.offsets)
+    slow = {each for each in law.actuation.actuators}
+    numbers = sum((each.lag > 0.0) + (each.ramp > 0.0) for each in slow)
+    assert head.count("±") == 1 + numbers + np.count_nonzero(law.offsets)
     for left, right, said in blocks(body):
         part = re.fullmatch(r"t_*\d+", left)  # whose constants have theirs where it is used
         constants = re.findall(r"(?<![\w*])\d", right)
@@ -395,7 +398,7 @@ def member(drag, lag=0.0, inside=None, extra=()):
     lines = [f"r4 = r1 * {drag}", *extra]
     if inside is not None:
         lines += [f"r5 = r0 * {inside}", "r5 = sin(r5)", "r5 = r5 * -3.0", "r4 = r4 + r5"]
-    actuators = [(lag, 0, None), (0.0, 0, None)] if lag else None
+    actuators = [(lag, 0, None, 0.0), (0.0, 0, None, 0.0)] if lag else None
     return law_of(parsed(4, 1, 6, lines), "acceleration", actuators=actuators)
 
 
@@ -423,6 +426,21 @@ def test_constants_inside_functions_and_lags_have_theirs():
     assert f"a lag of 0.05 ± {np.std(lags, ddof=1):.2g} s" in text
 
 
+def test_a_limited_rate_is_told_in_the_unit_of_its_command():
+    lines = ["r4 = r1 * -0.5"]
+    laws = [
+        law_of(parsed(4, 1, 6, lines), "acceleration", actuators=[(0.0, 0, None, ramp), (0.0, 0, None, 0.0)])
+        for ramp in (0.5, 0.4)
+    ]
+    text = " ".join(equations(laws[0], laws).replace("#", "").split())
+    size, unit = laws[0].signals.commands[0].size, laws[0].signals.commands[0].unit or "1"
+    name, rates = laws[0].signals.command_names[0], [size / 0.5, size / 0.4]
+    assert (
+        f"{name}: act with a rate of at most {rates[0]:g} ± {np.std(rates, ddof=1):.2g} {unit}/s, from"
+        in text
+    )
+
+
 def test_a_constant_that_all_members_have_alike_does_not_differ_by_the_rounding_of_a_mean():
     # The mean of six numbers 0.1 is not 0.1.
     assert np.std([0.1] * 6, ddof=1) > 0.0
@@ -444,7 +462,9 @@ def test_terms_that_share_a_constant_share_a_line_and_its_deviation():
 def test_a_hidden_state_has_an_equation_that_sympy_reads():
     program = parsed(5, 1, 6, ["r5 = r4 * 2.0"])
     hidden = [((0, 1), True, 0.25, 3.0, (), False, 0.0)]
-    model = _core.Model(program, "acceleration", SIGNALS.engine, [(0.0, 0, None)] * 2, hidden, (0.004, 0.0))
+    model = _core.Model(
+        program, "acceleration", SIGNALS.engine, [(0.0, 0, None, 0.0)] * 2, hidden, (0.004, 0.0)
+    )
     text = equations(Law.of(model, SIGNALS))
     assert "d hidden / dt = u_scaled**2/2 + t1**2/2 - 0.25 - hidden/3" in text
     assert "# x is read 0.004 s later" in text

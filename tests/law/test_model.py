@@ -114,9 +114,9 @@ def test_a_program_of_another_shape_is_no_model(rig):
 def test_commands_or_states_fill_a_hidden_state_and_only_states_settle_or_turn_it(rig, wrong):
     program = _core.Program.parse(program_text(5, 2, 7, [["r5 = r4 + 0.0"]]))
     for right in (([0], True, None, 0.3, [], False, 0.0), ([], False, 0.5, 0.3, [1], True, 0.0)):
-        assert _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2, [right]).hidden == [right]
+        assert _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2, [right]).hidden == [right]
     with pytest.raises(InvalidInput, match="hidden state: expected"):
-        _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2, [wrong])
+        _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2, [wrong])
 
 
 def test_rows_of_another_width_are_refused(rig):

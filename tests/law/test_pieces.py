@@ -126,7 +126,7 @@ def gusty(truth, seed=0):
     target = np.zeros((STEPS + 1, 2))
     target[:, 0] = 0.5 * np.sign(np.sin(4.0 * SIGNALS.dt * np.arange(STEPS + 1)))
     test = tl.Test(family, family.genes({"lean.kp": -2.5, "lean.kd": -0.6}), np.zeros(2), target, STEPS)
-    seen, moved = noise.drawn(1, STEPS, Unit(seed).part(1).stream("repeats"))
+    seen, moved = noise.drawn(1, STEPS, Unit(seed).part(1).stream("repeats"), ())
     run = fly(truth, test, noise=seen[0], disturbance=moved[0], limits=LIMITS)
     assert run.steps == STEPS
     return run, noise
@@ -171,7 +171,7 @@ def test_what_a_twin_says_of_a_log_is_that_of_the_pieces():
 def test_a_replay_goes_on_from_its_anchors_and_its_lag_as_it_was():
     lag = _core.Model(
         _core.Program.parse(program_text(3, 1, 4, [["r3 = r2 * 4.0"]])), "acceleration", SIGNALS.engine,
-        actuators=[(0.5, 0, 0.0)],
+        actuators=[(0.5, 0, 0.0, 0.0)],
     )  # fmt: skip
     commands = np.ones((100, 1))
     anchors = np.full((101, 2), np.nan)

@@ -26,7 +26,7 @@ SWINGING = [((), False, 0.25, 0.4, (1,), True, 0.11)] * 2
 
 def linear_twin(form="acceleration", hidden=STORED):
     lines = LINEAR if form in DERIVATIVES else STEPPED
-    return twin_of(lines, form, inputs=6, actuators=[(0.0, 0, None)] * 2, hidden=hidden)
+    return twin_of(lines, form, inputs=6, actuators=[(0.0, 0, None, 0.0)] * 2, hidden=hidden)
 
 
 def test_a_free_run_is_the_solution_of_its_equations():
@@ -115,7 +115,7 @@ def test_at_an_instant_what_is_stored_is_filled_by_the_state_and_empties():
 def turning_twin():
     stored = [((), False, 0.0, 0.3, (3,), False, 0.0)]
     lines = ["r8 = r6 * 2.0", "r11 = r7 * -30.0", "r8 = r8 + r11"]
-    return twin_of(lines, signals=BODY, inputs=8, actuators=[(0.0, 0, None)], hidden=stored)
+    return twin_of(lines, signals=BODY, inputs=8, actuators=[(0.0, 0, None, 0.0)], hidden=stored)
 
 
 def test_a_body_that_turns_stores_as_well():

@@ -4,6 +4,7 @@ from collections import deque
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -19,7 +20,8 @@ QUIET = (0.0, 0.0, 1.0)
 class Line:
     """One actuator: whole periods of delay, then a first-order lag, solved exactly within each period."""
 
-    def __init__(self, lag, delay, rest):
+    def __init__(self, lag, delay, rest, ramp):
+        assert ramp == 0.0
         self.lag, self.delay, self.rest, self.waiting = lag, delay, rest, None
 
     def effects(self, command, dt):
@@ -37,9 +39,9 @@ class Line:
 
 
 ACTUATORS = [
-    [(0.08, 0, None), (0.0, 2, None)],
-    [(0.03, 3, 0.5), (0.2, 0, -1.0)],
-    [(0.0, 0, None), (0.5, 1, 0.0)],
+    [(0.08, 0, None, 0.0), (0.0, 2, None, 0.0)],
+    [(0.03, 3, 0.5, 0.0), (0.2, 0, -1.0, 0.0)],
+    [(0.0, 0, None, 0.0), (0.5, 1, 0.0, 0.0)],
 ]
 
 
@@ -53,6 +55,25 @@ def test_the_effects_of_commands_are_those_of_a_plain_loop(actuators):
     )
     for stage in range(3):
         np.testing.assert_allclose(found[stage], expected[:, :, stage], rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.13])
+def test_effects_that_move_at_a_limited_rate_are_those_of_scipy(lag):
+    commands = np.repeat(np.random.default_rng(0).normal(size=(8, 1)), 4, axis=0)
+    ramp, scale = 0.6, 2.0
+    found = _core.command_effects([(lag, 1, 0.5, ramp)], [], [scale], DT, commands)
+    rate, value, sent = scale / ramp, 0.5, [0.5, *commands[:-1, 0]]
+    for k, command in enumerate(sent):
+
+        def moves(_, e, command=command):
+            return np.clip((command - e) / max(lag, 1e-6), -rate, rate)
+
+        run = solve_ivp(
+            moves, (0.0, DT), [value], "LSODA", [0.0, DT / 2, DT], rtol=1e-9, atol=1e-9, max_step=DT / 50
+        )
+        assert [stage[k, 0] for stage in found] == pytest.approx(run.y[0].tolist(), abs=2e-5)
+        value = float(found[2][k, 0])
+    assert np.abs(np.diff(found[2][:, 0])).max() == pytest.approx(rate * DT)
 
 
 @pytest.mark.parametrize("actuators", ACTUATORS)
@@ -130,7 +151,7 @@ def test_hidden_states_are_those_of_a_plain_loop(hidden):
         np.testing.assert_allclose(found[stage][:, 2:], expected[:, :, stage], rtol=1e-6, atol=1e-8)
 
 
-@pytest.mark.parametrize("actuators", [[(0.0, 0, None)] * 2, ACTUATORS[1]])
+@pytest.mark.parametrize("actuators", [[(0.0, 0, None, 0.0)] * 2, ACTUATORS[1]])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_setting, form, actuators):
     hidden, scales = HIDDEN[2], np.array([1.0, 4.0])
@@ -184,18 +205,18 @@ def test_a_model_with_hidden_states_flies_as_a_plain_loop_does(rig, rig_setting,
 def test_hidden_states_that_there_are_none_of_are_refused(rig, hidden):
     program = _core.Program.parse(program_text(5, 2, 7, [["r5 = r2 + 0.0"]]))
     with pytest.raises(ValueError, match="expected"):
-        _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2, [hidden])
+        _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2, [hidden])
     with pytest.raises(ValueError, match="actuators: expected one for each of 2 commands, found 0"):
         _core.Model(program, "absolute", rig, None, [([0], True, None, 1.0, [], False, 0.0)])
     with pytest.raises(ValueError, match="expected a program of 4 inputs"):
-        _core.Model(program, "absolute", rig, [(0.0, 0, None)] * 2)
+        _core.Model(program, "absolute", rig, [(0.0, 0, None, 0.0)] * 2)
 
 
 def test_actuators_that_act_at_once_are_none(rig, rig_setting):
     program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r2 + 0.0", "r5 = r3 + 0.0"]]))
     plain, direct = (
         _core.Model(program, "absolute", rig),
-        _core.Model(program, "absolute", rig, [(0.0, 0, 1.0)] * 2),
+        _core.Model(program, "absolute", rig, [(0.0, 0, 1.0, 0.0)] * 2),
     )
     assert direct.actuators == []
     task, genes = _core.Task([0.4, 0.0], [-0.2, 0.0], 9), np.ones((1, 6))
@@ -204,7 +225,13 @@ def test_actuators_that_act_at_once_are_none(rig, rig_setting):
 
 
 @pytest.mark.parametrize(
-    "actuators", [[(0.1, 0, None)], [(-0.1, 0, None)] * 2, [(0.1, 0, np.nan)] * 2, [(0.0, 1001, None)] * 2]
+    "actuators",
+    [
+        [(0.1, 0, None, 0.0)],
+        [(-0.1, 0, None, 0.0)] * 2,
+        [(0.1, 0, np.nan, 0.0)] * 2,
+        [(0.0, 1001, None, 0.0)] * 2,
+    ],
 )
 def test_actuators_that_there_are_none_of_are_refused(rig, actuators):
     program = _core.Program.parse(program_text(4, 2, 6, [["r4 = r2 + 0.0"]]))
@@ -285,7 +312,7 @@ def lagging(a, b, lag):
     """speed' = a speed + b u behind a lag, as a model with two constants."""
     signals = _core.Signals(DT, [5.0], [(-3.0, 3.0)], [1.0], [None])
     text = program_text(2, 1, 4, [["r2 = r0 * " + repr(a), "r3 = r1 * " + repr(b), "r2 = r2 + r3"]])
-    return _core.Model(_core.Program.parse(text), "acceleration", signals, [(lag, 0, 0.0)])
+    return _core.Model(_core.Program.parse(text), "acceleration", signals, [(lag, 0, 0.0, 0.0)])
 
 
 def flown(seed, steps=120, truth=(-1.3, 2.0, 0.12)):
@@ -300,7 +327,7 @@ def flown(seed, steps=120, truth=(-1.3, 2.0, 0.12)):
 
 def loop(a, b, lag, commands, state, correct):
     """Innovations and states of the model, each state corrected after its reading."""
-    line, errors, states = Line(lag, 0, 0.0), [], []
+    line, errors, states = Line(lag, 0, 0.0, 0.0), [], []
     for k in range(len(commands) + 1):
         state, error = correct(state, k)
         errors.append(error)
@@ -443,7 +470,7 @@ def test_a_gust_that_is_predicted_is_that_of_a_kalman_filter():
 def test_only_what_is_free_moves_and_the_rest_stays_to_the_bit():
     start = (-0.8, 2.0, 0.12)
     tuned, left, *_ = _core.tune(lagging(*start), LIMITS, CHAIN, [flown(1)], free=[0], lags=[], iterations=30)
-    assert tuned.constants[1] == 2.0 and tuned.actuators == [(0.12, 0, 0.0)]
+    assert tuned.constants[1] == 2.0 and tuned.actuators == [(0.12, 0, 0.0, 0.0)]
     assert tuned.constants[0] == pytest.approx(-1.3, rel=0.05)
     assert left < (residuals(start, [flown(1)]) ** 2).sum()
     same, *_ = _core.tune(lagging(*start), LIMITS, CHAIN, [flown(1)], free=[0, 1], lags=[[0]], iterations=0)
@@ -500,13 +527,13 @@ def test_the_time_of_a_hidden_state_is_tuned_with_the_constants():
         lines = ["r3 = r0 * " + repr(a), "r4 = r1 * " + repr(b), "r3 = r3 + r4", "r4 = r2 * " + repr(c)]
         text = program_text(3, 1, 5, [[*lines, "r3 = r3 + r4"]])
         hidden = [([0], True, 0.0, time, [], False, 0.0)]
-        return _core.Model(_core.Program.parse(text), "acceleration", signals, [(0.0, 0, None)], hidden)
+        return _core.Model(_core.Program.parse(text), "acceleration", signals, [(0.0, 0, None, 0.0)], hidden)
 
     stream, records, steps = np.random.default_rng(5), [], 160
     for _ in range(2):
         commands = np.repeat(stream.uniform(-2.0, 2.0, (steps // 10, 1)), 10, axis=0)
         inputs = _core.command_effects(
-            [(0.0, 0, None)], [([0], True, 0.0, truth[3], [], False, 0.0)], [1.0], DT, commands
+            [(0.0, 0, None, 0.0)], [([0], True, 0.0, truth[3], [], False, 0.0)], [1.0], DT, commands
         )
         states = [np.array([0.5])]
         for k in range(steps):

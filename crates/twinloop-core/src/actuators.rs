@@ -1,5 +1,5 @@
 //! Actuation: what stands between commands and a model. Each command has an actuator with a delay and a first-order
-//! lag; hidden states that commands fill may follow, and after these some that states fill.
+//! lag, which moves at a limited rate, de/dt = clip((u − e) / lag, ± rate); hidden states that commands fill may follow, and after these some that states fill.
 
 use crate::error::{Result, invalid};
 use crate::hidden::{Filling, Hidden};
@@ -14,21 +14,24 @@ pub struct Actuator {
     pub delay: usize,
     /// Command whose effect is there at the start of a run; none: the first one.
     pub rest: Option<f64>,
+    /// Time in which the effect moves by one scale of the command at most, s; 0 where no limit is known.
+    pub ramp: f64,
 }
 
 impl Actuator {
     /// A command that acts at once.
-    pub const DIRECT: Self = Self { lag: 0.0, delay: 0, rest: None };
+    pub const DIRECT: Self = Self { lag: 0.0, delay: 0, rest: None, ramp: 0.0 };
     /// More periods of delay than this are refused.
     pub const LONGEST_DELAY: usize = 1000;
 
     /// Refuses what no actuator has.
     pub fn validated(self) -> Result<Self> {
-        let finite = self.lag.is_finite() && self.lag >= 0.0 && self.rest.is_none_or(f64::is_finite);
-        if !finite || self.delay > Self::LONGEST_DELAY {
+        let time = |time: f64| time.is_finite() && time >= 0.0;
+        let fits = time(self.lag) && time(self.ramp) && self.rest.is_none_or(f64::is_finite);
+        if !fits || self.delay > Self::LONGEST_DELAY {
             return invalid(format!(
-                "actuator: expected a lag of at least 0 s, a delay of at most {} periods and a finite rest, found \
-                 {self:?}",
+                "actuator: expected a lag and a ramp of at least 0 s, a delay of at most {} periods and a finite rest, \
+                 found {self:?}",
                 Self::LONGEST_DELAY
             ));
         }
@@ -36,7 +39,7 @@ impl Actuator {
     }
 
     fn is_direct(&self) -> bool {
-        self.lag == 0.0 && self.delay == 0
+        self.lag == 0.0 && self.delay == 0 && self.ramp == 0.0
     }
 }
 
@@ -83,11 +86,18 @@ impl Actuation {
         self.actuators.is_empty()
     }
 
-    /// Lag of each actuator, then time of each hidden state, then the time in which each that has a partner turns, s.
+    /// Lag of each actuator, then time of each hidden state, then the time in which each that has a partner turns, then
+    /// the ramp of each actuator that has one, s.
     pub fn times(&self) -> Vec<f64> {
         let lags = self.actuators.iter().map(|actuator| actuator.lag);
         let times = self.hidden.iter().map(|hidden| hidden.time);
-        lags.chain(times).chain(self.hidden.iter().filter_map(Hidden::turns)).collect()
+        let turns = self.hidden.iter().filter_map(Hidden::turns);
+        lags.chain(times).chain(turns).chain(self.ramping().map(|i| self.actuators[i].ramp)).collect()
+    }
+
+    /// Commands whose effects move at a limited rate.
+    fn ramping(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.actuators.len()).filter(|&i| self.actuators[i].ramp > 0.0)
     }
 
     /// The same, each on so many lanes, lane by lane.
@@ -102,6 +112,8 @@ impl Actuation {
             return invalid(format!("lags: expected {expected}, found {}", times.len()));
         }
         let mut other = self.clone();
+        let (times, ramps) = times.split_at(expected - self.ramping().count());
+        self.ramping().zip(ramps).for_each(|(i, &ramp)| other.actuators[i].ramp = ramp);
         let (lags, rest) = times.split_at(self.actuators.len());
         let (rest, turns) = rest.split_at(self.hidden.len());
         let turning = other.hidden.iter_mut().filter_map(Hidden::turns_mut);
@@ -121,6 +133,8 @@ pub struct Line<V> {
     /// e^(−dt / 2 time) of each command's lag, then of each hidden state.
     halves: Vec<V>,
     memory: Vec<V>,
+    /// Of each command whose effect moves at a limited rate.
+    limited: Vec<Option<Limited<V>>>,
     /// Commands on their way, the oldest first, for each command.
     queues: Vec<Vec<V>>,
     /// Effect of each command, then each hidden state, at the start, the middle and the end of the period.
@@ -139,8 +153,16 @@ impl<V: Vector> Line<V> {
         let hidden: Vec<_> =
             (commands..).zip(hidden).map_while(|(i, one)| Filling::new(one, decays[i], gains[i])).collect();
         let effects = || zeros(commands + hidden.len());
+        let first = times.len() - actuation.ramping().count() * V::LANES;
+        let mut limited: Vec<_> = (0..commands).map(|_| None).collect();
+        for (i, ramp) in actuation.ramping().zip(times[first..].chunks_exact(V::LANES)) {
+            let rates: Vec<_> = ramp.iter().map(|ramp| 1.0 / (factors[i] * ramp)).collect();
+            let lag = V::load(&times[i * V::LANES..]);
+            limited[i] = Some(Limited { lag, rate: V::load(&rates), time: 0.5 * dt });
+        }
         Self {
             memory: zeros(commands),
+            limited,
             effects: [effects(), effects(), effects()],
             queues: actuators.iter().map(|actuator| Vec::with_capacity(actuator.delay + 1)).collect(),
             hidden,
@@ -169,12 +191,16 @@ impl<V: Vector> Line<V> {
             self.queues[i].push(command);
             let arrived = self.queues[i].remove(0);
             let start = self.memory[i];
-            let middle = arrived + (start - arrived) * self.halves[i];
-            let end = arrived + (middle - arrived) * self.halves[i];
+            let on_its_way = |from: V| match &self.limited[i] {
+                Some(limited) => limited.on_its_way(from, arrived),
+                None => arrived + (from - arrived) * self.halves[i],
+            };
+            let middle = on_its_way(start);
+            let end = on_its_way(middle);
             self.effects[0][i] = start;
             self.effects[1][i] = middle;
             self.effects[2][i] = end;
-            if self.actuators[i].lag == 0.0 {
+            if self.actuators[i].lag == 0.0 && self.actuators[i].ramp == 0.0 {
                 self.effects[0][i] = arrived;
             }
             self.memory[i] = end;
@@ -187,6 +213,40 @@ impl<V: Vector> Line<V> {
         }
         self.started = true;
     }
+}
+
+/// An actuator that moves at a limited rate, for a time.
+#[derive(Clone)]
+struct Limited<V> {
+    lag: V,
+    /// In units of the command, a second.
+    rate: V,
+    time: f64,
+}
+
+impl<V: Vector> Limited<V> {
+    /// The effect after the time under a command. Such actuators are rare, so each lane is moved by itself, and by a call.
+    #[inline(never)]
+    fn on_its_way(&self, from: V, to: V) -> V {
+        let mut found = [0.0; 64];
+        for (l, found) in found.iter_mut().enumerate().take(V::LANES) {
+            *found = moved(from.lane(l), to.lane(l), self.lag.lane(l), self.rate.lane(l), self.time);
+        }
+        V::load(&found)
+    }
+}
+
+/// An effect on its way from a value to a command: it moves at the rate until a lag would be slower.
+fn moved(from: f64, to: f64, lag: f64, rate: f64, time: f64) -> f64 {
+    let fading = |off: f64, time: f64| if lag > 0.0 { off * libm::exp(-time / lag) } else { 0.0 };
+    let beyond = (to - from).abs() - rate * lag;
+    if !(beyond > 0.0) {
+        return to - fading(to - from, time);
+    }
+    if beyond >= rate * time {
+        return from + (rate * time).copysign(to - from);
+    }
+    to - fading((rate * lag).copysign(to - from), time - beyond / rate)
 }
 
 /// For each time constant: the decay over half a period, e^(−dt / 2 time) or 0 for a time of 0, and the gain of its input.
@@ -247,7 +307,7 @@ mod tests {
     #[test]
     fn a_step_rises_as_one_minus_an_exponential() {
         let (lag, dt) = (0.05, 0.02);
-        let actuator = Actuator { lag, delay: 0, rest: Some(1.0) };
+        let actuator = Actuator { lag, rest: Some(1.0), ..Actuator::DIRECT };
         let [start, middle, end] = effects(&of(actuator), &[1.0], dt, &[3.0; 20]);
         for k in 0..20 {
             let expected = |t: f64| 3.0 - 2.0 * (-t / lag).exp();
@@ -262,12 +322,47 @@ mod tests {
     fn a_delay_shifts_commands_by_whole_periods_and_nothing_is_direct() {
         let commands: Vec<f64> = (0..10).map(f64::from).collect();
         let [start, _, end] =
-            effects(&of(Actuator { lag: 0.0, delay: 3, rest: Some(-1.0) }), &[1.0], 0.1, &commands);
+            effects(&of(Actuator { delay: 3, rest: Some(-1.0), ..Actuator::DIRECT }), &[1.0], 0.1, &commands);
         let expected = [-1.0, -1.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         assert_eq!(start, expected);
         assert_eq!(end, expected);
         let [start, middle, end] = effects(&of(Actuator::DIRECT), &[1.0], 0.1, &commands);
         assert!(start == commands && middle == commands && end == commands);
+    }
+
+    #[test]
+    fn a_limited_rate_holds_until_the_lag_is_slower() {
+        let (lag, rate, scale, dt, fine) = (0.05, 4.0, 2.0, 0.02, 20_000);
+        for lag in [lag, 0.0] {
+            let actuator = Actuator { lag, rest: Some(0.0), ramp: scale / rate, ..Actuator::DIRECT };
+            let commands: Vec<f64> = (0..40).map(|k| if k < 25 { 1.0 } else { -0.6 }).collect();
+            let found = effects(&of(actuator), &[1.0 / scale], dt, &commands);
+            let (mut state, step) = (0.0, dt / f64::from(fine));
+            for (k, command) in commands.iter().enumerate() {
+                for (part, found) in found.iter().enumerate() {
+                    assert!((found[k] - state).abs() < 1e-4, "{lag} {k} {part}: {} is not {state}", found[k]);
+                    for _ in 0..if part < 2 { fine / 2 } else { 0 } {
+                        let off: f64 = command - state;
+                        let wanted = if lag > 0.0 { off / lag } else { off / step };
+                        state += step * wanted.clamp(-rate, rate);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn limited_rates_are_the_last_of_the_times() {
+        let hidden =
+            Hidden { source: Source::Commands { commands: vec![0], rest: None }, squared: true, time: 2.0 };
+        let limited = Actuator { ramp: 0.5, ..Actuator::DIRECT };
+        let actuators = vec![Actuator { lag: 0.1, ..Actuator::DIRECT }, limited];
+        let actuation = Actuation { actuators, hidden: vec![hidden] }.validated(2, 1).unwrap();
+        assert_eq!(actuation.times(), [0.1, 0.0, 2.0, 0.5]);
+        let other = actuation.with_times(&[0.2, 0.0, 3.0, 0.25]).unwrap();
+        assert_eq!((other.actuators[1].ramp, other.times()), (0.25, vec![0.2, 0.0, 3.0, 0.25]));
+        assert!(Actuator { ramp: -1.0, ..Actuator::DIRECT }.validated().is_err());
+        assert!(Actuator { ramp: f64::NAN, ..Actuator::DIRECT }.validated().is_err());
     }
 
     #[test]

@@ -139,7 +139,7 @@ impl PyModel {
     /// (lag, delay, rest) of each command's actuator; empty where every command acts at once and nothing is hidden.
     #[getter]
     fn actuators(&self) -> Vec<ActuatorParts> {
-        self.0.frame().actuation().actuators.iter().map(|a| (a.lag, a.delay, a.rest)).collect()
+        self.0.frame().actuation().actuators.iter().map(|a| (a.lag, a.delay, a.rest, a.ramp)).collect()
     }
 
     /// (commands, squared, rest, time, states, settled, turns) of each hidden state.
@@ -196,8 +196,8 @@ impl PyModel {
     }
 }
 
-/// Lag, delay, rest.
-type ActuatorParts = (f64, usize, Option<f64>);
+/// Lag, delay, rest, ramp.
+type ActuatorParts = (f64, usize, Option<f64>, f64);
 /// State, periods from one new reading to the next, period of the first one after the start, and how old they are.
 type HeldParts = (usize, usize, usize, usize);
 /// State, the other one, and what is kept of the last value and added of its change.
@@ -206,7 +206,7 @@ type ComputedParts = (usize, usize, f64, f64);
 type HiddenParts = (Vec<usize>, bool, Option<f64>, f64, Vec<usize>, bool, f64);
 
 fn actuation(actuators: Vec<ActuatorParts>, hidden: Vec<HiddenParts>) -> Result<Actuation> {
-    let actuator = |(lag, delay, rest)| Actuator { lag, delay, rest };
+    let actuator = |(lag, delay, rest, ramp)| Actuator { lag, delay, rest, ramp };
     Ok(Actuation {
         actuators: actuators.into_iter().map(actuator).collect(),
         hidden: hidden.into_iter().map(filled).collect::<Result<_>>()?,
@@ -240,7 +240,7 @@ fn parts(hidden: &Hidden) -> HiddenParts {
     }
 }
 
-/// Effects of commands (n, n_u) in their units behind actuators (lag, delay, rest), then the hidden states that they
+/// Effects of commands (n, n_u) in their units behind actuators (lag, delay, rest, ramp), then the hidden states that they
 /// fill (commands, squared, rest, time, no states, not settled, no turns), at the start, the middle and the end of each period.
 #[pyfunction]
 pub fn command_effects<'py>(

@@ -212,6 +212,7 @@ class Lesson(Recorded, kind="lesson"):
             model error, not a disturbance.
         undecided: states whose correlated disturbance may also be a model error: the flights so far do not decide it.
         asked: the tests planned after it.
+        rates: at which each command's actuator moves at most, in the command's unit a second; 0 as with `lags`.
     """
 
     iteration: int
@@ -233,6 +234,7 @@ class Lesson(Recorded, kind="lesson"):
     recurring: tuple[str, ...] = ()
     undecided: tuple[str, ...] = ()
     asked: tuple[Planned, ...] = ()
+    rates: tuple[float, ...] = ()
 
     VERSION = 3
 

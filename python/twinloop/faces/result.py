@@ -233,6 +233,7 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) 
                 "name": command.name,
                 "lag": actuator.lag,
                 "delay": actuator.delay,
+                "rate": actuator.rate(command.size),
                 "identified": (actuator.lag, actuator.delay) == found,
             }
             for command, actuator, found in zip(

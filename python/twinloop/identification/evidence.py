@@ -12,7 +12,7 @@ from twinloop.law.actuation import Actuation
 from twinloop.law.forms import EULER
 
 LAGGING = 12.0
-"""What a lag or a delay must gain in description length, each: its number, and the choice of having one."""
+"""What a lag or a delay, or a limited rate, must gain in description length, each: its number, and the choice of it."""
 HIDING = 30.0
 """What a hidden state must gain: its time, its kind, and what a search may find by luck."""
 STANDING_IN = 30.0
@@ -91,7 +91,9 @@ def price(
         states: how many may fill a hidden state, empty or settled at the start, beside a group of commands or none.
         tuned: whether its constants were tuned on predictions.
     """
-    lagging = sum(any(not actuation.actuators[i].direct for i in group) for group in alike)
+    behind = [[actuation.actuators[i] for i in group] for group in alike]
+    lagging = sum(any(one.lag > 0.0 or one.delay > 0 for one in group) for group in behind)
+    lagging += sum(any(one.ramp > 0.0 for one in group) for group in behind)
     return (
         STEPPING * (form == "increment" or form in EULER)
         + LAGGING * lagging

@@ -63,6 +63,7 @@ class IdentificationOptions:
             backlash.
         friction: whether dry friction is searched.
         lags: whether lags and delays of the actuators are searched.
+        ramps: whether actuators may move at a limited rate.
         at_once: whether a lag that is tuned to nearly 0 is dropped.
         apart: whether commands of the same unit and bounds may have different lags.
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
@@ -117,6 +118,7 @@ class IdentificationOptions:
     contacts: bool = True
     friction: bool = True
     lags: bool = True
+    ramps: bool = True
     at_once: bool = True
     apart: bool = True
     longest_delay: int = 2

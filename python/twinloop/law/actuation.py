@@ -20,22 +20,30 @@ LONGEST_DELAY = 1000
 
 
 class Actuator(NamedTuple):
-    """The way from one command to its effect.
+    """The way from a command u to its effect e: de/dt = clip((u − e) / lag, ± rate).
 
     Args:
         lag: time constant of a first-order lag, s; 0 for none.
         delay: whole periods before a command begins to act.
         rest: command whose effect is there at the start of a run, in its unit; None: the first one.
+        ramp: time in which the effect moves by the command's scale at most, s: the scale over the rate; 0 where no
+            limit of the rate is known.
     """
 
     lag: float = 0.0
     delay: int = 0
     rest: float | None = None
+    ramp: float = 0.0
+
+    def rate(self, size: float) -> float:
+        """At which the effect moves at most, of a command of this scale, in its unit a second; 0: no limit is known."""
+        # As the engine does, to the bit.
+        return 1.0 / ((1.0 / size) * self.ramp) if self.ramp > 0.0 else 0.0
 
     @property
     def direct(self) -> bool:
         """Whether a command acts at once."""
-        return self.lag == 0.0 and self.delay == 0
+        return self.lag == 0.0 and self.delay == 0 and self.ramp == 0.0
 
 
 def in_periods(count: int) -> str:
@@ -103,7 +111,7 @@ class Actuation(Recorded, kind="actuation"):
     actuators: tuple[Actuator, ...]
     hidden: tuple[HiddenState, ...] = ()
 
-    VERSION = 3
+    VERSION = 4
 
     @staticmethod
     def direct(signals: Signals) -> Actuation:
@@ -148,8 +156,15 @@ class Actuation(Recorded, kind="actuation"):
 
     @classmethod
     def renewed(cls, record: Record) -> Record:
-        """A record of an earlier version, in which commands alone filled hidden states, or none turned."""
+        """A record of an earlier version, in which commands alone filled hidden states, none turned, or none ramped."""
         found = super().renewed(record)
+        if "actuators" in found:
+            bare = with_names(found["actuators"], Actuator._fields, 0.0)
+            found["actuators"] = (
+                [{"ramp": 0.0, **one} if isinstance(one, dict) else one for one in bare]
+                if isinstance(bare, list)
+                else bare
+            )
         if "hidden" in found:
             found["hidden"] = renewed_hidden(found["hidden"])
         return found
@@ -213,6 +228,7 @@ def delayed(model: _core.Model, signals: Signals, periods: float = 1.0) -> _core
 def _check_actuator(actuator: Actuator, where: str) -> None:
     """Refuses numbers that no actuator has."""
     at_least_zero(f"{where}.lag", actuator.lag)
+    at_least_zero(f"{where}.ramp", actuator.ramp)
     if whole(f"{where}.delay", actuator.delay) > LONGEST_DELAY:
         raise InvalidInput(
             f"{where}.delay: expected at most {LONGEST_DELAY} periods, found {actuator.delay}; change it."

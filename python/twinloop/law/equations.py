@@ -156,10 +156,16 @@ class Equations:
             if not actuator.direct:
                 alike.setdefault(actuator, []).append(place)
         lines = []
-        for (lag, delay, rest), places in alike.items():
-            lags = [member.actuation.actuators[places[0]].lag for member in self.members]
-            parts = [f"a lag of {self.writer.number(lag)}{self._deviation(lags)} s"] if lag > 0.0 else []
+        for (lag, delay, rest, ramp), places in alike.items():
+            of_members = [member.actuation.actuators[places[0]] for member in self.members]
+            lags = self._deviation([each.lag for each in of_members])
+            parts = [f"a lag of {self.writer.number(lag)}{lags} s"] if lag > 0.0 else []
             parts += [f"a delay of {in_periods(delay)}"] if delay else []
+            if ramp > 0.0:
+                command = self.signals.commands[places[0]]
+                rates = self._deviation([each.rate(command.size) for each in of_members])
+                unit = f"{command.unit or '1'}/s"
+                parts.append(f"a rate of at most {self.writer.number(command.size / ramp)}{rates} {unit}")
             start = "the first command" if rest is None else self.writer.number(rest)
             names = ", ".join(self.signals.command_names[place] for place in places)
             lines.append(f"{names}: act with {' and '.join(parts)}, from {start} at the start")

@@ -35,7 +35,7 @@ def model_record(model: _core.Model) -> dict[str, Any]:
     record: dict[str, Any] = {
         "program": str(model.program),
         "form": model.form,
-        "actuators": [dict(zip(ACTUATOR_KEYS, actuator, strict=True)) for actuator in model.actuators],
+        "actuators": [_actuator_record(*actuator) for actuator in model.actuators],
         "hidden": [_hidden_record(*hidden) for hidden in model.hidden],
     }
     if model.offsets:
@@ -104,10 +104,16 @@ def _reports(
     return held, computed
 
 
-def _actuator(value: object, where: str) -> tuple[float, int, float | None]:
-    found = keys(value, ACTUATOR_KEYS, where)
+def _actuator_record(lag: float, delay: int, rest: float | None, ramp: float) -> dict[str, Any]:
+    record: dict[str, Any] = dict(zip(ACTUATOR_KEYS, (lag, delay, rest), strict=True))
+    return {**record, "ramp": ramp} if ramp else record
+
+
+def _actuator(value: object, where: str) -> tuple[float, int, float | None, float]:
+    found = keys(value, ACTUATOR_KEYS, where, optional=("ramp",))
     delay = read_whole(found["delay"], f"{where}.delay")
-    return read_number(found["lag"], f"{where}.lag"), _count(delay, where), _rest(found["rest"], where)
+    ramp = read_number(found.get("ramp", 0.0), f"{where}.ramp")
+    return read_number(found["lag"], f"{where}.lag"), _count(delay, where), _rest(found["rest"], where), ramp
 
 
 def _hidden_record(

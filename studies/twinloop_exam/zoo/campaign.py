@@ -187,6 +187,7 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
             "false": [name for name in structures if name not in plant.has],
             "lags": list(lesson.lags),
             "delays": list(lesson.delays),
+            "rates": list(lesson.rates),
             "offsets": list(lesson.offsets),
             "hidden": [list(each) for each in lesson.hidden],
             "sensors": list(lesson.sensors),

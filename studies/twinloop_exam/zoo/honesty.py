@@ -31,7 +31,7 @@ CONFIDENT = re.compile(r"\b(all models agree|models agree|confirms)\b", re.IGNOR
 def found(twin: Twin, lesson: Lesson) -> list[str]:
     """The structures that a lesson has found, of `plant.STRUCTURES`."""
     present = {
-        "actuator": any(lesson.lags) or any(lesson.delays),
+        "actuator": any(lesson.lags) or any(lesson.delays) or any(lesson.rates),
         "offset": any(lesson.offsets),
         "hidden": bool(lesson.hidden),
         "lasting": any(each.cause == "disturbance" for each in disturbances(twin, lesson)),

@@ -36,7 +36,7 @@ def hostile(unit):
     )
     return twin_of(
         ["r4 = sin(r0)", "r5 = r2 * 11.0", "r4 = r5 - r4"], signals=signals, offsets=(0.003, 0.0),
-        actuators=[(0.08, 2, None), (0.0, 1, 2.0)],
+        actuators=[(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)],
     )  # fmt: skip
 
 

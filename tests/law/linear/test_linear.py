@@ -85,7 +85,7 @@ def test_kinematics_are_among_the_equations(usual, form):
 
 
 ACTUATED = {
-    "actuators": [(0.08, 2, None), (0.0, 1, 2.0)],
+    "actuators": [(0.08, 2, None, 0.0), (0.0, 1, 2.0, 0.0)],
     "hidden": [((0, 1), True, None, 0.7, (), False, 0.0)],
     "inputs": 5,
 }
@@ -215,7 +215,7 @@ def test_a_controller_on_a_bound_is_refused():
 # Margins
 
 
-def loops(ki=0.5, kp=1.5, kd=0.3, actuators=((0.05, 1, None), (0.0, 0, None))):
+def loops(ki=0.5, kp=1.5, kd=0.3, actuators=((0.05, 1, None, 0.0), (0.0, 0, None, 0.0))):
     law = Law.of(twin(PENDULUM, actuators=list(actuators)).model, SIGNALS)
     target = np.array([0.4, 0.0])
     family = pid("rate")
@@ -269,11 +269,14 @@ def test_an_oscillation_without_damping_is_no_edge(stiffness):
 
 
 def test_at_its_delay_margin_too():
-    delay = loops(actuators=((0.05, 0, None), (0.0, 0, None)))[0].margins(0, "angle").delay
+    delay = loops(actuators=((0.05, 0, None, 0.0), (0.0, 0, None, 0.0)))[0].margins(0, "angle").delay
     periods = delay / 0.05
     below, above = math.floor(periods), math.ceil(periods)
     for steps, stable in ((below, True), (above, False)):
-        assert loops(actuators=((0.05, steps, None), (0.0, 0, None)))[0].margins(0, "angle").stable is stable
+        assert (
+            loops(actuators=((0.05, steps, None, 0.0), (0.0, 0, None, 0.0)))[0].margins(0, "angle").stable
+            is stable
+        )
 
 
 def test_the_margins_of_a_campaign_are_those_of_its_twin_and_the_worst_of_its_committee():

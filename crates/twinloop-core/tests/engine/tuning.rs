@@ -209,7 +209,7 @@ fn a_lag_is_found_from_a_step_response() {
     let states: Vec<f64> =
         (0..=steps).map(|k| f64::from(k) * DT).map(|t| t - lag * (1.0 - (-t / lag).exp())).collect();
     let limits = limits();
-    let actuator = Actuator { lag: 0.4, delay: 0, rest: Some(0.0) };
+    let actuator = Actuator { lag: 0.4, rest: Some(0.0), ..Actuator::DIRECT };
     let actuation = Actuation { actuators: vec![actuator], hidden: vec![] };
     let frame = Frame::new(Form::Acceleration, limits.signals()).with_actuation(actuation).unwrap();
     let record = Recorded { weights: vec![1.0; states.len()], commands: vec![1.0; steps as usize], states };

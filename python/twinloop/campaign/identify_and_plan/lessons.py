@@ -56,6 +56,9 @@ def lesson_of(
         sensors=tuple(identified.sensors(signals.n_x).tolist()),
         lags=tuple(actuator.lag for actuator in actuators),
         delays=tuple(actuator.delay for actuator in actuators),
+        rates=tuple(
+            actuator.rate(command.size) for actuator, command in zip(actuators, signals.commands, strict=True)
+        ),
         hidden=identified.actuation.hidden,
         offsets=tuple(identified.offsets.tolist()),
         closed_loop=tuple(each.error for each in free),

@@ -50,4 +50,6 @@ def _late(actuator: Actuator) -> str:
     parts = [f"lag {actuator.lag:.3g} s"] if actuator.lag else []
     if actuator.delay:
         parts.append(f"delay {in_periods(actuator.delay)}")
+    if actuator.ramp:
+        parts.append("a limited rate")
     return ", ".join(parts)

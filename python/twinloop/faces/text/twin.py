@@ -93,18 +93,19 @@ def _disturbances(disturbances: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
-    """Lags and delays in words; commands that have the same are named together."""
-    groups: dict[tuple[float, int, bool], list[str]] = {}
+    """Lags, delays and rates in words; commands that have the same are named together."""
+    groups: dict[tuple[float, int, float, bool], list[str]] = {}
     for actuator in actuators:
-        kind = actuator["lag"], actuator["delay"], actuator.get("identified", True)
+        kind = actuator["lag"], actuator["delay"], actuator.get("rate", 0.0), actuator.get("identified", True)
         groups.setdefault(kind, []).append(actuator["name"])
-    if list(groups) == [(0.0, 0, True)]:
+    if list(groups) == [(0.0, 0, 0.0, True)]:
         return "Actuators: no lag and no delay found."
     words = []
-    for (lag, delay, identified), names in groups.items():
+    for (lag, delay, rate, identified), names in groups.items():
         slow = f"lag {lag:.3g} s" if lag else "no lag"
         late = f"delay {in_periods(delay)}" if delay else "no delay"
-        words.append(f"{', '.join(names)}: {slow}, {late}{'' if identified else f' ({STAND_IN})'}")
+        limited = f", at most {rate:.3g} a second" if rate else ""
+        words.append(f"{', '.join(names)}: {slow}, {late}{limited}{'' if identified else f' ({STAND_IN})'}")
     return f"Actuators: {'; '.join(words)}."
 
 

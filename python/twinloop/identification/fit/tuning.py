@@ -81,7 +81,7 @@ def tune(
 
 
 def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals) -> list[list[int]]:
-    """Groups of lags, of times of hidden states and of those in which pairs turn, each of which is one number."""
+    """Groups of lags, times of hidden states, those in which pairs turn, and ramps, each of which is one number."""
     actuation = Actuation.of(model, signals)
     lags = [list(group) for group in hypothesis.alike if actuation.actuators[group[0]].lag > 0.0]
     # Hidden states that begin with one time keep one.
@@ -93,7 +93,12 @@ def moving_together(model: _core.Model, hypothesis: Hypothesis, signals: Signals
         for first, each in ((signals.n_u, times), (signals.n_u + len(times), turns))
         for time in dict.fromkeys(each)
     ]
-    return lags + groups
+    first = signals.n_u + len(times) + len(turns)
+    places = {
+        i: first + j for j, i in enumerate(i for i, one in enumerate(actuation.actuators) if one.ramp > 0.0)
+    }
+    ramps = [[places[i] for i in group] for group in hypothesis.alike if group[0] in places]
+    return lags + groups + ramps
 
 
 def _forgetting(model: _core.Model, signals: Signals, longest: float) -> tuple[_core.Model, set[int]]:
@@ -102,6 +107,7 @@ def _forgetting(model: _core.Model, signals: Signals, longest: float) -> tuple[_
     times = [actuator.lag for actuator in actuation.actuators] + [state.time for state in actuation.hidden]
     times += [state.turns for state in actuation.hidden if state.turns > 0.0]
     endless = {place for place, time in enumerate(times) if place >= signals.n_u and time > longest}
+    times += [actuator.ramp for actuator in actuation.actuators if actuator.ramp > 0.0]
     if endless:
         times = [longest if place in endless else time for place, time in enumerate(times)]
         model = model.with_constants(model.constants.tolist(), times)

@@ -10,7 +10,7 @@ from twinloop.identification.evidence import by_evidence
 from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.hypothesis import Hypothesis
 from twinloop.identification.search.selection import climbed, from_both_sides
-from twinloop.law.actuation import Actuator, one_by_one
+from twinloop.law.actuation import one_by_one
 
 
 def apart(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
@@ -39,8 +39,8 @@ def apart(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 def _undelayed(context: Context, hypothesis: Hypothesis, group: Sequence[int]) -> Iterator[Hypothesis]:
     """The hypothesis with a longer lag in place of a delay, which may have stood in for the lag of some of a group."""
     actuators = list(hypothesis.actuation.actuators)
-    lag, delay, rest = actuators[group[0]]
+    lag, delay, _, _ = actuators[group[0]]
     if delay:
         for i in group:
-            actuators[i] = Actuator(lag + delay * context.signals.dt, 0, rest)
+            actuators[i] = actuators[i]._replace(lag=lag + delay * context.signals.dt, delay=0)
         yield replace(hypothesis, actuation=replace(hypothesis.actuation, actuators=tuple(actuators)))

@@ -20,8 +20,8 @@ def at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         return
     actuation = hypothesis.actuation
     for group in hypothesis.alike:
-        lag, delay, _ = actuation.actuators[group[0]]
-        if 0.0 < lag < NOTHING * context.signals.dt and delay == 0:
+        lag, delay, _, ramp = actuation.actuators[group[0]]
+        if 0.0 < lag < NOTHING * context.signals.dt and delay == 0 and ramp == 0.0:
             actuation = actuation.at_once(group)
     if actuation is not hypothesis.actuation:
         yield fitted(context, replace(hypothesis, actuation=actuation, fit=None))

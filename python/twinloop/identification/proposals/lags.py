@@ -1,6 +1,7 @@
-"""Lags and delays of the actuators: searched on a grid, one group of commands after another, from none of them on.
+"""Lags, delays and rates of actuators: searched on grids, one group of commands after another, from none of them on.
 
-A group that is searched early may stand in for one that is searched later, so in the end each is tried without.
+A group that is searched early may stand in for one that is searched later, so in the end each is tried without. Then
+limits of the rate are tried, those that the commands of the runs would have met.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import sqrt
+
+import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.identification.context import Context
@@ -29,8 +32,12 @@ FEW = 3
 """Commands that are alike up to which each is tried with a lag and a delay of its own."""
 MOST_DELAY = 50
 """Periods beyond which no delay is tried."""
-GRID = 0
-"""Number of the unit of work that tries them; the searches that a hypothesis counts begin at 1."""
+RAMPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0)
+"""Periods in which an actuator crosses all commands that were sent: limits of its rate that are tried."""
+CLEARLY = 24.0
+"""Units of χ² by which a limit of the rate must be worse than none for slower ones not to be tried."""
+GRID, RATES = 0, 1000
+"""Numbers of the units of work that try them; the searches that a hypothesis counts begin at 1, and are few."""
 Trial = Callable[[Actuation], Hypothesis]
 """The hypothesis behind other actuators, with sums of the first rung."""
 
@@ -47,6 +54,7 @@ def lags(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         best = _searched(context, trial, best, group)
     best = _without(trial, best)
     best = _each(context, best, number)
+    best = _at_limited_rates(context, best)
     if best.actuation != hypothesis.actuation:
         # The noise was that of other actuators, and a disturbance may still stand in for terms.
         yield from_both_sides(context, best, best.sums)
@@ -77,9 +85,49 @@ def _each(context: Context, best: Hypothesis, number: Iterator[int]) -> Hypothes
     return best
 
 
-def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int]) -> Trial:
+def _at_limited_rates(context: Context, best: Hypothesis) -> Hypothesis:
+    """The best so far, or a better one in which groups of commands move at a limited rate, with their lag or none."""
+    trial = _trials(context, best, itertools.count(), RATES)
+    for group in best.alike if context.options.ramps else ():
+        crossed = [np.concatenate([run.commands[:, i] for run in best.runs]) for i in group]
+        span = max(float(np.ptp(sent)) for sent in crossed)
+        steps = [np.abs(np.diff(run.commands[:, i])).max(initial=0.0) for run in best.runs for i in group]
+        fastest, worse = max(map(float, steps)), 0
+        # One that no command would have met is none that was seen.
+        met = [periods for periods in RAMPS if fastest * periods > span > 0.0]
+        found: float | None = None
+        for periods in met:
+            other = _ramped(context, trial, best, group, periods / span)
+            if other.evidence > best.evidence:
+                best, found = other, periods
+            # Past the true rate the fit only gets worse, and without a limit from the first one on.
+            worse = worse + 1 if best.evidence > other.evidence.less(-CLEARLY) else 0
+            if worse == 2:
+                break
+        for periods in (found / FINER, found * FINER) if found is not None else ():
+            best = max([best, _ramped(context, trial, best, group, periods / span)], key=by_evidence)
+    return best
+
+
+def _ramped(
+    context: Context, trial: Trial, best: Hypothesis, group: Sequence[int], periods: float
+) -> Hypothesis:
+    """The hypothesis behind actuators of a group that move by one unit of its command in so many periods at least."""
+    several = []
+    now = best.actuation.actuators[group[0]].lag
+    # Where no limit was known, a lag has stood for it in part.
+    for lag in dict.fromkeys((now, 0.5 * now, 0.0)):
+        actuators = list(best.actuation.actuators)
+        for i in group:
+            ramp = periods * context.signals.dt * context.signals.commands[i].size
+            actuators[i] = actuators[i]._replace(lag=lag, ramp=ramp)
+        several.append(trial(replace(best.actuation, actuators=tuple(actuators))))
+    return max(several, key=by_evidence)
+
+
+def _trials(context: Context, hypothesis: Hypothesis, number: Iterator[int], of: int = GRID) -> Trial:
     """What tries actuators for a hypothesis; the searches of each trial are a part of one unit of work."""
-    unit = context.unit.part(hypothesis.start, GRID)
+    unit = context.unit.part(hypothesis.start, of)
     driven = [found.chain for found in hypothesis.sums]
 
     def trial(actuation: Actuation) -> Hypothesis:

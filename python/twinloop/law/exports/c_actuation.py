@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from twinloop.law.exports.c_words import listed, number
 from twinloop.law.law import Law
 
@@ -14,6 +16,7 @@ def actuation_c(law: Law, name: str, precision: str) -> list[str]:
     def literal(value: float) -> str:
         return number(value, precision)
 
+    slow = _on_its_way(law, name, literal, f)
     lines = [
         f"static void {name}_effects({name}_memory *memory, const real u[{n_u}], real seen[3][SEEN])",
         "{",
@@ -28,9 +31,11 @@ def actuation_c(law: Law, name: str, precision: str) -> list[str]:
             "    }",
             "}",
         ]
+    rates = [one.rate(command.size) for one, command in zip(actuators, law.signals.commands, strict=True)]
     delays = ", ".join(str(actuator.delay) for actuator in actuators)
     lines += [
         f"    static const real lags[{n_u}] = {listed([actuator.lag for actuator in actuators], precision)};",
+        f"    static const real rates[{n_u}] = {listed(rates, precision)};",
         f"    static const int delays[{n_u}] = {{{delays}}};",
     ]
     begun = [
@@ -68,10 +73,9 @@ def actuation_c(law: Law, name: str, precision: str) -> list[str]:
         "            queue[delays[i] - 1] = u[i];",
         "            queue += delays[i];",
         "        }",
-        f"        const real half = lags[i] > 0 ? exp{f}({literal(-0.5 * law.signals.dt)} / lags[i]) : 0;",
-        "        const real start = lags[i] > 0 ? memory->held[i] : arrived;",
-        "        const real middle = arrived + (start - arrived) * half;",
-        "        const real end = arrived + (middle - arrived) * half;",
+        "        const real start = lags[i] > 0 || rates[i] > 0 ? memory->held[i] : arrived;",
+        f"        const real middle = {name}_on_its_way(start, arrived, lags[i], rates[i]);",
+        f"        const real end = {name}_on_its_way(middle, arrived, lags[i], rates[i]);",
         "        memory->held[i] = end;",
         "        seen[0][i] = start * factors[i];",
         "        seen[1][i] = middle * factors[i];",
@@ -89,4 +93,25 @@ def actuation_c(law: Law, name: str, precision: str) -> list[str]:
             f"        memory->hidden[{j}] = seen[2][{n_u + j}];",
             "    }",
         ]
-    return [*lines, "}"]
+    return [*slow, *lines, "}"]
+
+
+def _on_its_way(law: Law, name: str, literal: Callable[[float], str], f: str) -> list[str]:
+    """The effect of a command half a period later: it moves at the rate, if there is one, until the lag is slower."""
+    return [
+        f"static real {name}_on_its_way(real held, real arrived, real lag, real rate)",
+        "{",
+        f"    const real time = {literal(0.5 * law.signals.dt)};",
+        "    const real off = arrived - held;",
+        f"    const real beyond = fabs{f}(off) - rate * lag;",
+        "    if (rate == 0 || !(beyond > 0)) {",
+        f"        return arrived + (held - arrived) * (lag > 0 ? exp{f}(-time / lag) : 0);",
+        "    }",
+        "    if (beyond >= rate * time) {",
+        f"        return held + copysign{f}(rate * time, off);",
+        "    }",
+        f"    const real fading = lag > 0 ? exp{f}(-(time - beyond / rate) / lag) : 0;",
+        f"    return arrived - copysign{f}(rate * lag, off) * fading;",
+        "}",
+        "",
+    ]

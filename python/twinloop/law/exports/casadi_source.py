@@ -38,6 +38,22 @@ def _upright(a):
 '''
 
 _EFFECTS = '''
+def _on_its_way(held, arrived, lag, rate):
+    """The effect of a command half a period later: it moves at the rate, if there is one, until the lag is slower."""
+    time, off = 0.5 * DT, arrived - held
+    lagging = arrived + (held - arrived) * (math.exp(-time / lag) if lag > 0.0 else 0.0)
+    if rate == 0.0:
+        return lagging
+    beyond = ca.fabs(off) - rate * lag
+    fading = ca.exp(-(time - ca.fmin(beyond / rate, time)) / lag) if lag > 0.0 else 0.0
+    limited = ca.if_else(
+        beyond >= rate * time,
+        held + ca.sign(off) * (rate * time),
+        arrived - ca.sign(off) * (rate * lag) * fading,
+    )
+    return ca.if_else(beyond > 0.0, limited, lagging)
+
+
 def _levels(seen):
     """What fills each hidden state."""
     return [
@@ -67,11 +83,10 @@ def _effects(memory, u):
     held, memory = memory[: len(u)], memory[len(u) :]
     hidden, rests = memory[: len(HIDDEN)], memory[len(HIDDEN) :]
     starts, middles, ends = [], [], []
-    for before, value, lag, scale in zip(held, arrived, LAGS, SCALES):
-        half = math.exp(-0.5 * DT / lag) if lag > 0.0 else 0.0
-        start = before if lag > 0.0 else value
-        middle = value + (start - value) * half
-        end = value + (middle - value) * half
+    for before, value, lag, rate, scale in zip(held, arrived, LAGS, FASTEST, SCALES):
+        start = before if lag > 0.0 or rate > 0.0 else value
+        middle = _on_its_way(start, value, lag, rate)
+        end = _on_its_way(middle, value, lag, rate)
         ends_.append(end)
         for seen, effect in zip((starts, middles, ends), (start, middle, end)):
             seen.append(effect * (1.0 / scale))

@@ -67,6 +67,17 @@ def _upright(a):
 '''
 
 _ACTUATED = '''
+def _on_its_way(held, arrived, lag, rate):
+    """The effect of a command half a period later: it moves at the rate, if there is one, until the lag is slower."""
+    time, beyond = 0.5 * DT, abs(arrived - held) - rate * lag
+    if rate == 0.0 or beyond <= 0.0:
+        return arrived + (held - arrived) * (math.exp(-time / lag) if lag > 0.0 else 0.0)
+    if beyond >= rate * time:
+        return held + math.copysign(rate * time, arrived - held)
+    fading = math.exp(-(time - beyond / rate) / lag) if lag > 0.0 else 0.0
+    return arrived - math.copysign(rate * lag, arrived - held) * fading
+
+
 class Twin:
     """The twin from period to period; it remembers what its actuators and hidden states hold."""
 
@@ -94,10 +105,9 @@ class Twin:
         for i, value in enumerate(u):
             self._queues[i].append(value)
             arrived = self._queues[i].pop(0)
-            half = math.exp(-0.5 * DT / LAGS[i]) if LAGS[i] > 0.0 else 0.0
-            start = self._held[i] if LAGS[i] > 0.0 else arrived
-            middle = arrived + (start - arrived) * half
-            end = arrived + (middle - arrived) * half
+            start = self._held[i] if LAGS[i] > 0.0 or FASTEST[i] > 0.0 else arrived
+            middle = _on_its_way(start, arrived, LAGS[i], FASTEST[i])
+            end = _on_its_way(middle, arrived, LAGS[i], FASTEST[i])
             self._held[i] = end
             for seen, effect in zip((starts, middles, ends), (start, middle, end)):
                 seen.append(effect * (1.0 / SCALES[i]))
@@ -203,8 +213,12 @@ def layout(law: Law, actuated: bool) -> list[str]:
         f"DT = {signals.dt!r}  # s, a period",
     ]
     if actuated:
+        limits = tuple(
+            each.rate(command.size) for each, command in zip(actuators, signals.commands, strict=True)
+        )
         lines += [
             f"LAGS = {tuple(actuator.lag for actuator in actuators)!r}  # s, of each command",
+            f"FASTEST = {limits!r}  # rate at most, a second; 0: any",
             f"DELAYS = {tuple(actuator.delay for actuator in actuators)!r}  # periods",
             f"RESTS = {tuple(actuator.rest for actuator in actuators)!r}  # at the start; None: the first one",
             f"HIDDEN = {tuple(tuple(each[:4]) for each in law.actuation.hidden)!r}"

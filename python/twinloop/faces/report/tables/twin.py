@@ -72,18 +72,34 @@ def disturbances(result: Mapping[str, Any]) -> Table | None:
 
 
 def actuators(result: Mapping[str, Any]) -> Table | None:
-    """Lags and delays."""
+    """Lags, delays, and limited rates where there are any."""
     found = result["twin"].get("actuators")
     if not found:
         return None
-    head = ["command", "lag (s)", "delay (periods)", "identified"]
-    rows = [[words(each["name"]), each["lag"], each["delay"], _identified(each)] for each in found]
+    limited = any(each.get("rate") for each in found)
+    head = [
+        "command",
+        "lag (s)",
+        "delay (periods)",
+        *(["rate at most (1/s)"] if limited else []),
+        "identified",
+    ]
+    rows = [
+        [
+            words(each["name"]),
+            each["lag"],
+            each["delay"],
+            *([each.get("rate") or "–"] if limited else []),
+            _identified(each),
+        ]
+        for each in found
+    ]
     return table_of("actuators", "Actuators", head, rows)
 
 
 def _identified(actuator: Mapping[str, Any]) -> str:
     """Whether a lag or a delay was identified; a dash where there is neither."""
-    if not (actuator["lag"] or actuator["delay"]):
+    if not (actuator["lag"] or actuator["delay"] or actuator.get("rate")):
         return "–"
     # Results of earlier versions do not say so: what they name was identified.
     return "yes" if actuator.get("identified", True) else STAND_IN
