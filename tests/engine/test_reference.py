@@ -177,7 +177,7 @@ def test_a_run_under_recorded_commands_is_that_of_the_controller_that_gave_them(
 def test_a_run_under_commands_is_step_after_step_with_lags_and_all(seed):
     signals = PLANT.signals
     program = pendulum_of(signals).program
-    lagging = _core.Model(program, "acceleration", signals.engine, [(0.08, 2, None)], [])
+    lagging = _core.Model(program, "acceleration", signals.engine, [(0.08, 2, None, 0.0)], [])
     draw = np.random.default_rng(seed)
     commands = draw.uniform(-3.0, 3.0, (30, 1))
     twin = tl.Twin(lagging, signals)

@@ -85,7 +85,7 @@ def members_with_memory():
     """A pendulum with a lag and one with a delay, the second one weaker."""
     program = "r4 = r2 {gain}\nr0 = r4"
     made = []
-    for gain, actuator in ((18.0, (0.08, 0, 0.0)), (21.0, (0.0, 2, 0.0))):
+    for gain, actuator in ((18.0, (0.08, 0, 0.0, 0.0)), (21.0, (0.0, 2, 0.0, 0.0))):
         # Inputs: angle, rate, torque; then the output, the acceleration, and one spare register.
         pages = [[("*", 3, 2, 2.0 * gain), ("*", 4, 1, 1.1), ("-", 3, 3, 4), ("sin", 4, 0, None), ("*", 4, 4, 24.5),
                   ("-", 3, 3, 4)]]  # fmt: skip

@@ -100,7 +100,7 @@ def test_a_law_gives_its_model_back():
     )
     hidden = [((0,), True, None, 2.0, (), False, 0.0)]
     late = (0.01, 0.0, 0.0, 0.0, 0.0, 0.0)
-    model = _core.Model(program, "acceleration", BODY.engine, [(0.04, 2, 0.5)], hidden, late)
+    model = _core.Model(program, "acceleration", BODY.engine, [(0.04, 2, 0.5, 0.0)], hidden, late)
     law = Law.of(model, BODY)
     again = law.model()
     assert (again.form, again.actuators, again.hidden) == (model.form, model.actuators, model.hidden)
