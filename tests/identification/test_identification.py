@@ -410,7 +410,7 @@ def test_a_lag_of_the_actuator_is_found():
         commands = np.repeat(stream.uniform(-2.0, 2.0, (12, 1)), 10, axis=0)
         runs.append(lagging_motor(commands, dt, lag, lambda u: 3.0 * u, stream))
     found = identified(runs, signals, lags=True, form="acceleration", longest_delay=1)
-    [(time, delay, _)] = found.actuation.actuators
+    [(time, delay, _, _)] = found.actuation.actuators
     assert time == pytest.approx(lag, rel=0.1) and delay == 0
     terms = law(found)
     assert set(terms) == {0, 1}
@@ -427,7 +427,7 @@ def test_a_thruster_that_lags_by_what_no_grid_has_and_turns_round_is_found(least
         commands = np.repeat(stream.uniform(least, 1.0, (16, 1)), 12, axis=0)
         runs.append(lagging_motor(commands, dt, lag, lambda u: 3.0 * u * abs(u), stream))
     found = identified(runs, signals, lags=True, form="acceleration", longest_delay=2)
-    [(time, delay, _)] = found.actuation.actuators
+    [(time, delay, _, _)] = found.actuation.actuators
     assert time == pytest.approx(lag, rel=0.02) and delay == 0
     # Where it was never asked to turn round readings do not say that it pulls then.
     rows = np.array([[0.0, -1.0], [0.0, 1.0], [1.0, 0.0]])
@@ -475,7 +475,7 @@ def test_a_delay_beyond_the_longest_that_is_tried_is_found_where_a_lag_stands_in
         readings = np.array(level)[:, None]
         runs.append(Run.of(readings + 1e-3 * stream.normal(size=readings.shape), commands))
     found = identified(runs, signals, lags=True, form="acceleration", longest_delay=2)
-    [(time, delay, _)] = found.actuation.actuators
+    [(time, delay, _, _)] = found.actuation.actuators
     assert delay == dead and time < 0.1 * dt
     terms = law(found)
     assert terms[0] == pytest.approx(-0.8, rel=0.02) and terms[1] == pytest.approx(2.0, rel=0.02)
