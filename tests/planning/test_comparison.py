@@ -84,7 +84,7 @@ def test_for_the_model_the_flight_that_tells_most_of_those_that_last_is_chosen(n
     flown, committee = replace(FLOWN, good=good), replace(COMMITTEE, sds=np.array(sds))
     drawn = drafts(flown, number=number)
     quiet, usage = judged(drawn, QUIET, measured=False)
-    noisy, shaken = judged(drawn, PLANNER.noise(committee.sds, DRAWS), measured=True)
+    noisy, shaken = judged(drawn, PLANNER.noise(committee.sds, DRAWS, ()), measured=True)
     options = PLANNER.options
     # One for the model may cost what the best flight has cost and a little, or as much again as is promised.
     most = max((1.0 + options.worse) * good, 2.0 * quiet[:, 0, 0].mean())
