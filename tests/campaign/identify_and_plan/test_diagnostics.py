@@ -370,6 +370,13 @@ def test_sensors_of_their_own_and_exact_steps_are_not_computed_from_each_other()
         x = np.array([x[0] + DT * rate, rate])
         states.append(x)
     assert list(derived([np.array(states)])) == []
+    # In few coarse steps motion looks like noise, and at rest like a sensor that rounds.
+    x, states = np.array([0.0, 0.0]), [np.zeros(2)] * 30
+    for k in range(41):
+        rate = x[1] + 0.05 * (20.0 * (np.sin(0.4 * k) + 0.5) - 24.0 * np.sin(x[0]) - x[1])
+        x = np.array([x[0] + 0.05 * rate, rate])
+        states = [*states, x]
+    assert list(derived([np.array(states[30:])])) == list(derived([np.array(states)])) == []
 
 
 @pytest.mark.parametrize(

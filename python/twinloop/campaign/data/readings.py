@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -26,6 +27,10 @@ LIKE = 0.8
 """Share of the stretches in which a sensor repeats itself that are as long as most of them, where it is slow."""
 DERIVED = 1e-3
 """Share of what noise adds to a rate by which it may be off what another's readings say, if it is computed of them."""
+AS_LARGE = 2.0
+"""Ratio of noise in differences of two orders, at most."""
+ON_GRID = 1e-6
+"""Share of a count, or of what it is counted from, by which readings of a sensor that rounds may be off."""
 REPEATED = 0.5
 """Share of its readings that differ at most, of a sensor that rounds."""
 EXACT = 0.02
@@ -179,10 +184,12 @@ def derived(records: Sequence[Floats]) -> Iterator[Derived]:
     runs = [Run.of(states, np.zeros((len(states) - 1, 1))) for states in records]
     sizes = np.max([np.abs(states).max(axis=0) for states in records], axis=0)
     noise = np.sqrt(guessed_noise(runs, np.where(sizes > 0.0, sizes, 1.0)))
-    noise = np.maximum(noise, [count([states[:, i] for states in records]) for i in range(len(sizes))])
+    of_states = [[states[:, i] for states in records] for i in range(len(sizes))]
+    counts = np.array([count(readings) for readings in of_states])
     moving = [i for i, size in enumerate(sizes) if size > 0.0]
-    # What is exact says nothing of what is made of it.
-    read = [i for i in moving if NOISY * sizes[i] < noise[i]]
+    # What is exact says nothing of what is made of it: a simulator's step gives differences that are rates, too.
+    read = [i for i in moving if counts[i] > 0.0 or (NOISY * sizes[i] < noise[i] and scatters(of_states[i]))]
+    noise = np.maximum(noise, counts)
     for i in moving:
         for j in (j for j in read if j != i):
             columns = [np.stack([x[:-1, i], x[1:, j], x[:-1, j]], axis=1) for x in records]
@@ -215,7 +222,27 @@ def count(records: Sequence[Floats]) -> float:
     """
     readings = np.concatenate(records)
     values = np.unique(readings)
-    return float(np.diff(values).min()) if 1 < len(values) < REPEATED * len(readings) else 0.0
+    if not 1 < len(values) < REPEATED * len(readings):
+        return 0.0
+    least = float(np.diff(values).min())
+    steps = (values - values[0]) / least
+    return least if bool((np.abs(steps - np.round(steps)) < ON_GRID * np.maximum(steps, 1.0)).all()) else 0.0
+
+
+def scatters(records: Sequence[Floats]) -> bool:
+    """Whether what no polynomial follows is noise: it is as large in differences of any order, which motion is not.
+
+    Args:
+        records: of one state, a run each (n + 1,).
+    """
+    found = []
+    for order in (5, 6):
+        differences = [np.diff(readings, n=order) for readings in records if len(readings) > order]
+        if not differences:
+            return False
+        squares = np.square(np.concatenate(differences))
+        found.append(float(np.median(squares)) / math.comb(2 * order, order))
+    return 0.0 < found[0] < AS_LARGE * found[1] and found[1] < AS_LARGE * found[0]
 
 
 def ratio(records: Sequence[Floats]) -> float:
