@@ -342,7 +342,9 @@ def test_readings_that_come_anew_or_now_and_then_are_no_slow_sensor():
     fresh = stream.normal(size=300)
     counted = np.round(3.0 * np.sin(0.02 * np.arange(300)) / 0.2) * 0.2
     now_and_then = np.repeat(fresh[:60], stream.integers(1, 9, 60))
-    assert [repeats([one]) for one in (fresh, counted, now_and_then, np.zeros(50))] == [None] * 4
+    evenly = np.floor(0.1 * (np.arange(300) + 0.5) / 0.3 + 1e-9)
+    assert np.array_equal(np.unique(np.diff(np.flatnonzero(np.diff(evenly)))), [3])
+    assert [repeats([one]) for one in (fresh, counted, now_and_then, np.zeros(50), evenly)] == [None] * 5
 
 
 @pytest.mark.parametrize("keeps", [0.0, 0.7])
