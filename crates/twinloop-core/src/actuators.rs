@@ -240,7 +240,7 @@ impl<V: Vector> Limited<V> {
 fn moved(from: f64, to: f64, lag: f64, rate: f64, time: f64) -> f64 {
     let fading = |off: f64, time: f64| if lag > 0.0 { off * libm::exp(-time / lag) } else { 0.0 };
     let beyond = (to - from).abs() - rate * lag;
-    if !(beyond > 0.0) {
+    if beyond <= 0.0 || beyond.is_nan() {
         return to - fading(to - from, time);
     }
     if beyond >= rate * time {
