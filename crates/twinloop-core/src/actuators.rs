@@ -134,7 +134,7 @@ pub struct Line<V> {
     halves: Vec<V>,
     memory: Vec<V>,
     /// Of each command whose effect moves at a limited rate.
-    limited: Vec<Option<Limited<V>>>,
+    limited: Vec<Option<Limited>>,
     /// Commands on their way, the oldest first, for each command.
     queues: Vec<Vec<V>>,
     /// Effect of each command, then each hidden state, at the start, the middle and the end of the period.
@@ -156,9 +156,9 @@ impl<V: Vector> Line<V> {
         let first = times.len() - actuation.ramping().count() * V::LANES;
         let mut limited: Vec<_> = (0..commands).map(|_| None).collect();
         for (i, ramp) in actuation.ramping().zip(times[first..].chunks_exact(V::LANES)) {
-            let rates: Vec<_> = ramp.iter().map(|ramp| 1.0 / (factors[i] * ramp)).collect();
-            let lag = V::load(&times[i * V::LANES..]);
-            limited[i] = Some(Limited { lag, rate: V::load(&rates), time: 0.5 * dt });
+            let rates = ramp.iter().map(|ramp| 1.0 / (factors[i] * ramp)).collect();
+            let lags = times[i * V::LANES..][..V::LANES].to_vec();
+            limited[i] = Some(Limited { lags, rates, time: 0.5 * dt });
         }
         Self {
             memory: zeros(commands),
@@ -191,12 +191,13 @@ impl<V: Vector> Line<V> {
             self.queues[i].push(command);
             let arrived = self.queues[i].remove(0);
             let start = self.memory[i];
-            let on_its_way = |from: V| match &self.limited[i] {
-                Some(limited) => limited.on_its_way(from, arrived),
-                None => arrived + (from - arrived) * self.halves[i],
+            let [middle, end] = match &self.limited[i] {
+                Some(limited) => limited.halfway_and_through(start, arrived),
+                None => {
+                    let middle = arrived + (start - arrived) * self.halves[i];
+                    [middle, arrived + (middle - arrived) * self.halves[i]]
+                }
             };
-            let middle = on_its_way(start);
-            let end = on_its_way(middle);
             self.effects[0][i] = start;
             self.effects[1][i] = middle;
             self.effects[2][i] = end;
@@ -215,24 +216,35 @@ impl<V: Vector> Line<V> {
     }
 }
 
-/// An actuator that moves at a limited rate, for a time.
+/// An actuator that moves at a limited rate, for a time; lane by lane, and by a call, for such actuators are rare.
 #[derive(Clone)]
-struct Limited<V> {
-    lag: V,
+struct Limited {
+    lags: Vec<f64>,
     /// In units of the command, a second.
-    rate: V,
+    rates: Vec<f64>,
     time: f64,
 }
 
-impl<V: Vector> Limited<V> {
-    /// The effect after the time under a command. Such actuators are rare, so each lane is moved by itself, and by a call.
+impl Limited {
+    /// The effect after the time under a command, and after as much again.
     #[inline(never)]
-    fn on_its_way(&self, from: V, to: V) -> V {
-        let mut found = [0.0; 64];
-        for (l, found) in found.iter_mut().enumerate().take(V::LANES) {
-            *found = moved(from.lane(l), to.lane(l), self.lag.lane(l), self.rate.lane(l), self.time);
+    fn halfway_and_through<V: Vector>(&self, from: V, to: V) -> [V; 2] {
+        let (mut effects, mut commands) = ([0.0; 64], [0.0; 64]);
+        from.store(&mut effects);
+        to.store(&mut commands);
+        [(); 2].map(|()| {
+            self.advance(&mut effects, &commands);
+            V::load(&effects)
+        })
+    }
+
+    /// Moves the effects on towards the commands.
+    #[inline(never)]
+    fn advance(&self, effects: &mut [f64], commands: &[f64]) {
+        let lanes = self.lags.iter().zip(&self.rates);
+        for ((effect, &to), (&lag, &rate)) in effects.iter_mut().zip(commands).zip(lanes) {
+            *effect = moved(*effect, to, lag, rate, self.time);
         }
-        V::load(&found)
     }
 }
 
