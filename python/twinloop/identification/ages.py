@@ -13,7 +13,7 @@ from twinloop.identification.description import shorter
 from twinloop.identification.forms import briefly_described
 from twinloop.identification.records import Run
 from twinloop.identification.sensors.reported import as_sensed
-from twinloop.law.reports import Held, Reports, old, reports_of
+from twinloop.law.reports import Held, Reports, reports_of
 
 LONGEST = 2.0
 """Periods of the sensor that a reading is old at most."""
@@ -34,14 +34,14 @@ def aged(context: Context, logged: Sequence[Run]) -> Reports:
         context: of the identification, with what is given of readings.
         logged: runs as they were logged.
     """
-    reports, known = context.reports, context.earlier
-    if known is not None and context.settled:
-        before = reports_of(known.model, context.signals.n_x)
-        return old(
-            reports, [one.age if isinstance(one, Held) else 0 for one in before or [None] * len(reports)]
-        )
+    reports, earlier = context.reports, context.earlier
+    before = reports_of(earlier.model, context.signals.n_x) if earlier is not None and context.settled else ()
+    known = {report.every: report.age for report in before if isinstance(report, Held)}
     for every in dict.fromkeys(report.every for report in reports if isinstance(report, Held)):
-        reports = _of_one(context, logged, reports, every)
+        if every in known:
+            reports = with_age(reports, every, known[every])
+        else:
+            reports = _of_one(context, logged, reports, every)
     return reports
 
 

@@ -149,9 +149,9 @@ def identify_runs(
         ages = tuple(report.age if isinstance(report, Held) else 0 for report in reports)
         under_way = UnderWay(tuple(context.runs), form, tuple(said), ages=ages)
         keep(under_way)
-    context = replace(context, runs=under_way.runs, reports=old(reports, under_way.ages)).under(
-        under_way.form
-    )
+    # An earlier version, which began without, knew no ages.
+    reports = old(reports, under_way.ages) if under_way.ages else ()
+    context = replace(context, runs=under_way.runs, reports=reports).under(under_way.form)
     searches = list(under_way.searches)
     for number, start in enumerate(starts(context, under_way.form)):
         if number == len(searches):

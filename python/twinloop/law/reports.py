@@ -109,9 +109,9 @@ def in_words(reports: Reports, signals: Signals) -> list[str]:
     lines, names = [], signals.state_names
     for name, report in zip(names, reports, strict=False):
         if isinstance(report, Held):
-            old = f", and given {report.age * signals.dt:.6g} s later" if report.age else ""
+            late = f", and given {report.age * signals.dt:.6g} s later" if report.age else ""
             lines.append(
-                f"{name} is read once in {report.every} periods ({report.every * signals.dt:.6g} s){old}"
+                f"{name} is read once in {report.every} periods ({report.every * signals.dt:.6g} s){late}"
             )
         elif isinstance(report, Computed):
             of = names[report.of]

@@ -1,5 +1,7 @@
 """Rates that are computed of readings, and slow sensors: what is learnt is what a sensor of its own would give."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
@@ -92,6 +94,37 @@ def test_a_slow_sensor_is_found_with_how_old_its_readings_are():
     assert ages[0] == ages[1] and abs(ages[0] - 6) <= 1
     factors, text = speed_of(learnt, ["tilt"])
     assert factors["tilt"] == pytest.approx(9.81, rel=0.05), text
+
+
+def learnt_of(runs, reports, **changes):
+    options = options_of("default", {**FAST, "moves": 300, "tuning_steps": 2})
+    return identify_runs(
+        [Run.of(*run) for run in runs], SIGNALS, options, reports=reports, workers=_core.Workers(), **changes
+    )
+
+
+def test_an_age_stays_once_it_is_settled_and_sensors_that_are_slow_no_more_have_none(monkeypatch):
+    slow = (Held(10, 7), Held(10, 7), None)
+    runs = logged((Held(10, 7, 6), Held(10, 7, 6), None), seeds=range(5))
+    earlier = learnt_of(runs[:2], slow)
+    ages = [age for _, _, _, age in earlier.model.reports[0]]
+    monkeypatch.setattr("twinloop.identification.ages.briefly_described", None)  # nothing is searched again
+    later = learnt_of(runs, slow, earlier=earlier, iteration=1)
+    assert [age for _, _, _, age in later.model.reports[0]] == ages
+    # One new flight may show that a sensor is not slow after all.
+    assert learnt_of(logged((), seeds=range(5)), (), earlier=earlier, iteration=1).model.reports == ([], [])
+
+
+def test_an_identification_that_an_earlier_version_began_goes_on_as_it_began():
+    slow, kept = (Held(10, 10), Held(10, 10), None), []
+    runs = logged(slow)
+    whole = learnt_of(runs, slow, keep=kept.append)
+    assert (
+        whole.model.reports[0]
+        and learnt_of(runs, slow, under_way=kept[0]).model.reports == whole.model.reports
+    )
+    begun = replace(kept[0], ages=(), runs=tuple(Run.of(*run) for run in runs))
+    assert learnt_of(runs, slow, under_way=begun).model.reports == ([], [])
 
 
 def test_readings_of_no_age_are_given_none():
