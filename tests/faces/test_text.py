@@ -84,7 +84,9 @@ def result_of_default(**advice):
                     "cause": "disturbance",
                 },
             ],
-            "actuators": [{"name": "torque", "lag": 0.03, "delay": 1}],
+            "actuators": [
+                {"name": "torque", "lag": 0.03, "delay": 1}, {"name": "rudder", "lag": 0.0, "delay": 0, "rate": 0.5},
+            ],
             "hidden": [{"commands": ["torque"], "squared": True, "rest": 0.0, "time": 0.8}],
         },
         "controller": {
@@ -103,7 +105,8 @@ def result_of_default(**advice):
 def test_a_result_of_default_says_what_a_person_must_know():
     text = render(result_of_default())
     for words in (
-        "torque: lag 0.03 s, delay 1 period.", "squares of torque drive a state", "1/e in 0.8 s",
+        "torque: lag 0.03 s, delay 1 period;",
+        "rudder: no lag, no delay, at most 0.5 of its unit a second.", "squares of torque drive a state", "1/e in 0.8 s",
         "rate 0.5 (rad/s)/s with a correlation time of 0.2 s", "It was cut: rate above 12.",
         "CONTROLLER TO FLY: NOT FLOWN YET", "rad², (rad/s)²", "Fly another test before you trust it.",
     ):  # fmt: skip

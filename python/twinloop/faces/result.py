@@ -234,12 +234,13 @@ def _add_identified(result: dict[str, Any], campaign: Campaign, lesson: Lesson) 
                 "lag": actuator.lag,
                 "delay": actuator.delay,
                 "rate": actuator.rate(command.size),
-                "identified": (actuator.lag, actuator.delay) == found,
+                "identified": (actuator.lag, actuator.delay, actuator.rate(command.size)) == found,
             }
             for command, actuator, found in zip(
                 campaign.signals.commands,
                 twin.law.actuation.actuators,
-                zip(lesson.lags, lesson.delays, strict=True),
+                # Lessons of earlier versions have no rates.
+                zip(lesson.lags, lesson.delays, lesson.rates or (0.0,) * len(lesson.lags), strict=True),
                 strict=True,
             )
         ],

@@ -104,7 +104,7 @@ def _actuators(actuators: Sequence[Mapping[str, Any]]) -> str:
     for (lag, delay, rate, identified), names in groups.items():
         slow = f"lag {lag:.3g} s" if lag else "no lag"
         late = f"delay {in_periods(delay)}" if delay else "no delay"
-        limited = f", at most {rate:.3g} a second" if rate else ""
+        limited = f", at most {rate:.3g} of its unit a second" if rate else ""
         words.append(f"{', '.join(names)}: {slow}, {late}{limited}{'' if identified else f' ({STAND_IN})'}")
     return f"Actuators: {'; '.join(words)}."
 

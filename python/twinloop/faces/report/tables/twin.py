@@ -81,7 +81,7 @@ def actuators(result: Mapping[str, Any]) -> Table | None:
         "command",
         "lag (s)",
         "delay (periods)",
-        *(["rate at most (1/s)"] if limited else []),
+        *(["rate at most (unit/s)"] if limited else []),
         "identified",
     ]
     rows = [
