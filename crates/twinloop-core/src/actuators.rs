@@ -1,5 +1,6 @@
 //! Actuation: what stands between commands and a model. Each command has an actuator with a delay and a first-order
-//! lag, which moves at a limited rate, de/dt = clip((u − e) / lag, ± rate); hidden states that commands fill may follow, and after these some that states fill.
+//! lag, and may move at a limited rate: de/dt = clip((u − e) / lag, ± rate). Hidden states that commands fill may follow,
+//! and after these some that states fill.
 
 use crate::error::{Result, invalid};
 use crate::hidden::{Filling, Hidden};

@@ -95,12 +95,14 @@ impl Sensors {
         for (l, lane) in recent.lanes.iter_mut().enumerate() {
             let state: Vec<Scalar> = state.iter().map(|value| Scalar::splat(value.lane(l))).collect();
             let mut given = state.clone();
-            for (i, found) in self.read_lane(lane, state) {
+            let late = self.read_lane(lane, state);
+            for &(i, found) in &late {
                 given[i] = found;
             }
             self.reports.give(&mut lane.given, &mut given);
-            for (reading, given) in reading.iter_mut().zip(&given) {
-                set_lane(reading, l, given.lane(0));
+            let others = self.reports.each().iter().map(|&(i, _)| i);
+            for i in late.iter().map(|&(i, _)| i).chain(others) {
+                set_lane(&mut reading[i], l, given[i].lane(0));
             }
         }
     }
