@@ -8,7 +8,8 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS
-from twinloop.campaign.data.readings import derived, froze, ratio, repeats
+from twinloop.campaign.data.readings import froze, ratio
+from twinloop.campaign.data.reports import derived, repeats
 from twinloop.campaign.data.sent import exchanged, other_commands
 from twinloop.campaign.examination.log_check import against
 from twinloop.campaign.identify_and_plan.diagnostics import Findings, diagnostics_of, distinct
