@@ -105,8 +105,8 @@ def result_of_default(**advice):
 def test_a_result_of_default_says_what_a_person_must_know():
     text = render(result_of_default())
     for words in (
-        "torque: lag 0.03 s, delay 1 period;",
-        "rudder: no lag, no delay, at most 0.5 of its unit a second.", "squares of torque drive a state", "1/e in 0.8 s",
+        "torque: lag 0.03 s, delay 1 period;", "rudder: no lag, no delay, at most 0.5 of its unit a second.",
+        "squares of torque drive a state", "1/e in 0.8 s",
         "rate 0.5 (rad/s)/s with a correlation time of 0.2 s", "It was cut: rate above 12.",
         "CONTROLLER TO FLY: NOT FLOWN YET", "rad², (rad/s)²", "Fly another test before you trust it.",
     ):  # fmt: skip
