@@ -10,7 +10,7 @@ import twinloop as tl
 from committees import MOTORS, STEPS, TASK, TUNED, committee_of, member, planner_of, signals
 from oracles import rk4, same_bits
 from twinloop.planning.candidates import candidates
-from twinloop.planning.comparison import Comparison
+from twinloop.planning.comparison import TRIED, Comparison, _spaced
 from twinloop.planning.gusts import Moved
 from twinloop.planning.proposal import Flown, Wanted
 from twinloop.planning.seen import Seen
@@ -171,6 +171,20 @@ def test_a_member_that_diverges_whatever_is_flown_has_no_say():
     assert same_bits(one.genes, other.genes) and same_bits(one.excitation, other.excitation)
 
 
+def test_a_member_that_goes_too_far_whatever_is_flown_has_no_say_unless_it_is_the_best_one():
+    # Commands drive it the wrong way, slowly enough to last the flight.
+    adrift = member(KNOWN, -0.2)
+    gains = FLOWN.best * np.linspace(0.8, 1.2, 24)[:, np.newaxis]
+    drawn = replace(drafts().quiet(), genes=gains)
+    usages = compared(replace(COMMITTEE, members=[adrift]), drawn=drawn).quiet.usages
+    assert usages.min() > 0.7 and np.isfinite(usages).all()
+    with_it = compared(replace(COMMITTEE, members=[*COMMITTEE.members, adrift]), drawn=drawn)
+    assert len(with_it.members) == len(with_it.quiet.qualities) == 3 and with_it.keeps.any()
+    assert same_bits(with_it.proposal().genes, compared(drawn=drawn).proposal().genes)
+    best = compared(replace(COMMITTEE, members=[adrift, *COMMITTEE.members]), drawn=drawn)
+    assert len(best.members) == 4 and not best.keeps.any()
+
+
 def keeping(usage):
     """Which candidates stay within what may be used after a flight that has used 70 %, by usages on each member."""
     reach = min(
@@ -279,3 +293,30 @@ def test_a_candidate_that_known_disturbances_drive_out_more_often_than_the_flown
     other = blown(2, 1)
     assert other.genes.tobytes() != chosen.genes.tobytes()
     assert other.disagreement <= chosen.disagreement and other.safe
+
+
+@pytest.mark.parametrize("goal", ["both", "control"])
+def test_where_the_gains_that_promise_most_bear_no_gust_some_on_the_way_back_from_them_fly(goal):
+    planner = planner_of(KNOWN, candidates=1024, draws=DRAWS)
+    flown = replace(FLOWN, good=5.0, best=np.array([0.5, 0.0, 3.0]))
+    drawn = candidates(planner, planner.options, TUNED, flown, goal, 3)
+    place = planner.family.to_unit(flown.best)
+    way = np.abs(planner.family.to_unit(TUNED) - place).max()
+
+    def on(test):
+        return Moved(0.0, 0.0, left=int(np.abs(planner.family.to_unit(test.genes) - place).max() > 0.5 * way))
+
+    committee = replace(COMMITTEE, gusts=SimpleNamespace(on=on))
+    comparison = Comparison(planner, planner.options, committee, drawn, flown, Wanted(goal, 3, False))
+    # Of those that promise most far more than are tried are all alike.
+    promising = np.argsort(comparison.quiet.mean)[: 2 * TRIED]
+    assert (np.abs(planner.family.to_unit(drawn.genes[promising]) - place).max(axis=1) > 0.5 * way).all()
+    off = np.abs(planner.family.to_unit(comparison.proposal().genes) - place).max()
+    assert 0.05 * way < off <= 0.5 * way
+
+
+@pytest.mark.parametrize(("there", "most", "found"), [
+    (0, 3, []), (1, 3, [0]), (3, 3, [0, 1, 2]), (5, 3, [0, 2, 4]), (9, 1, [0]), (10, 4, [0, 3, 6, 9]),
+])  # fmt: skip
+def test_so_many_at_most_of_a_list_are_spaced_from_its_first_to_its_last(there, most, found):
+    assert _spaced(range(there), most) == found

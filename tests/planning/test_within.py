@@ -87,6 +87,11 @@ def test_the_next_flight_keeps_both_the_reach_in_the_envelope_and_the_states_nea
     assert reach == pytest.approx(0.75)
     np.testing.assert_allclose(low, [max(-0.9 * reach, near[0, 0]), max(-1.5 * reach, near[0, 1])])
     np.testing.assert_allclose(high, [min(0.9 * reach, near[1, 0]), min(1.5 * reach, near[1, 1])])
+    # Each prediction that came true in a row adds as much again, as far as the margin.
+    for came_true, further in ((0, 0.7), (1, 0.5 * 1.25**2), (2, 0.9), (3, 0.9)):
+        proven = replace(flown, usages=[0.5], came_true=came_true)
+        assert reach_of(proven, "both", options) == pytest.approx(further)
+        assert reach_of(proven, "model", options) == reach_of(replace(proven, came_true=0), "model", options)
     # Once a prediction has come true the envelope alone counts.
     low, high = bounds_of(replace(flown, seen=None), "both", KNOWN, options)
     np.testing.assert_allclose(high, [0.9 * reach, 1.5 * reach])

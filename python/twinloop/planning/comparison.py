@@ -53,9 +53,14 @@ class Comparison:
         self.judge, self.options, self.committee = judge, options, committee
         self.drafts, self.flown, self.wanted = drafts, flown, wanted
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
+        reach = reach_of(flown, wanted.goal, options)
         # A member that diverges whatever is flown is no member (E-SINDy).
-        self.members = judge.stable_members(committee.members, genes, excitation, ends)
-        self.quiet = judge.judge(self.members, genes, committee.sds, 1, excitation, ends)
+        stable = judge.stable_members(committee.members, genes, excitation, ends)
+        quiet = judge.judge(stable, genes, committee.sds, 1, excitation, ends)
+        # Nor is one that goes too far whatever is flown, the best gains flown among them: it would forbid all flights.
+        heeded = (quiet.usages[:, 0] <= reach).any(axis=1) | (np.arange(len(stable)) == 0)
+        self.members = [stable[i] for i in np.flatnonzero(heeded)]
+        self.quiet = Judged(quiet.qualities[heeded], quiet.usages[heeded])
         # Differences below these are rounding.
         smallest = np.array([1e-6 * state.scale for state in judge.signals.states])
         self.tells, self.where = disagreements(
@@ -65,8 +70,8 @@ class Comparison:
             workers=judge.workers,
         )
         self.possible = self._possible()
-        within = self.quiet.worst_usage <= reach_of(flown, wanted.goal, options)
-        self.keeps = self.possible & within & self._bears_delay() & self._near_what_was_seen()
+        within = self.possible & (self.quiet.worst_usage <= reach)
+        self.keeps = within & self._bears_delay() & self._near_what_was_seen()
         self.promised = float(self.quiet.mean[0])
 
     def proposal(self) -> Proposal:
@@ -107,8 +112,10 @@ class Comparison:
         first += _in_order(allowed, mean if self.wanted.plain else -self.tells)
         found = self._first_that_lasts(first, worst + by_noise + 2.0 * scatter)
         if found is None:
-            # None that tells much lasts under noise: the one that promises most, if it is no worse than was flown.
-            found = self._first_that_lasts(_in_order(others & (mean <= most), mean), most + 2.0 * scatter)
+            # None that tells much lasts under noise: the one that promises most, if it is no worse than was flown. The
+            # best ones are all alike; what they do not withstand may be withstood on the way back from them.
+            back = _spaced(_in_order(others & (mean <= most), mean), TRIED)
+            found = self._first_that_lasts(back, most + 2.0 * scatter)
         return found
 
     def _safest(self) -> tuple[int, Judged]:
@@ -242,3 +249,9 @@ def _in_order(those: Flags, cost: Floats) -> list[int]:
     """Numbers of those that are meant, the one of least cost first."""
     numbers: list[int] = np.flatnonzero(those)[np.argsort(cost[those], kind="stable")].tolist()
     return numbers
+
+
+def _spaced(ordered: Sequence[int], most: int) -> list[int]:
+    """Of ordered numbers so many at most, evenly spaced from the first one to the last."""
+    some = min(len(ordered), most)
+    return [ordered[place * (len(ordered) - 1) // max(1, some - 1)] for place in range(some)]

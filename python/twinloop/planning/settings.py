@@ -41,15 +41,15 @@ class PlanningOptions:
         reach_first: usage of the envelope that a proposal may always have.
         reach_far: largest usage of flights for the model, whose gains may be far from any that were flown.
         reach_least: usage that such flights may always have, even if the first flight hardly moves.
-        reach_growth: largest ratio of a proposal's usage to the largest flown one or, for flights for the model, to
-            that of the first flight.
+        reach_growth: largest ratio of a proposal's usage to the largest flown one, once more for each of the last
+            predictions in a row that came true; for flights for the model, to that of the first flight.
         reach_seen: how far beyond the states seen so far and those of the task a proposal may lead, in units of how far
             flights have moved them, until a prediction has come true; 0: anywhere.
         evaluations: number of flights on which gains are tuned at most, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
         delay_margin: whether gains are tuned on, and must tolerate, one more period of delay, and half of that for each
-            of the last predictions of new gains in a row that came true.
+            of the last predictions of new gains in a row that came true, or that the flight was better than.
         confidence: share of members and draws that must find new gains better than the best flown ones, by half a
             percent or more, and by more than predictions have missed of late.
         track_record: whether new gains must also be better by the error of earlier predictions.

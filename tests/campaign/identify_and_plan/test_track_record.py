@@ -94,6 +94,17 @@ def test_a_prediction_comes_true_within_two_spreads_or_a_tenth(predicted, spread
     assert nearly_confirmed_in_a_row([run, came_true, missed]) == 0
 
 
+def test_a_flight_that_was_better_than_predicted_shows_no_delay_though_the_prediction_missed():
+    better, true, worse = flight(1.0, 0.1, 0.5, 1.0), flight(1.0, 0.1, 1.0, 2.0), flight(1.0, 0.1, 1.5, 3.0)
+    for runs, strict, lenient in (
+        ([better], 0, 1), ([true, better], 0, 2), ([worse], 0, 0), ([better, worse], 0, 0), ([worse, better], 0, 1),
+    ):  # fmt: skip
+        assert nearly_confirmed_in_a_row(runs) == strict
+        assert nearly_confirmed_in_a_row(runs, or_better=True) == lenient
+    # One that was cut has no quality.
+    assert nearly_confirmed_in_a_row([flight(1.0, 0.1, None, 1.0)], or_better=True) == 0
+
+
 def with_envelope(width):
     """The pendulum's signals, with an envelope of so many scales about 0 of each state, or with none."""
     envelopes = [

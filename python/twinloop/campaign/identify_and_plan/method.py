@@ -157,7 +157,7 @@ class IdentifyAndPlan:
         found = self.planner.propose(
             committee,
             tuned,
-            self._flown(book, best, tuned),
+            self._flown(book, best, tuned, committee),
             self.setup.goal,
             len(book.tests),
             final or (self.setup.goal == "control" and len(book.flown) > 1 and not waits),
@@ -210,8 +210,9 @@ class IdentifyAndPlan:
         self.memory = replace(self.memory, asked=self._latest(), under_way=None)
         return test
 
-    def _flown(self, book: Logbook, best: Test | None, tuned: Floats) -> Flown:
+    def _flown(self, book: Logbook, best: Test | None, tuned: Floats, committee: Committee) -> Flown:
         """What the planner has to know of the flights so far."""
+        came_true = nearly_confirmed_in_a_row(book.experiments)
         known = best is not None and standing.flies(book, best.number)
         good = None
         if best is not None and known and standing.on_task(book, best):
@@ -225,7 +226,8 @@ class IdentifyAndPlan:
             times=1 if best is None else standing.times_flown(book, best.genes),
             fared=Fared(0, 0) if best is None else standing.fared(book, best.genes, excited=True),
             borne=standing.borne(book),
-            seen=None if nearly_confirmed_in_a_row(book.experiments) else self._seen(book),
+            seen=None if came_true else self._seen(book),
+            came_true=came_true if committee.explains else 0,
         )
 
     def _seen(self, book: Logbook) -> Seen:
@@ -257,7 +259,7 @@ class IdentifyAndPlan:
 
     def _within_reach(self, committee: Committee, tuned: Floats, book: Logbook) -> Floats:
         """Tuned gains; as long as no prediction has come true, only those that the next flight may be flown with."""
-        flown = self._flown(book, standing.best_flown(book), tuned)
+        flown = self._flown(book, standing.best_flown(book), tuned, committee)
         if flown.seen is None or not committee.predicts_limits:
             return tuned
         goal, number = self.setup.goal, len(book.tests)
@@ -295,8 +297,9 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        # Gains that tolerate a delay and fly as predicted say little of gains that do not: half of it remains.
-        periods = TOLERATED ** nearly_confirmed_in_a_row(book.experiments)
+        # Gains that tolerate a delay and fly as predicted say little of gains that do not: half of it remains. A delay
+        # that nobody knew of would make flights worse than predicted.
+        periods = TOLERATED ** nearly_confirmed_in_a_row(book.experiments, or_better=True)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
         wanted = self.options.delay_margin and not stands_in(latest.identified)
         slower = [delayed(latest.believed[0], self.setup.signals, periods)] if wanted else []

@@ -54,7 +54,7 @@ def confirmed(experiments: Sequence[Experiment]) -> bool:
     return run is None or _came_true(run, 0.0)
 
 
-def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
+def nearly_confirmed_in_a_row(experiments: Sequence[Experiment], or_better: bool = False) -> int:
     """How many of the last flights in a row came within two spreads of what was predicted, or a tenth of themselves.
 
     Where nothing was predicted yet, nothing is confirmed. Gains that had flown before count only where they miss: the
@@ -62,13 +62,14 @@ def nearly_confirmed_in_a_row(experiments: Sequence[Experiment]) -> int:
 
     Args:
         experiments: in the order of `tell`.
+        or_better: whether flights count as well that were better than predicted.
     """
     flown, count = set[bytes](), 0
     for run in experiments:
         if run.test is None:
             continue
         genes, predicted = run.test.genes.tobytes(), _predicted([run])
-        if predicted and not _came_true(run, NEARLY):
+        if predicted and not (_came_true(run, NEARLY) or (or_better and _better(run))):
             count = 0
         elif predicted and genes not in flown:
             count += 1
@@ -147,6 +148,12 @@ def _came_true(run: Experiment, share: float) -> bool:
     if test is None or test.predicted is None or test.spread is None or run.quality is None:
         return False
     return bool(abs(test.predicted - run.quality) <= max(SURE * test.spread, share * run.quality))
+
+
+def _better(run: Experiment) -> bool:
+    """Whether a quality was predicted, and a better one was flown."""
+    predicted = None if run.test is None else run.test.predicted
+    return predicted is not None and run.quality is not None and run.quality < predicted
 
 
 def unproven_risk(
