@@ -64,7 +64,7 @@ class IdentificationOptions:
         friction: whether dry friction is searched.
         lags: whether lags and delays of the actuators are searched.
         ramps: whether actuators may move at a limited rate.
-        at_once: whether a lag that is tuned to nearly 0 is dropped.
+        at_once: whether a lag that is tuned to nearly 0, or a limit of a rate that nothing meets, is dropped.
         apart: whether commands of the same unit and bounds may have different lags.
         longest_delay: of an actuator, periods, that is tried in any case; longer ones are tried if a lag may have
             replaced them.

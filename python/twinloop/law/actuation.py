@@ -174,6 +174,12 @@ class Actuation(Recorded, kind="actuation"):
         actuators = (Actuator() if i in commands else actuator for i, actuator in enumerate(self.actuators))
         return replace(self, actuators=tuple(actuators))
 
+    def unlimited(self, commands: Sequence[int]) -> Actuation:
+        """The same with some commands whose effect moves at any rate."""
+        free = enumerate(self.actuators)
+        actuators = (each._replace(ramp=0.0) if i in commands else each for i, each in free)
+        return replace(self, actuators=tuple(actuators))
+
     def bare(self) -> Actuation:
         """The same without hidden states."""
         return replace(self, hidden=())

@@ -9,10 +9,16 @@ from hypothesis import strategies as st
 
 import twinloop as tl
 from twinloop import _core
+from twinloop._ground.streams import Unit
 from twinloop.campaign.presets import options_of
-from twinloop.identification.evidence import LAGGING, price
+from twinloop.identification.context import Context
+from twinloop.identification.evidence import LAGGING, by_evidence, price
+from twinloop.identification.fit.fitting import fitted
 from twinloop.identification.identify import identify_runs
+from twinloop.identification.proposals.at_once import at_once
 from twinloop.identification.records import Run
+from twinloop.identification.search.selection import from_both_sides
+from twinloop.identification.starts import ANEW, begun
 from twinloop.law.actuation import Actuation, Actuator
 
 DT, STEPS = 0.05, 240
@@ -73,6 +79,22 @@ def test_none_is_found_where_there_is_none_and_where_none_was_met(lag, rate, siz
     # A gentle run never meets what a wild one would.
     runs = [sailed(seed, lag, rate, size, hold=1 if size < 0.1 else 16) for seed in (0, 1)]
     assert learnt(runs).actuation.actuators[0].ramp == 0.0
+
+
+@pytest.mark.parametrize(("rate", "stays"), [(0.4, True), (40.0, False)])
+def test_a_limit_that_tuning_has_shown_to_bind_nothing_is_dropped_and_one_that_does_stays(rate, stays):
+    runs = [sailed(seed, 0.12, rate).continued(SIGNALS) for seed in (0, 1)]
+    options = options_of("default", {**FAST, "lags": True})
+    context = Context(runs, SIGNALS, options, Unit(0), _core.Workers(1))
+    first = begun(context, "acceleration", context.first_pool(), ANEW)
+    first = replace(first, actuation=Actuation((Actuator(0.12, 0, None, 0.6 / min(rate, 5.0)),)))
+    limited = fitted(context, from_both_sides(context, first))
+    assert limited.actuation.actuators[0].ramp > 0.0
+    (free,) = at_once(context, limited)
+    assert free.actuation.actuators[0].ramp == 0.0
+    best = max([limited, free], key=by_evidence)
+    assert best is (limited if stays else free)
+    assert (free.evidence.length < limited.evidence.length) is not stays
 
 
 def test_a_limited_rate_is_paid_for_like_a_lag():

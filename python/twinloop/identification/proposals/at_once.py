@@ -1,4 +1,4 @@
-"""At once: a lag that tuning has shown to be nothing is none, and need not be paid for."""
+"""At once: a lag or a limited rate that tuning has shown to be nothing is none, and need not be paid for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NOTHING = 0.05
 
 
 def at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """The hypothesis with groups of commands that act at once where they hardly lag, fitted again."""
+    """The hypothesis with groups of commands that act at once where they hardly lag, and without limits of rates."""
     wanted = context.options.lags and context.options.at_once
     if hypothesis.fit is None or not hypothesis.fit.stable or not wanted:
         return
@@ -25,3 +25,7 @@ def at_once(context: Context, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
             actuation = actuation.at_once(group)
     if actuation is not hypothesis.actuation:
         yield fitted(context, replace(hypothesis, actuation=actuation, fit=None))
+    # Whether a rate is limited shows where it is met; a lag that was tuned since may have taken its place.
+    for group in hypothesis.alike:
+        if any(actuation.actuators[i].ramp > 0.0 for i in group):
+            yield fitted(context, replace(hypothesis, actuation=actuation.unlimited(group), fit=None))
