@@ -400,7 +400,7 @@ def test_the_delay_that_gains_must_bear_halves_with_each_prediction_that_comes_t
         return after.delay - before.delay, (after.lag - before.lag) / SIGNALS.dt
 
     assert later() == (1, 0.0)
-    for came_true, delay, lag in ((1, 0, 0.5), (2, 0, 0.25), (4, 0, 0.0625)):
+    for came_true, delay, lag in ((1, 0, 0.25), (2, 0, 0.0625), (3, 0, 0.015625)):
         with mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=came_true):
             assert later() == (delay, pytest.approx(lag))
 

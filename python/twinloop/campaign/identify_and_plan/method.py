@@ -39,7 +39,7 @@ from twinloop.planning.seen import Seen
 from twinloop.records import Record
 from twinloop.test import Test
 
-TOLERATED = 0.5
+TOLERATED = 0.25
 """Share that is left of the delay that gains have to tolerate, after each prediction that came true."""
 
 
@@ -297,7 +297,7 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        # Gains that tolerate a delay and fly as predicted say little of gains that do not: half of it remains. A delay
+        # Gains that tolerate a delay and fly as predicted say little of gains that do not: a quarter of it is left. One
         # that nobody knew of would make flights worse than predicted.
         periods = TOLERATED ** nearly_confirmed_in_a_row(book.experiments, or_better=True)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
