@@ -534,12 +534,18 @@ def test_gains_bear_a_period_more_of_delay_as_long_as_no_prediction_has_come_tru
     slow = delayed(quick, known)
     sds, planner = np.array([1e-3, 5e-3]), planner_of(known, evaluations=2048)
     gentle = np.array([0.2, 0.0, 0.1])
-    tuned, wary = (planner.tune(Committee([quick], sds, True, late), [gentle], 1) for late in ((), (slow,)))
+    tuned, wary = (
+        planner.tune(Committee([quick], sds, True, late, late=late), [gentle], 1) for late in ((), (slow,))
+    )
+    # Those that only have to keep the envelope with it are better without it.
+    able = planner.tune(Committee([quick], sds, True, (slow,)), [gentle], 1)
 
     def worth(genes, model):
         return float(planner.judge([model], genes[None], sds, 1).mean[0])
 
-    assert worth(tuned, quick) < worth(wary, quick) < worth(gentle, quick)
+    assert worth(tuned, quick) < worth(able, quick) < worth(wary, quick) < worth(gentle, quick)
+    usage = planner.judge([slow], np.stack([able, tuned]), sds, 1).worst_usage
+    assert usage[0] <= 1.0 - planner.options.margin < usage[1]
     assert worth(wary, slow) < 2.0 * worth(wary, quick)
     assert not worth(tuned, slow) < worth(wary, slow)
     # A flight that does not bear it is not proposed, but gains that fly are.

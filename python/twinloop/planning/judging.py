@@ -42,7 +42,8 @@ class Committee:
         members: m of them.
         sds: of each state's sensor (n_x,).
         trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
-        delayed: models with more delay than was seen, which gains have to tolerate.
+        delayed: models with more delay than was seen, with which gains have to keep the envelope.
+        late: such models, with less of it, with which gains are also to fly well.
         explains: whether the best one explains the runs.
         gusts: disturbances that are known; None: nothing disturbs.
     """
@@ -53,6 +54,7 @@ class Committee:
     delayed: Sequence[_core.Model] = ()
     explains: bool = True
     gusts: Gusts | None = None
+    late: Sequence[_core.Model] = ()
 
     @property
     def predicts_limits(self) -> bool:

@@ -79,17 +79,17 @@ class Planner(Judge):
             other = 0.5 * places[0] + 0.5 * stream.uniforms(self.family.size)
             all_starts.append(self.family.from_unit(other))
         scored = scored or Scored()
-        delayed = list(committee.delayed)
-        first = [*committee.members[:1], *delayed]
-        best = self._searched(first, committee.sds, 1, all_starts, 0.2, number, "gains", scored)
-        members = [*committee.members[: max(1, options.tuning_members - len(delayed))], *delayed]
+        late = list(committee.late)
+        first = [*committee.members[:1], *late]
+        best = self._searched(committee, first, 1, all_starts, 0.2, number, "gains", scored)
+        members = [*committee.members[: max(1, options.tuning_members - len(late))], *late]
         fine = [best, starts[0]]
-        return self._searched(members, committee.sds, options.draws, fine, 0.08, number, "fine_gains", scored)
+        return self._searched(committee, members, options.draws, fine, 0.08, number, "fine_gains", scored)
 
     def _searched(
         self,
+        committee: Committee,
         members: Sequence[_core.Model],
-        sds: Floats,
         draws: int,
         starts: Sequence[Floats],
         spread: float,
@@ -98,7 +98,7 @@ class Planner(Judge):
         scored: Scored,
     ) -> Floats:
         """One of two searches, with half of the evaluations."""
-        options = self.options
+        options, sds = self.options, committee.sds
 
         first = float(self.judge(members, starts[0][np.newaxis], sds, draws).mean[0])
         unit = first if np.isfinite(first) else 0.0
@@ -109,8 +109,11 @@ class Planner(Judge):
             mean = lasts.qualities.sum(axis=(0, 1)) / np.maximum(
                 1, np.isfinite(judged.qualities).sum(axis=(0, 1))
             )
-            excess = np.maximum(0.0, lasts.worst_usage - (1.0 - options.margin))
-            return scores_of(judged.lost, mean, excess, unit)
+            lost, usage = judged.lost, lasts.worst_usage
+            if committee.delayed and committee.delayed is not committee.late:
+                delayed = self.judge(committee.delayed, genes, sds, draws)
+                lost, usage = lost + delayed.lost, np.maximum(usage, delayed.finite.worst_usage)
+            return scores_of(lost, mean, np.maximum(0.0, usage - (1.0 - options.margin)), unit)
 
         return tune_gains(
             self.family, scored(score), starts, evaluations=options.evaluations // 2, spread=spread,

@@ -37,7 +37,7 @@ def experiment(predicted=None, quality=1.0, spread=0.01):
 def chosen(
     new, old=1.0, recorded=None, again=1.0, measured=1.0, usage=0.5, flies=True, confidence=0.8, trusted=True,
     experiments=(), unfit=(), best=FLOWN, best_measured=FLOWN, track_record=True, gusts=UNMOVED, explained=True,
-    fared=KEPT, in_gusts=None,
+    fared=KEPT, in_gusts=None, delayed=None,
 ):  # fmt: skip
     """The answer where a twin of one member and four draws says this of the gains tuned and of those flown."""
     new = np.broadcast_to(np.asarray(new, dtype=float), 4)
@@ -51,6 +51,8 @@ def chosen(
         values[0, :, 0] = new if recorded is None or not measured else recorded
         usages = np.full((1, 4, len(genes)), 0.5)
         usages[0, 0, 0] = usage
+        if members == ["delayed"]:
+            usages[0, -1] = delayed
         return Judged(values, usages)
 
     runs = [experiment(), *experiments]
@@ -63,7 +65,8 @@ def chosen(
         options=PlanningOptions(track_record=track_record),
     )  # fmt: skip
     blown = SimpleNamespace(on=lambda test: in_gusts if in_gusts and (test.genes == TUNED).all() else gusts)
-    committee = Committee([None], np.zeros(2), trusted, explains=explained, gusts=blown)
+    late = [] if delayed is None else ["delayed"]
+    committee = Committee([None], np.zeros(2), trusted, late, explained, blown)
     choice = Choice(planner, committee, book, 4, confidence)
     with mock.patch.multiple(
         standing, finishes=lambda book, test: True, flies=lambda book, test: flies,
@@ -89,6 +92,15 @@ def test_gains_that_have_not_flown_must_promise_more_than_predictions_have_misse
     # Predictions that come true show of how little gains can be trusted to be better.
     assert chosen(0.95, experiments=[*runs, experiment(1.01), experiment(1.01)])[0] == "tuned"
     assert chosen(0.985)[0] == "flown" and chosen(0.975)[0] == "tuned"
+
+
+@pytest.mark.parametrize(
+    ("delayed", "answer"),
+    [((0.9, 0.9), "tuned"), ((1.1, 0.9), "flown"), ((np.inf, 1.0), "flown"), ((1.1, 1.1), "tuned")],
+)
+def test_gains_that_bear_less_delay_than_the_flown_ones_are_not_preferred(delayed, answer):
+    found, reason = chosen(0.9, delayed=delayed)
+    assert found == answer and ("with more delay than was found" in reason) == (answer == "flown")
 
 
 @pytest.mark.parametrize(

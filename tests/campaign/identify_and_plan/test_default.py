@@ -388,21 +388,26 @@ def test_gains_must_bear_more_delay_until_a_prediction_has_come_true(begin, pend
     assert len(campaign._method._committee(campaign._book).delayed) == bears
 
 
-def test_the_delay_that_gains_must_bear_halves_with_each_prediction_that_comes_true(begin, pendulum):
+def test_the_delay_that_gains_bear_and_the_one_they_fly_well_with_shrink_with_each_prediction_that_comes_true(
+    begin, pendulum
+):
     campaign = told(begin(), pendulum)
     _ = campaign.twin
     method, book = campaign._method, campaign._book
 
-    def later():
-        """By how many periods the slower model acts later, as a delay and as a lag."""
-        quick, slow = method._latest().believed[0], method._committee(book).delayed[0]
-        (before,), (after,) = (Actuation.of(model, SIGNALS).actuators for model in (quick, slow))
+    def later(slower):
+        """By how many periods a slower model acts later, as a delay and as a lag."""
+        models = method._latest().believed[0], slower[0]
+        (before,), (after,) = (Actuation.of(model, SIGNALS).actuators for model in models)
         return after.delay - before.delay, (after.lag - before.lag) / SIGNALS.dt
 
-    assert later() == (1, 0.0)
-    for came_true, delay, lag in ((1, 0, 0.25), (2, 0, 0.0625), (3, 0, 0.015625)):
+    committee = method._committee(book)
+    assert later(committee.delayed) == (1, 0.0) and committee.late is committee.delayed
+    for came_true, borne, counted in ((1, 0.5, 0.25), (2, 0.25, 0.0625), (3, 0.125, 0.015625)):
         with mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=came_true):
-            assert later() == (delay, pytest.approx(lag))
+            committee = method._committee(book)
+            assert later(committee.delayed) == (0, pytest.approx(borne))
+            assert later(committee.late) == (0, pytest.approx(counted))
 
 
 def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committee_with_parts(

@@ -139,8 +139,12 @@ class Choice:
         elsewhere = judged if off is None else self._judge(members, tuned[np.newaxis], off=off)
         if any(outside(flights.usages[:, :, 0]).any() for flights in (judged, elsewhere)):
             return "a model predicts that those preferred by the twin leave the envelope"
-        borne = 0 if flown is None else self._moved(flown.genes).left
-        if self._moved(tuned).left > borne:
+        if flown is not None and self.committee.delayed:
+            delayed = self._judge(self.committee.delayed, np.stack([tuned, flown.genes]))
+            left, borne = outside(delayed.worst_usage)
+            if left and not borne:
+                return "with more delay than was found those preferred by the twin leave the envelope"
+        if self._moved(tuned).left > (0 if flown is None else self._moved(flown.genes).left):
             return "in disturbances as the flights felt them, those preferred by the twin leave the envelope"
         return ""
 

@@ -29,7 +29,7 @@ from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
-from twinloop.law.actuation import delayed
+from twinloop.law.actuation import delayed as later
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -39,8 +39,10 @@ from twinloop.planning.seen import Seen
 from twinloop.records import Record
 from twinloop.test import Test
 
-TOLERATED = 0.25
+TOLERATED = 0.5
 """Share that is left of the delay that gains have to tolerate, after each prediction that came true."""
+COUNTED = 0.25
+"""The same of the delay with which they are also to fly well: that costs quality without it."""
 
 
 class IdentifyAndPlan:
@@ -297,14 +299,18 @@ class IdentifyAndPlan:
     def _committee(self, book: Logbook) -> Committee:
         latest = self._latest()
         sensors = latest.identified.sensors(self.setup.signals.n_x)
-        # Gains that tolerate a delay and fly as predicted say little of gains that do not: a quarter of it is left. One
+        # Gains that tolerate a delay and fly as predicted say little of gains that do not: a part of it is left. One
         # that nobody knew of would make flights worse than predicted.
-        periods = TOLERATED ** nearly_confirmed_in_a_row(book.experiments, or_better=True)
+        true = nearly_confirmed_in_a_row(book.experiments, or_better=True)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
         wanted = self.options.delay_margin and not stands_in(latest.identified)
-        slower = [delayed(latest.believed[0], self.setup.signals, periods)] if wanted else []
+        delayed, late = (
+            [later(latest.believed[0], self.setup.signals, share**true)] if wanted else []
+            for share in (TOLERATED, COUNTED)
+        )
         gusts = self._gusts(latest, len(book.experiments))
-        return Committee(latest.believed, sensors, latest.follows, slower, latest.explained, gusts)
+        late = late if true and wanted else delayed
+        return Committee(latest.believed, sensors, latest.follows, delayed, latest.explained, gusts, late)
 
     def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
         """Disturbances that are known; none that are known to be a model error."""
