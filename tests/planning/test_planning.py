@@ -535,7 +535,8 @@ def test_gains_bear_a_period_more_of_delay_as_long_as_no_prediction_has_come_tru
     sds, planner = np.array([1e-3, 5e-3]), planner_of(known, evaluations=2048)
     gentle = np.array([0.2, 0.0, 0.1])
     tuned, wary = (
-        planner.tune(Committee([quick], sds, True, late, late=late), [gentle], 1) for late in ((), (slow,))
+        planner.tune(Committee([quick], sds, True, late, tuned_delayed=late), [gentle], 1)
+        for late in ((), (slow,))
     )
     # Those that only have to keep the envelope with it are better without it.
     able = planner.tune(Committee([quick], sds, True, (slow,)), [gentle], 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,13 +55,12 @@ class Comparison:
         self.drafts, self.flown, self.wanted = drafts, flown, wanted
         genes, excitation, ends = drafts.genes, drafts.excitation, drafts.ends
         reach = reach_of(flown, wanted.goal, options)
-        # A member that diverges whatever is flown is no member (E-SINDy).
-        stable = judge.stable_members(committee.members, genes, excitation, ends)
-        quiet = judge.judge(stable, genes, committee.sds, 1, excitation, ends)
-        # Nor is one that goes too far whatever is flown, the best gains flown among them: it would forbid all flights.
-        heeded = (quiet.usages[:, 0] <= reach).any(axis=1) | (np.arange(len(stable)) == 0)
-        self.members = [stable[i] for i in np.flatnonzero(heeded)]
-        self.quiet = Judged(quiet.qualities[heeded], quiet.usages[heeded])
+        everyone = judge.judge(committee.members, genes, committee.sds, 1, excitation, ends)
+        # A member that diverges whatever is flown is no member (E-SINDy). Nor is one that goes too far whatever is
+        # flown, the best gains flown among them: it would forbid all flights.
+        heeded = everyone.stable & (everyone.usages[:, 0] <= reach).any(axis=1)
+        heeded[0] = True
+        self.members, self.quiet = list(compress(committee.members, heeded)), everyone.of(heeded)
         # Differences below these are rounding.
         smallest = np.array([1e-6 * state.scale for state in judge.signals.states])
         self.tells, self.where = disagreements(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop._experiment.envelope import outside
@@ -43,7 +45,7 @@ class Committee:
         sds: of each state's sensor (n_x,).
         trusted: whether the best one, flown by itself, follows at least half of the runs that it was learnt from.
         delayed: models with more delay than was seen, with which gains have to keep the envelope.
-        late: such models, with less of it, with which gains are also to fly well.
+        tuned_delayed: such models with less of it, on which gains are also tuned.
         explains: whether the best one explains the runs.
         gusts: disturbances that are known; None: nothing disturbs.
     """
@@ -54,7 +56,7 @@ class Committee:
     delayed: Sequence[_core.Model] = ()
     explains: bool = True
     gusts: Gusts | None = None
-    late: Sequence[_core.Model] = ()
+    tuned_delayed: Sequence[_core.Model] = ()
 
     @property
     def predicts_limits(self) -> bool:
@@ -81,6 +83,17 @@ class Judged:
         """Over members and draws (K,); infinite where any flight diverges."""
         mean: Floats = self.qualities.mean(axis=(0, 1))
         return mean
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Members that diverge on fewer than half of the flights; the best one in any case (members,)."""
+        stable: NDArray[np.bool_] = np.isinf(self.qualities).any(axis=1).mean(axis=1) < 0.5
+        stable[0] = True
+        return stable
+
+    def of(self, members: NDArray[np.bool_]) -> Judged:
+        """The same of some members."""
+        return Judged(self.qualities[members], self.usages[members])
 
     @property
     def lost(self) -> Floats:
@@ -223,8 +236,7 @@ class Judge:
     ) -> list[_core.Model]:
         """Members that diverge on fewer than half of the flights; the best one in any case."""
         judged = self.judge(members, genes, np.zeros(self.signals.n_x), 1, excitation, ends)
-        share = np.isinf(judged.qualities).any(axis=1).mean(axis=1)
-        return [member for i, member in enumerate(members) if i == 0 or share[i] < 0.5]
+        return list(compress(members, judged.stable))
 
     def noise(self, sds: Floats, draws: int, reports: Reports) -> Floats | None:
         """The same draws of sensor noise for everybody, as it is given (draws, n + 1, n_x); None for a quiet flight."""

@@ -79,10 +79,10 @@ class Planner(Judge):
             other = 0.5 * places[0] + 0.5 * stream.uniforms(self.family.size)
             all_starts.append(self.family.from_unit(other))
         scored = scored or Scored()
-        late = list(committee.late)
-        first = [*committee.members[:1], *late]
+        delayed = list(committee.tuned_delayed)
+        first = [*committee.members[:1], *delayed]
         best = self._searched(committee, first, 1, all_starts, 0.2, number, "gains", scored)
-        members = [*committee.members[: max(1, options.tuning_members - len(late))], *late]
+        members = [*committee.members[: max(1, options.tuning_members - len(delayed))], *delayed]
         fine = [best, starts[0]]
         return self._searched(committee, members, options.draws, fine, 0.08, number, "fine_gains", scored)
 
@@ -99,6 +99,7 @@ class Planner(Judge):
     ) -> Floats:
         """One of two searches, with half of the evaluations."""
         options, sds = self.options, committee.sds
+        limiting = [model for model in committee.delayed if model not in committee.tuned_delayed]
 
         first = float(self.judge(members, starts[0][np.newaxis], sds, draws).mean[0])
         unit = first if np.isfinite(first) else 0.0
@@ -110,8 +111,8 @@ class Planner(Judge):
                 1, np.isfinite(judged.qualities).sum(axis=(0, 1))
             )
             lost, usage = judged.lost, lasts.worst_usage
-            if committee.delayed and committee.delayed is not committee.late:
-                delayed = self.judge(committee.delayed, genes, sds, draws)
+            if limiting:
+                delayed = self.judge(limiting, genes, sds, draws)
                 lost, usage = lost + delayed.lost, np.maximum(usage, delayed.finite.worst_usage)
             return scores_of(lost, mean, np.maximum(0.0, usage - (1.0 - options.margin)), unit)
 

@@ -48,9 +48,9 @@ class PlanningOptions:
         evaluations: number of flights on which gains are tuned at most, for each member and draw.
         tuning_starts: number of starts of the tuning.
         tuning_members: members of the committee on which gains are tuned; 1: the best model only.
-        delay_margin: whether gains are tuned on, and must tolerate, one more period of delay; for each of the last
-            predictions of new gains in a row that came true, or that the flight was better than, they must tolerate
-            half of that, and are tuned on a quarter.
+        delay_margin: whether gains are tuned with, and must tolerate, one more period of delay; for each of the last
+            predictions of new gains in a row that came true, or that the flight was better than, the delay that gains
+            must tolerate is halved, and the one that they are tuned with is quartered.
         confidence: share of members and draws that must find new gains better than the best flown ones, by half a
             percent or more, and by more than predictions have missed of late.
         track_record: whether new gains must also be better by the error of earlier predictions.

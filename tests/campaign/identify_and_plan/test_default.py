@@ -402,12 +402,12 @@ def test_the_delay_that_gains_bear_and_the_one_they_fly_well_with_shrink_with_ea
         return after.delay - before.delay, (after.lag - before.lag) / SIGNALS.dt
 
     committee = method._committee(book)
-    assert later(committee.delayed) == (1, 0.0) and committee.late is committee.delayed
+    assert later(committee.delayed) == (1, 0.0) and committee.tuned_delayed is committee.delayed
     for came_true, borne, counted in ((1, 0.5, 0.25), (2, 0.25, 0.0625), (3, 0.125, 0.015625)):
         with mock.patch.object(method_of_default, "nearly_confirmed_in_a_row", return_value=came_true):
             committee = method._committee(book)
             assert later(committee.delayed) == (0, pytest.approx(borne))
-            assert later(committee.late) == (0, pytest.approx(counted))
+            assert later(committee.tuned_delayed) == (0, pytest.approx(counted))
 
 
 def test_the_band_is_wider_by_what_flights_have_shown_but_not_those_of_a_committee_with_parts(

@@ -29,7 +29,7 @@ from twinloop.campaign.presets import DefaultOptions
 from twinloop.campaign.setup import Setup
 from twinloop.errors import NotAvailable
 from twinloop.identification.identify import UnderWay
-from twinloop.law.actuation import delayed as later
+from twinloop.law.actuation import delayed
 from twinloop.planning.gusts import Gusts
 from twinloop.planning.judging import Committee, Task
 from twinloop.planning.planner import Planner
@@ -41,8 +41,8 @@ from twinloop.test import Test
 
 TOLERATED = 0.5
 """Share that is left of the delay that gains have to tolerate, after each prediction that came true."""
-COUNTED = 0.25
-"""The same of the delay with which they are also to fly well: that costs quality without it."""
+TUNED_WITH = 0.25
+"""The same of the delay with which they are tuned: to fly well with it costs quality without it."""
 
 
 class IdentifyAndPlan:
@@ -304,13 +304,20 @@ class IdentifyAndPlan:
         true = nearly_confirmed_in_a_row(book.experiments, or_better=True)
         # The lag of a linear twin that stands for what no law explains is such a margin already.
         wanted = self.options.delay_margin and not stands_in(latest.identified)
-        delayed, late = (
-            [later(latest.believed[0], self.setup.signals, share**true)] if wanted else []
-            for share in (TOLERATED, COUNTED)
+
+        def slower(share: float) -> list[_core.Model]:
+            return [delayed(latest.believed[0], self.setup.signals, share**true)] if wanted else []
+
+        borne = slower(TOLERATED)
+        return Committee(
+            latest.believed,
+            sensors,
+            latest.follows,
+            borne,
+            latest.explained,
+            self._gusts(latest, len(book.experiments)),
+            slower(TUNED_WITH) if true else borne,
         )
-        gusts = self._gusts(latest, len(book.experiments))
-        late = late if true and wanted else delayed
-        return Committee(latest.believed, sensors, latest.follows, delayed, latest.explained, gusts, late)
 
     def _gusts(self, latest: Learnt, experiments: int) -> Gusts:
         """Disturbances that are known; none that are known to be a model error."""
