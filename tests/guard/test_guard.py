@@ -219,6 +219,30 @@ def test_a_command_or_other_gains_may_be_the_fallback(campaign):
             campaign.guard(test, wrong)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ([99.0], "torque within its bounds, -2 to 2 N m, found 99"),
+        ([-2.001], "found -2.001"),
+        ([np.nan], "expected finite numbers"),
+        ([-np.inf], "expected finite numbers"),
+    ],
+)
+def test_a_command_that_may_not_be_sent_is_no_fallback(wrong, words):
+    with pytest.raises(tl.InvalidInput, match=words):
+        Guard(new_campaign().test(GOOD), wrong)
+    for bound in SIGNALS.commands[0].bounds:
+        guard = Guard(new_campaign().test(GOOD), [bound], clock=None)
+        assert guard.command([np.nan, 0.0], [0.8, 0.0]) == bound
+
+
+def test_a_controller_of_other_signals_is_no_fallback():
+    strong = dataclasses.replace(SIGNALS, commands=[tl.Command("torque", "N m", bounds=(-50.0, 50.0))])
+    with pytest.raises(tl.InvalidInput, match="signals of the test"):
+        Guard(new_campaign().test(GOOD), PENDULUM_CONTROLLER.bind(strong).controller([6.0, 0.0, 0.0]))
+    Guard(new_campaign().test(GOOD), PENDULUM_CONTROLLER.bind(PENDULUM_SIGNALS).controller([6.0, 0.0, 0.0]))
+
+
 # Band
 
 

@@ -15,6 +15,7 @@ from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard.band import BandWatch
 from twinloop.guard.sensors import SensorWatch
 from twinloop.law.twin import Twin
+from twinloop.signals import Bounds, Signals
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory
 
@@ -36,7 +37,8 @@ class Guard:
 
     Args:
         test: to fly.
-        fallback: a controller, or a command that is safe to hold (n_u,), in its units.
+        fallback: a controller for the same signals, or a command that is safe to hold (n_u,), in its units and within
+            its bounds.
         twin: for the prediction and the band; None: only readings, envelope and clock are checked.
         flown: flights so far with their tests, on which the band is checked.
         horizon: of the prediction, s; 0: no prediction. None: a fifth of the test.
@@ -65,10 +67,7 @@ class Guard:
         self.test = test
         self.signals = test.family.signals
         n_x, n_u = self.signals.n_x, self.signals.n_u
-        if isinstance(fallback, Controller):
-            self.fallback: Controller | Floats = fallback
-        else:
-            self.fallback = floats("Guard, fallback (a command)", fallback, (n_u,))
+        self.fallback = _safe(fallback, self.signals)
         dt = self.signals.dt
         length = HORIZON * test.steps * dt if horizon is None else horizon
         self.horizon = round(at_least_zero("Guard, horizon (s)", length) / dt)
@@ -238,6 +237,38 @@ class Guard:
             return reading
         before = self.test.initial_state if self._estimate is None else self._estimate
         return np.where(wrong, before, reading)
+
+
+def _safe(fallback: Controller | ArrayLike, signals: Signals) -> Controller | Floats:
+    """A fallback that sends nothing beyond the bounds of the commands."""
+    if isinstance(fallback, Controller):
+        own = fallback.family.signals
+        for what, expected, found in (
+            ("states", signals.state_names, own.state_names),
+            ("periodic states", signals.periods, own.periods),
+            ("commands", _sendable(signals), _sendable(own)),
+            ("period", signals.dt, own.dt),
+        ):
+            if expected != found:
+                raise InvalidInput(
+                    f"Guard, fallback: expected a controller with the {what} {expected} of the test, found {found};"
+                    " bind its family to the signals of the test."
+                )
+        return fallback
+    held = floats("Guard, fallback (a command)", fallback, (signals.n_u,))
+    for command, value in zip(signals.commands, held.tolist(), strict=True):
+        low, high = command.bounds
+        if not low <= value <= high:
+            raise InvalidInput(
+                f"Guard, fallback: expected {command.name} within its bounds, {low:g} to {high:g} {command.unit}, found"
+                f" {value:g}; hold a command that may be sent."
+            )
+    return held
+
+
+def _sendable(signals: Signals) -> list[tuple[str, Bounds]]:
+    """Names and bounds of the commands."""
+    return [(command.name, command.bounds) for command in signals.commands]
 
 
 def _look_ahead(test: Test, twin: Twin, bounds: list[tuple[float, float]]) -> _core.LookAhead:
