@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import twinloop as tl
+from twinloop._experiment.envelope import outside, usages_of
 from twinloop._ground.arrays import Floats
 from twinloop.guard import Guard
 from twinloop.guard.guarded import led_by
@@ -96,11 +97,8 @@ class Count:
 
 def leaves(states: Floats, signals: tl.Signals) -> int | None:
     """The first period whose true state is outside."""
-    outside = np.zeros(len(states), bool)
-    for column, state in zip(states.T, signals.states, strict=True):
-        if state.envelope is not None:
-            outside |= (column < state.envelope[0]) | (column > state.envelope[1])
-    return int(np.argmax(outside)) if outside.any() else None
+    beyond = outside(usages_of(signals, states))
+    return int(np.argmax(beyond)) if beyond.any() else None
 
 
 def flown(subject: Subject, seed: int, test: tl.Test, law: object | None) -> Floats:

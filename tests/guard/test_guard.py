@@ -13,6 +13,7 @@ from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, pend
 from lives import THOROUGH
 from oracles import same_bits
 from twinloop import _core
+from twinloop._experiment.envelope import outside, usages_of
 from twinloop._experiment.hold_back import HoldBack
 from twinloop.guard import Guard, Guarded, band
 from twinloop.guard.band import DRAWS, BandWatch
@@ -81,7 +82,7 @@ def slow_leaving(members, test, past_readings, past_commands, reading, horizon, 
     return soonest
 
 
-def members_with_memory():
+def members_with_memory(signals=SIGNALS):
     """A pendulum with a lag and one with a delay, the second one weaker."""
     program = "r4 = r2 {gain}\nr0 = r4"
     made = []
@@ -90,7 +91,7 @@ def members_with_memory():
         pages = [[("*", 3, 2, 2.0 * gain), ("*", 4, 1, 1.1), ("-", 3, 3, 4), ("sin", 4, 0, None), ("*", 4, 4, 24.5),
                   ("-", 3, 3, 4)]]  # fmt: skip
         program = _core.Program(3, 1, 5, pages)
-        made.append(_core.Model(program, "acceleration", SIGNALS.engine, [actuator]))
+        made.append(_core.Model(program, "acceleration", signals.engine, [actuator]))
     return made
 
 
@@ -355,6 +356,64 @@ def test_before_anything_is_known_readings_and_envelope_are_watched():
         guard.command([angle, 0.0], test.target(0))
     assert guard.tripped_at == 2 and "angle has left its envelope: 1.31 rad" in guard.reason
     assert not new_campaign().guard(test, clock=None).tripped
+
+
+ENVELOPES = st.tuples(st.floats(-20.0, 20.0), st.floats(0.1, 9.0)).map(lambda found: (found[0], sum(found)))
+
+
+@given(
+    data=st.data(),
+    periods=st.lists(st.sampled_from([False, 2.0 * np.pi, 10.0, 360.0]), min_size=1, max_size=3),
+)
+def test_a_guard_ends_a_flight_at_the_first_reading_that_the_rest_counts_as_outside_and_at_no_other(
+    data, periods
+):
+    states = [
+        tl.State(f"x{i}", "u", scale=5.0, envelope=data.draw(st.none() | ENVELOPES), periodic=period)
+        for i, period in enumerate(periods)
+    ]
+    signals = tl.Signals(states, SIGNALS.commands, 0.05)
+    family = tl.controllers.StateFeedback(None, (-1.0, 1.0)).bind(signals)
+    start = np.zeros(len(states))
+    test = tl.Test(family, np.zeros(family.size), start, start, 12)
+
+    def reading(state):
+        low, high = state.envelope or (-1.0, 1.0)
+        near = st.floats(low - 0.2 * (high - low), high + 0.2 * (high - low))
+        turns = st.integers(-3, 3) if state.period is not None else st.just(0)
+        return st.builds(lambda value, turn: value + turn * (state.period or 0.0), near, turns)
+
+    readings = np.array(data.draw(st.lists(st.tuples(*map(reading, states)), min_size=12, max_size=12)))
+    beyond = outside(usages_of(signals, readings))
+    guard = Guard(test, np.zeros(1), horizon=0.0, clock=None)
+    for row in readings:
+        guard.command(row, start)
+    assert guard.tripped_at == (int(np.argmax(beyond)) if beyond.any() else None)
+    if not guard.tripped:
+        return
+    # By the bounds themselves: some number of turns would bring every other state inside, and none brings this one.
+    (name,) = (state.name for state in states if f"{state.name} has left its envelope" in guard.reason)
+    i = signals.state_names.index(name)
+    turned = readings[guard.tripped_at, i] + np.arange(-9, 10) * (states[i].period or 0.0)
+    low, high = states[i].envelope
+    assert not ((turned >= low + 1e-9) & (turned <= high - 1e-9)).any()
+
+
+@pytest.mark.parametrize("turns", [-1, 2])
+def test_an_angle_that_is_read_some_turns_off_is_watched_alike_and_ahead(turns):
+    angle, rate = SIGNALS.states
+    signals = dataclasses.replace(SIGNALS, states=(dataclasses.replace(angle, periodic=True), rate))
+    members, family = members_with_memory(signals), PENDULUM_CONTROLLER.bind(signals)
+    twin = tl.Twin(members[0], signals, members=members)
+    for gains in (GOOD, WILD):
+        test = tl.Test(family, family.genes(gains), [0.0, 0.0], [0.8, 0.0], 30)
+        found = []
+        for offset in (0.0, 2.0 * np.pi * turns):
+            guard = Guard(test, [0.0], twin=twin, horizon=0.3, clock=None)
+            fly(guard, test, lambda k, x, offset=offset: x + np.array([offset, 0.0]))
+            found.append((guard.tripped_at, guard.reason))
+        assert found[0] == found[1]
+        assert ("angle would leave its envelope" in found[0][1]) == (gains is WILD)
 
 
 def test_wrong_arguments_are_refused(campaign):

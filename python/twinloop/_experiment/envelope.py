@@ -2,7 +2,8 @@
 
 A simulated flight knows its true states, drawn noise or not, so that one beyond a bound is enough. Of a flown one
 readings are all that is known, and a single one may be the sensor's: two in a row must be outside, as noise is drawn
-anew for each. Both look at the usage of the envelope, the most of all states: 1 at a bound, and more outside.
+anew for each. A guard waits for no second one, for it may be too late then. All look at the usage of the envelope, the
+most of all states: 1 at a bound, and more outside.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from twinloop import _core
+from twinloop._experiment.envelope import outside, usages_of
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, NotAvailable
@@ -79,7 +80,9 @@ class Guard:
         bounds = [
             (-np.inf, np.inf) if state.envelope is None else state.envelope for state in self.signals.states
         ]
-        self.low, self.high = np.array(bounds).T
+        # A periodic state turns up at any number of turns; those around the middle are those that the bounds mean.
+        self._middle = np.array([0.0 if np.isinf(low) else 0.5 * (low + high) for low, high in bounds])
+        self._half = np.array([0.5 * (high - low) for low, high in bounds])
         self._ahead = None if twin is None or not self.horizon else _look_ahead(test, twin, bounds)
         drawn = twin is not None and twin.members and twin.noise is not None
         self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
@@ -197,9 +200,9 @@ class Guard:
         late = self._late()
         if late is not None:
             return self._trip(f"a period took {late:.3g} s instead of {self.signals.dt:g} s")
-        outside = (reading < self.low) | (reading > self.high)
-        if outside.any():
-            i = int(np.argmax(outside))
+        if outside(usages_of(self.signals, reading[np.newaxis])).any():
+            used = np.abs(self.signals.difference(reading, self._middle)) / self._half
+            i = int(np.argmax(used))
             return self._trip(
                 f"{states[i].name} has left its envelope: {reading[i]:.4g} {states[i].unit}".rstrip()
             )
@@ -209,7 +212,8 @@ class Guard:
                 f"readings were outside of the twin's band for too long, {count} periods in a row now"
             )
         if self._ahead is not None and self.period < self.test.steps:
-            found = self._ahead.leaving(reading, self.horizon)
+            near = self.signals.continued(reading[np.newaxis], self._middle)[0]
+            found = self._ahead.leaving(near, self.horizon)
             self._leaving = 0 if found is None else self._leaving + 1
             if found is not None and (self._leaving >= CERTAIN or found[0] < CERTAIN):
                 seconds = found[0] * self.signals.dt
