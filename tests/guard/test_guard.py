@@ -309,6 +309,18 @@ def test_a_reading_that_is_none_ends_the_flight_and_the_fallback_flies_on_what_t
     assert told.steps == 9 and same_bits(told.states, states[:10])
 
 
+def test_a_flight_whose_first_reading_is_none_has_no_period_and_starts_where_the_test_does():
+    test = dataclasses.replace(new_campaign().test(GOOD), initial_state=np.array([0.25, 0.0]))
+    for number in range(20):
+        junk = np.full((test.steps + 1, 2), 7.5 + number)  # what new memory may hold
+        del junk
+        guard = Guard(test, [0.0], clock=None)
+        guard.command([np.nan, 0.0], test.target(0))
+        flown = guard.trajectory()
+        assert (flown.ended, flown.steps) == ("aborted", 0) and "not a finite number" in flown.reason
+        assert same_bits(flown.states, [[0.25, 0.0]])
+
+
 def test_a_sensor_that_repeats_itself_for_longer_than_it_ever_did_ends_the_flight(campaign):
     # Where it is long at its target: before that the band would be the first to notice.
     test = dataclasses.replace(campaign.test(GOOD, excitation=None), steps=80)

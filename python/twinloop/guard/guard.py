@@ -153,6 +153,8 @@ class Guard:
     def trajectory(self, last: ArrayLike | None = None) -> Trajectory:
         """The flight: complete, or until the guard tripped, with the reason.
 
+        If not even the first reading could be used, it has no period, and its only state is the start of the test.
+
         Args:
             last: the reading after the last command (n_x,); needed unless the guard has tripped.
 
@@ -168,7 +170,7 @@ class Guard:
             # The reading on which it tripped, unless that is none: then the flight ends a period sooner.
             if self._last is None:
                 n = max(0, n - 1)
-                last = self._states[n]
+                last = self._states[n] if self.tripped_at else self.test.initial_state
             else:
                 last = self._last
         elif last is None:
