@@ -203,6 +203,28 @@ def test_nothing_changes_where_nothing_is_wrong_and_a_guard_can_fly_again(campai
         guard.trajectory()
 
 
+@pytest.mark.parametrize("fails", [False, True])
+def test_what_comes_after_the_test_changes_nothing_of_its_flight(fails):
+    test = new_campaign().test(GOOD, excitation=None)
+    states, commands = fly(test.controller(), test)
+    guard = Guard(test, [0.0], horizon=0.0, clock=None)
+    after = [1.4, 0.0] if fails else [0.7, 0.0]
+    fly(guard, test, lambda k, x: x if k <= test.steps else np.array(after), loops=test.steps + 6)
+    assert guard.tripped == fails
+    flown = guard.trajectory()
+    assert (flown.ended, flown.reason, flown.steps) == ("completed", "", test.steps)
+    assert same_bits(flown.states, states) and same_bits(flown.commands, commands)
+
+
+def test_a_second_flight_without_a_reset_is_not_taken_for_the_first():
+    test = new_campaign().test(GOOD, excitation=None)
+    guard = Guard(test, [0.0], horizon=0.0, clock=None)
+    for _ in range(2):
+        states, _ = fly(guard, test)
+    with pytest.raises(tl.InvalidInput, match=r"reset\(\) before each flight"):
+        guard.trajectory(states[-1])
+
+
 def test_a_command_or_other_gains_may_be_the_fallback(campaign):
     test = campaign.test(WILD, excitation=None)
     guard = campaign.guard(test, [0.25], horizon=0.3, clock=None)

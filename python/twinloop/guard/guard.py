@@ -136,8 +136,9 @@ class Guard:
         reading = self._believed(reading)
         if not self.tripped:
             command = self._controller.command(reading, goal)
-            if self.period < self.test.steps:
+            if self.period <= self.test.steps:
                 self._states[self.period] = reading
+            if self.period < self.test.steps:
                 self._commands[self.period] = command
         elif isinstance(self.fallback, Controller):
             command = self.fallback.command(reading, goal)
@@ -156,23 +157,32 @@ class Guard:
         If not even the first reading could be used, it has no period, and its only state is the start of the test.
 
         Args:
-            last: the reading after the last command (n_x,); needed unless the guard has tripped.
+            last: the reading after the last command of the test (n_x,); needed unless the guard has tripped, or has
+                seen it because it was asked for further commands.
 
         Returns:
-            A run of even periods; `ended` is "aborted" if the guard tripped, or if the loop ended before the test.
+            A run of even periods; `ended` is "aborted" if the guard tripped in the test, or if the loop ended before
+            the test did.
 
         Raises:
-            InvalidInput: `last` is missing and the guard has not tripped.
+            InvalidInput: `last` is missing; or it is given though the test ended periods ago.
         """
-        dt, n = self.signals.dt, min(self.period, self.test.steps)
-        if self.tripped_at is not None:
-            n = min(self.tripped_at, self.test.steps)
-            # The reading on which it tripped, unless that is none: then the flight ends a period sooner.
-            if self._last is None:
-                n = max(0, n - 1)
-                last = self._states[n] if self.tripped_at else self.test.initial_state
-            else:
-                last = self._last
+        dt, steps = self.signals.dt, self.test.steps
+        ended_at = self.tripped_at if self.tripped_at is not None and self.tripped_at <= steps else None
+        n = min(self.period, steps) if ended_at is None else ended_at
+        if ended_at is not None and self._last is not None:
+            last = self._last
+        elif ended_at is not None:
+            # What it tripped on is no reading: the flight ends a period sooner.
+            n = max(0, ended_at - 1)
+            last = self._states[n] if ended_at else self.test.initial_state
+        elif self.period > steps:
+            if last is not None and not self.tripped:
+                raise InvalidInput(
+                    f"Guard.trajectory: expected no reading, for the test of {steps} periods ended"
+                    f" {self.period - steps} periods ago, found one; leave it out, and call reset() before each flight."
+                )
+            last = self._states[steps]
         elif last is None:
             raise InvalidInput(
                 "Guard.trajectory: expected the reading after the last command, found none; pass it, or end the flight"
@@ -180,9 +190,12 @@ class Guard:
             )
         states = self._states[: n + 1].copy()
         states[n] = floats("Guard, last reading", last, (self.signals.n_x,))
-        complete = self.tripped_at is None and n == self.test.steps
-        reason = self.reason or ("" if complete else f"the loop ended after {n} of {self.test.steps} periods")
-        ended = "completed" if complete else "aborted"
+        if ended_at is not None:
+            ended, reason = "aborted", self.reason
+        elif n < steps:
+            ended, reason = "aborted", f"the loop ended after {n} of {steps} periods"
+        else:
+            ended, reason = "completed", ""
         return Trajectory(
             dt * np.arange(n + 1, dtype=np.float64), states, self._commands[:n].copy(), ended, reason
         )
