@@ -114,8 +114,7 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
             " record."
         )
     check_period(trajectory, signals)
-    # Twice: noise may carry the last reading of a run that was stopped in time past the limit.
-    farthest = 2.0 * limits.states
+    farthest = limits.readings
     excess = np.abs(trajectory.states) / farthest
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     if excess[k, i] > 1.0:

@@ -343,6 +343,30 @@ def test_a_flight_whose_first_reading_is_none_has_no_period_and_starts_where_the
         assert same_bits(flown.states, [[0.25, 0.0]])
 
 
+@pytest.mark.parametrize("garbage", [1e3, 1e9, 1.7e308])
+def test_a_reading_that_nobody_records_is_none_and_no_controller_sees_it(garbage):
+    free = dataclasses.replace(
+        SIGNALS, states=[dataclasses.replace(s, envelope=None) for s in SIGNALS.states]
+    )
+    for signals in (SIGNALS, free):
+        campaign = tl.Campaign(
+            signals,
+            controller=PENDULUM_CONTROLLER,
+            initial_state=[0.0, 0.0],
+            target_state=[0.8, 0.0],
+            duration=1.5,
+        )
+        test = campaign.test(GOOD, excitation=None)
+        guard = campaign.guard(test, clock=None)
+        broken = np.array([garbage, -garbage])
+        states, commands = fly(guard, test, lambda k, x, b=broken: x if k < 10 else b * (-1.0) ** (k // 3))
+        assert guard.tripped_at == 10 and "angle cannot be" in guard.reason
+        assert np.isfinite(commands).all() and np.abs(commands).max() <= 2.0
+        flown = guard.trajectory()
+        assert flown.steps == 9 and same_bits(flown.states, states[:10])
+        campaign.tell(test, flown)
+
+
 def test_a_sensor_that_repeats_itself_for_longer_than_it_ever_did_ends_the_flight(campaign):
     # Where it is long at its target: before that the band would be the first to notice.
     test = dataclasses.replace(campaign.test(GOOD, excitation=None), steps=80)
@@ -365,11 +389,11 @@ def test_a_sensor_whose_flights_repeat_readings_is_not_taken_for_frozen():
     from twinloop.guard.sensors import SensorWatch
 
     still = tl.Trajectory(0.05 * np.arange(31), np.zeros((31, 2)), np.zeros((30, 1)))
-    watch = SensorWatch(2, [still])
-    assert not any([watch.wrong(np.zeros(2))[1].any() for _ in range(50)])
-    assert watch.wrong(np.zeros(2))[1].any() or any([watch.wrong(np.zeros(2))[1].any() for _ in range(20)])
-    without = SensorWatch(2, [])
-    assert not any([without.wrong(np.zeros(2))[1].any() for _ in range(500)])
+    watch = SensorWatch(np.ones(2), [still])
+    assert not any([watch.frozen(np.zeros(2)).any() for _ in range(50)])
+    assert any([watch.frozen(np.zeros(2)).any() for _ in range(21)])
+    without = SensorWatch(np.ones(2), [])
+    assert not any([without.frozen(np.zeros(2)).any() for _ in range(500)])
 
 
 def test_a_late_period_ends_the_flight():

@@ -45,6 +45,14 @@ class Limits(Value):
         scales = [np.inf if state.periodic else state.scale for state in self.signals.states]
         return self.divergence_factor * np.array(scales)
 
+    @cached_property
+    def readings(self) -> Floats:
+        """Magnitude (n_x,) beyond which no reading is recorded; infinite for a periodic one.
+
+        Twice that of the states: noise may carry the last reading of a run that was stopped in time past the limit.
+        """
+        return 2.0 * self.states
+
     def setting(self, family: _core.Family) -> _core.Setting:
         """What the native engine flies controllers in.
 

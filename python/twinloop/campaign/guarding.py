@@ -38,6 +38,7 @@ def guard_of(
         false_alarms=false_alarms,
         overrun=overrun,
         clock=clock,
+        limits=campaign.setup.limits,
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop._experiment.envelope import outside, usages_of
+from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, at_least_zero, floats, number
 from twinloop.controllers import Controller
 from twinloop.errors import InvalidInput, NotAvailable
@@ -29,8 +30,8 @@ CERTAIN = 2
 class Guard:
     """A test's controller with supervision: `reset()`, then `command(state, target)` once per period.
 
-    Each period it checks, in this order: the reading is finite and not frozen; the period is not too long; the
-    reading is inside the envelope; the readings agree with the twin's band; no member of the committee, under the
+    Each period it checks, in this order: the reading is one that can be, and not frozen; the period is not too long;
+    the reading is inside the envelope; the readings agree with the twin's band; no member of the committee, under the
     test's own controller and excitation, leaves the envelope within the horizon. At the first failed check it has
     *tripped*: from then on it sends the fallback's commands, and `trajectory` has the flight up to there.
 
@@ -47,6 +48,7 @@ class Guard:
             prediction.
         overrun: share of the period by which a period may be late.
         clock: gives the time in s; None: time is not checked, as in a simulation.
+        limits: of runs; a reading that they let nobody record is none. None: the usual ones.
 
     Raises:
         InvalidInput: arguments that do not fit each other.
@@ -64,6 +66,7 @@ class Guard:
         false_alarms: float = 0.01,
         overrun: float = 0.5,
         clock: Callable[[], float] | None = time.monotonic,
+        limits: Limits | None = None,
     ) -> None:
         self.test = test
         self.signals = test.family.signals
@@ -86,7 +89,8 @@ class Guard:
         self._ahead = None if twin is None or not self.horizon else _look_ahead(test, twin, bounds)
         drawn = twin is not None and twin.members and twin.noise is not None
         self._band = BandWatch(twin, test, share, flown) if twin is not None and drawn else None
-        self._sensors = SensorWatch(n_x, () if twin is None else twin.flights)
+        limits = Limits(self.signals) if limits is None else limits
+        self._sensors = SensorWatch(limits.readings, () if twin is None else twin.flights)
         self._controller = test.controller()
         self._states = np.empty((test.steps + 1, n_x))
         self._commands = np.empty((test.steps, n_u))
@@ -204,13 +208,18 @@ class Guard:
 
     def _watch(self, reading: Floats) -> None:
         """Trips on the first thing that is wrong."""
-        missing, frozen = self._sensors.wrong(reading)
+        missing, frozen = self._sensors.missing(reading), self._sensors.frozen(reading)
         states = self.signals.states
         self._last = None if missing.any() else reading.copy()
         if missing.any() or frozen.any():
             self._broken = missing | frozen
             i = int(np.argmax(self._broken))
-            what = "is not a finite number" if missing[i] else "has not changed in its last bit for too long"
+            if not missing[i]:
+                what = "has not changed in its last bit for too long"
+            elif not np.isfinite(reading[i]):
+                what = "is not a finite number"
+            else:
+                what = f"cannot be: {reading[i]:.4g} {states[i].unit}".rstrip()
             return self._trip(f"the reading of {states[i].name} {what}")
         late = self._late()
         if late is not None:
@@ -251,7 +260,7 @@ class Guard:
 
     def _believed(self, reading: Floats) -> Floats:
         """The reading, with the twin's prediction from the one before instead of readings that cannot be trusted."""
-        wrong = self._broken | ~np.isfinite(reading)
+        wrong = self._broken | self._sensors.missing(reading)
         if not wrong.any():
             return reading
         before = self.test.initial_state if self._estimate is None else self._estimate

@@ -1,10 +1,11 @@
-"""Readings that cannot be: not a number, or the same to the last bit for longer than the sensor ever gave."""
+"""Readings that cannot be: no number, too far out, or the same to the last bit for longer than the sensor ever gave."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
 from twinloop.trajectory import Trajectory
@@ -19,11 +20,13 @@ class SensorWatch:
     """The states whose readings cannot be trusted.
 
     Args:
-        n_x: number of states.
+        farthest: magnitude of each state (n_x,) beyond which no reading is recorded: such a one is none.
         flights: recorded before, which say how long each sensor repeats itself; none: no sensor is taken for frozen.
     """
 
-    def __init__(self, n_x: int, flights: Sequence[Trajectory]) -> None:
+    def __init__(self, farthest: Floats, flights: Sequence[Trajectory]) -> None:
+        n_x = len(farthest)
+        self.farthest = farthest
         longest = np.zeros(n_x, np.int64)
         for flight in flights:
             longest = np.maximum(longest, _longest(flight.states))
@@ -36,12 +39,15 @@ class SensorWatch:
         self.last[:] = np.nan
         self.repeated[:] = 0
 
-    def wrong(self, reading: Floats) -> tuple[np.ndarray, np.ndarray]:
-        """States (n_x,) that are no finite number, and those whose sensor is frozen."""
+    def missing(self, reading: Floats) -> NDArray[np.bool_]:
+        """States (n_x,) whose reading is no number, or so far out that it is none of the state."""
+        return ~np.isfinite(reading) | (np.abs(reading) > self.farthest)
+
+    def frozen(self, reading: Floats) -> NDArray[np.bool_]:
+        """States (n_x,) whose sensor is frozen, with this reading, the next one of the flight."""
         self.repeated[:] = np.where(reading == self.last, self.repeated + 1, 0)
         self.last[:] = reading
-        frozen = np.zeros(len(reading), bool) if self.limit is None else self.repeated >= self.limit
-        return ~np.isfinite(reading), frozen
+        return np.zeros(len(reading), bool) if self.limit is None else self.repeated >= self.limit
 
 
 def _longest(states: Floats) -> np.ndarray:
