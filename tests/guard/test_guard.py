@@ -406,6 +406,46 @@ def test_a_late_period_ends_the_flight():
     assert guard.tripped_at == 4 and "0.08 s instead of 0.05 s" in guard.reason
 
 
+class Failing:
+    """A law in Python, and a clock, that work a few times."""
+
+    def __init__(self, kp=1.0, times=6, answer=None):
+        self.kp, self.left, self.answer = kp, times, answer
+
+    def reset(self):
+        pass
+
+    def command(self, state, target):
+        self()
+        return [self.kp * (target[0] - state[0])] if self.left or self.answer is None else self.answer
+
+    def __call__(self):
+        self.left -= 1
+        if self.left < 0 or (self.left == 0 and self.answer is None):
+            raise ZeroDivisionError("division by zero")
+        return 0.0
+
+
+@pytest.mark.parametrize("answer", [None, [np.nan], [0.1, 0.2], "none"])
+def test_a_law_that_fails_in_flight_hands_over_to_the_fallback(answer):
+    family = tl.controllers.Custom(lambda kp: Failing(kp, answer=answer), {"kp": (0.0, 6.0)}).bind(SIGNALS)
+    test = tl.Test(family, [1.0], [0.0, 0.0], [0.8, 0.0], 30)
+    guard = Guard(test, [0.25], horizon=0.0, clock=None)
+    states, commands = fly(guard, test)
+    assert guard.tripped_at == 5 and "the controller failed" in guard.reason
+    assert (commands[5:] == 0.25).all() and not (commands[:5] == 0.25).any()
+    flown = guard.trajectory()
+    assert flown.ended == "aborted" and same_bits(flown.states, states[:6])
+
+
+def test_a_clock_that_fails_in_flight_hands_over_to_the_fallback():
+    test = new_campaign().test(GOOD, excitation=None)
+    guard = Guard(test, [0.25], horizon=0.0, clock=Failing())
+    _, commands = fly(guard, test)
+    assert guard.tripped_at == 5 and "a check failed: ZeroDivisionError: division by zero" in guard.reason
+    assert (commands[5:] == 0.25).all()
+
+
 def test_before_anything_is_known_readings_and_envelope_are_watched():
     campaign = new_campaign()
     test = campaign.test(GOOD)

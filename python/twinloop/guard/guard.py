@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,8 +33,9 @@ class Guard:
 
     Each period it checks, in this order: the reading is one that can be, and not frozen; the period is not too long;
     the reading is inside the envelope; the readings agree with the twin's band; no member of the committee, under the
-    test's own controller and excitation, leaves the envelope within the horizon. At the first failed check it has
-    *tripped*: from then on it sends the fallback's commands, and `trajectory` has the flight up to there.
+    test's own controller and excitation, leaves the envelope within the horizon. At the first failed check, or if a
+    check or the controller raises an error, it has *tripped*: from then on it sends the fallback's commands, and
+    `trajectory` has the flight up to there.
 
     For the fallback, a reading that cannot be trusted is replaced by the twin's prediction from the previous reading.
 
@@ -127,7 +129,7 @@ class Guard:
             Command (n_u,), within its bounds: the test's, or the fallback's once the guard has tripped.
 
         Raises:
-            InvalidInput: other shapes.
+            InvalidInput: other shapes; and what the fallback raises, if it is a controller in Python.
         """
         reading = np.array(state, dtype=np.float64)
         if reading.shape != (self.signals.n_x,):
@@ -135,11 +137,16 @@ class Guard:
                 f"Guard.command, state: expected {self.signals.n_x} numbers, found shape {reading.shape}."
             )
         goal = floats("Guard.command, target", target, (self.signals.n_x,))
+        own = None
         if not self.tripped:
-            self._watch(reading)
+            with self._tripping("a check"):
+                self._watch(reading)
         reading = self._believed(reading)
         if not self.tripped:
-            command = self._controller.command(reading, goal)
+            with self._tripping("the controller"):
+                own = self._controller.command(reading, goal)
+        if own is not None:
+            command = own
             if self.period <= self.test.steps:
                 self._states[self.period] = reading
             if self.period < self.test.steps:
@@ -243,6 +250,14 @@ class Guard:
                 seconds = found[0] * self.signals.dt
                 return self._trip(f"{states[found[1]].name} would leave its envelope in {seconds:.3g} s")
         return None
+
+    @contextmanager
+    def _tripping(self, what: str) -> Iterator[None]:
+        """Trips where a part fails, such as a law or a clock in Python: in the air an error helps nobody."""
+        try:
+            yield
+        except Exception as failure:
+            self._trip(f"{what} failed: {type(failure).__name__}: {failure}")
 
     def _trip(self, why: str) -> None:
         self.tripped, self.tripped_at = True, self.period
