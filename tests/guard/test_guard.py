@@ -343,6 +343,17 @@ def test_a_flight_whose_first_reading_is_none_has_no_period_and_starts_where_the
         assert same_bits(flown.states, [[0.25, 0.0]])
 
 
+def test_a_twin_that_diverges_while_a_sensor_is_missing_leaves_the_fallback_something_to_see():
+    program = _core.Program(3, 1, 4, [[("*", 3, 1, 60.0)]])
+    twin = tl.Twin(_core.Model(program, "acceleration", SIGNALS.engine), SIGNALS)
+    test = dataclasses.replace(new_campaign().test(GOOD, excitation=None), steps=900)
+    guard = Guard(test, test.controller(), twin=twin, horizon=0.05, clock=None)
+    guard.command([0.0, 0.001], test.target(0))
+    commands = np.array([guard.command([np.nan, np.nan], test.target(0)) for _ in range(800)])
+    assert guard.tripped_at == 1 and np.isfinite(commands).all()
+    assert (np.abs(guard._estimate) <= 20.0 * np.array([state.scale for state in SIGNALS.states])).all()
+
+
 @pytest.mark.parametrize("garbage", [1e3, 1e9, 1.7e308])
 def test_a_reading_that_nobody_records_is_none_and_no_controller_sees_it(garbage):
     free = dataclasses.replace(

@@ -157,7 +157,9 @@ class Guard:
             command = self.fallback.copy()
         self._estimate = reading
         if self._ahead is not None:
-            self._estimate = self._ahead.following(reading, command)
+            ahead = self._ahead.following(reading, command)
+            # Flown blind for long a twin may diverge: then the last reading that was believed is the better guess.
+            self._estimate = np.where(np.abs(ahead) <= self._sensors.farthest, ahead, reading)
             self._ahead.sent(reading, goal, command)
         self.period += 1
         return command
