@@ -457,6 +457,14 @@ def test_a_clock_that_fails_in_flight_hands_over_to_the_fallback():
     assert (commands[5:] == 0.25).all()
 
 
+def test_a_clock_that_goes_back_ends_the_flight():
+    test = new_campaign().test(GOOD, excitation=None)
+    times = iter([10.0, 10.05, 10.1, 8.2, 8.25])
+    guard = Guard(test, [0.25], horizon=0.0, clock=lambda: next(times))
+    commands = [guard.command(np.zeros(2), test.target(0)) for _ in range(5)]
+    assert guard.tripped_at == 3 and "clock went back by 1.9 s" in guard.reason and commands[3] == 0.25
+
+
 def test_before_anything_is_known_readings_and_envelope_are_watched():
     campaign = new_campaign()
     test = campaign.test(GOOD)

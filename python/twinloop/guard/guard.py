@@ -230,9 +230,13 @@ class Guard:
             else:
                 what = f"cannot be: {reading[i]:.4g} {states[i].unit}".rstrip()
             return self._trip(f"the reading of {states[i].name} {what}")
-        late = self._late()
-        if late is not None:
-            return self._trip(f"a period took {late:.3g} s instead of {self.signals.dt:g} s")
+        took = self._took()
+        if took is not None and took < 0.0:
+            return self._trip(
+                f"the clock went back by {-took:.3g} s, and nobody knows how long the period took"
+            )
+        if took is not None and not took <= (1.0 + self.overrun) * self.signals.dt:
+            return self._trip(f"a period took {took:.3g} s instead of {self.signals.dt:g} s")
         if outside(usages_of(self.signals, reading[np.newaxis])).any():
             used = np.abs(self.signals.difference(reading, self._middle)) / self._half
             i = int(np.argmax(used))
@@ -265,15 +269,13 @@ class Guard:
         self.tripped, self.tripped_at = True, self.period
         self.reason = f"guard, {self.period * self.signals.dt:.3g} s after the start: {why}"
 
-    def _late(self) -> float | None:
-        """How long the last period took, where that is too long."""
+    def _took(self) -> float | None:
+        """How long the last period took, s; None where time is not checked, and before the first one."""
         if self.clock is None:
             return None
         now, before = self.clock(), self._time
         self._time = now
-        if before is None or now - before <= (1.0 + self.overrun) * self.signals.dt:
-            return None
-        return now - before
+        return None if before is None else now - before
 
     def _believed(self, reading: Floats) -> Floats:
         """The reading, with the twin's prediction from the one before instead of readings that cannot be trusted."""
