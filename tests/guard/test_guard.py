@@ -465,6 +465,18 @@ def test_a_clock_that_goes_back_ends_the_flight():
     assert guard.tripped_at == 3 and "clock went back by 1.9 s" in guard.reason and commands[3] == 0.25
 
 
+def test_what_a_mask_hides_is_missing_and_what_is_no_number_is_refused():
+    test = new_campaign().test(GOOD, excitation=None)
+    guard = Guard(test, [0.25], horizon=0.0, clock=None)
+    for wrong in (["x", 0.0], [1j, 0.0]):
+        with pytest.raises(tl.InvalidInput, match="state: expected numbers"):
+            guard.command(wrong, test.target(0))
+    guard.command(np.ma.array([0.1, 0.0], mask=[False, False]), test.target(0))
+    guard.command([0.1, 0.01], test.target(0))
+    assert guard.command(np.ma.array([0.1, 0.5], mask=[False, True]), test.target(0)) == 0.25
+    assert guard.tripped_at == 2 and "rate is not a finite number" in guard.reason
+
+
 def test_before_anything_is_known_readings_and_envelope_are_watched():
     campaign = new_campaign()
     test = campaign.test(GOOD)

@@ -131,7 +131,13 @@ class Guard:
         Raises:
             InvalidInput: other shapes; and what the fallback raises, if it is a controller in Python.
         """
-        reading = np.array(state, dtype=np.float64)
+        try:
+            # What a mask hides is missing.
+            reading = np.array(np.ma.filled(np.ma.asarray(state, dtype=np.float64), np.nan))
+        except (TypeError, ValueError) as reason:
+            raise InvalidInput(
+                f"Guard.command, state: expected numbers, found {reason}; pass NaN for a missing one."
+            ) from reason
         if reading.shape != (self.signals.n_x,):
             raise InvalidInput(
                 f"Guard.command, state: expected {self.signals.n_x} numbers, found shape {reading.shape}."
