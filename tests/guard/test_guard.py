@@ -581,6 +581,49 @@ def test_a_campaign_flies_a_guarded_system_and_learns_from_what_was_ended():
     assert "left its envelope" in run.trajectory.reason
 
 
+class OwnLoop(tl.System):
+    """Closes its loop by hand; what it is asked to do besides is its matter."""
+
+    signals = SIGNALS
+
+    def __init__(self, watched=True, lost=False):
+        self.watched, self.lost = watched, lost
+
+    def run(self, test):
+        law = test.controller() if self.watched else new_campaign().test(GOOD, excitation=None).controller()
+        states, commands = fly(law, test, lambda k, x: x if k < 6 else np.array([1.4, 0.0]))
+        if self.lost:
+            raise tl.SystemFailure("the link was lost")
+        band = np.stack([states - 1.0, states + 1.0])
+        return tl.Trajectory(0.05 * np.arange(len(states)), states, commands, band=band)
+
+
+def guarded_by_hand(system):
+    return Guarded(system, lambda test: Guard(test, [0.0], horizon=0.0, clock=None))
+
+
+def test_a_run_that_has_a_band_is_cut_with_it():
+    run = guarded_by_hand(OwnLoop()).run(new_campaign().test(GOOD, excitation=None))
+    assert (run.ended, run.steps) == ("aborted", 6)
+    assert same_bits(run.band, np.stack([run.states - 1.0, run.states + 1.0]))
+
+
+def test_a_system_that_asks_no_guard_is_refused_and_its_run_is_not_lost():
+    guarded = guarded_by_hand(OwnLoop(watched=False))
+    with pytest.raises(tl.InvalidInput, match=r"asked 0 times in 30 periods"):
+        guarded.run(new_campaign().test(GOOD, excitation=None))
+    assert guarded.flown.steps == 30
+
+
+def test_after_a_run_that_failed_the_guard_is_the_one_of_that_run():
+    guarded, test = guarded_by_hand(OwnLoop()), new_campaign().test(GOOD, excitation=None)
+    guarded.run(test)
+    before, guarded.system = guarded.guard, OwnLoop(lost=True)
+    with pytest.raises(tl.SystemFailure):
+        guarded.run(test)
+    assert guarded.guard is not before and guarded.guard.tripped and guarded.flown is None
+
+
 def test_a_flight_that_is_ended_at_once_is_told_as_failed():
     class Outside(tl.System):
         signals = SIGNALS

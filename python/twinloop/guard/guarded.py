@@ -8,6 +8,7 @@ from collections.abc import Callable
 from twinloop import _core
 from twinloop.controllers import Family
 from twinloop.controllers.custom import Law
+from twinloop.errors import InvalidInput
 from twinloop.guard.guard import Guard
 from twinloop.signals import Signals
 from twinloop.systems.base import System
@@ -47,10 +48,19 @@ class Guarded(System):
 
         Returns:
             The measured run, up to the moment when the guard tripped.
+
+        Raises:
+            InvalidInput: the system did not ask the test's controller for every command, so that nobody watched.
         """
-        guard = self.make(test)
-        run = self.system.run(led_by(guard, test))
-        self.guard, self.flown = guard, run
+        self.flown = None
+        self.guard = guard = self.make(test)
+        self.flown = run = self.system.run(led_by(guard, test))
+        if guard.period < run.steps:
+            raise InvalidInput(
+                f"Guarded: expected a system that asks test.controller() for the command of each period, found one that"
+                f" asked {guard.period} times in {run.steps} periods, so that no guard watched; let its run(test) close"
+                " the loop with it. The run is in `flown`."
+            )
         if guard.tripped_at is None or guard.tripped_at > run.steps:
             return run
         steps = guard.tripped_at
@@ -62,6 +72,7 @@ class Guarded(System):
             ended="aborted",
             reason=guard.reason,
             true_states=None if run.true_states is None else run.true_states[: steps + 1],
+            band=None if run.band is None else run.band[:, : steps + 1],
         )
 
 
