@@ -1,6 +1,7 @@
 """Campaigns on a small pendulum: made, begun, lived through all events, kept in a store; and what they came to."""
 
 import numpy as np
+import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, TINY, pendulum_step
@@ -179,3 +180,24 @@ class StopAt:
         self.calls -= 1
         if self.calls == 0:
             raise KeyboardInterrupt
+
+
+def one_writer_after_another(campaign, where, system):
+    """Checks that once another one writes its campaign, the first one does not: it says so, and nothing is lost."""
+    first = campaign.tests[0]
+    campaign.tell(first, system.run(first))  # nobody else has opened it: nothing has happened yet
+    second = stored(where)
+    assert len(second.experiments) == 2
+    for act in (
+        lambda: campaign.tell(first, system.run(first)),
+        campaign.ask,
+        lambda: campaign.test(OTHER_GAINS),
+    ):
+        with pytest.raises(tl.StoreFailure, match="another one has opened it since"):
+            act()
+    assert (len(campaign.tests), len(campaign.experiments)) == (1, 2)
+    second.tell(first, system.run(first))
+    second.ask()
+    campaign.close()
+    assert plain(tl.Campaign.load(where, read_only=True)) == plain(second)
+    second.close()

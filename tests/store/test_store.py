@@ -19,7 +19,17 @@ from sqlalchemy import event
 import twinloop as tl
 from conftest import TINY
 from faults import exit_code_of, killed_and_resumed, telling, withdrawing
-from lives import LIFE, OTHER_GAINS, SMALL, WITHDRAWN_LIFE, flown, lived, plain, stored
+from lives import (
+    LIFE,
+    OTHER_GAINS,
+    SMALL,
+    WITHDRAWN_LIFE,
+    flown,
+    lived,
+    one_writer_after_another,
+    plain,
+    stored,
+)
 from sameness import same
 from twinloop.campaign import keeping
 from twinloop.records import to_text
@@ -445,6 +455,33 @@ def test_a_store_that_becomes_read_only_is_said_and_loses_nothing(path, pendulum
     with pytest.raises(tl.StoreFailure, match="right to write"):
         campaign.tell(first, pendulum.run(first))
     assert campaign.experiments == ()
+
+
+def test_a_writer_whose_lock_is_gone_writes_no_more_once_another_one_does(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    (lock,) = path.parent.glob("*.lock")
+    lock.unlink()
+    one_writer_after_another(campaign, path, pendulum)
+
+
+def test_who_opens_a_campaign_while_another_one_writes_it_is_refused_though_no_lock_is_held(
+    path, pendulum, monkeypatch
+):
+    campaign = flown(stored(path), pendulum)
+    (lock,) = path.parent.glob("*.lock")
+    lock.unlink()
+    read = keeping.found
+
+    def found(*arguments):
+        held = read(*arguments)
+        campaign.tell(campaign.tests[0], pendulum.run(campaign.tests[0]))
+        return held
+
+    monkeypatch.setattr(keeping, "found", found)
+    with pytest.raises(tl.StoreFailure, match="only one who writes"):
+        stored(path)
+    monkeypatch.undo()
+    assert len(tl.Campaign.load(path, read_only=True).experiments) == len(campaign.experiments) == 2
 
 
 def test_a_file_that_is_no_store_is_refused_and_left_as_it_was(path):

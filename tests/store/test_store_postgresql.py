@@ -10,9 +10,21 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from sqlalchemy import create_engine, text
 
 import twinloop as tl
-from lives import FULL_LIFE, LIFE, PLANT, WITHDRAWN_LIFE, begun, flown, lived, plain, stored
+from lives import (
+    FULL_LIFE,
+    LIFE,
+    PLANT,
+    WITHDRAWN_LIFE,
+    begun,
+    flown,
+    lived,
+    one_writer_after_another,
+    plain,
+    stored,
+)
 from old_store import old_store
 from sameness import same
 from twinloop.faces.cli import main
@@ -50,8 +62,6 @@ def server():
 
 def fresh(server, name):
     """A database of its own on the server."""
-    from sqlalchemy import create_engine, text
-
     engine = create_engine(server, isolation_level="AUTOCOMMIT")
     with engine.connect() as connection:
         connection.execute(text(f"create database {name}"))
@@ -88,6 +98,20 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(server, pendulum):
     campaign.close()
     other.close()
     tl.Campaign.load(address, "one").close()
+
+
+def test_a_writer_whose_lock_the_server_has_ended_writes_no_more_once_another_one_does(server, pendulum):
+    address = fresh(server, "lost")
+    campaign = flown(stored(address), pendulum)
+    lost = campaign._keeping._keeper._lock._connection
+    engine = create_engine(address)
+    with engine.begin() as connection:
+        number = lost.connection.dbapi_connection.info.backend_pid
+        assert connection.execute(
+            text("select pg_terminate_backend(:number, 5000)"), {"number": number}
+        ).scalar()
+    engine.dispose()
+    one_writer_after_another(campaign, address, pendulum)
 
 
 MAPPING = """

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from twinloop.errors import InvalidInput
+from twinloop.errors import InvalidInput, StoreFailure
 from twinloop.records import Record, from_text, to_text
 from twinloop.store.database import Store
-from twinloop.store.lock import AdvisoryLock, FileLock, Lock
+from twinloop.store.lock import AdvisoryLock, FileLock, Lock, taken
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -171,7 +172,7 @@ def begun(store: Store, name: str | None) -> tuple[str, Record] | None:
 
 
 class Keeper:
-    """The only writer of a campaign.
+    """The only writer of a campaign; once another one has opened it, it writes no more.
 
     Args:
         store: open, to be written; it is closed with the keeper.
@@ -187,6 +188,7 @@ class Keeper:
         self.store = store
         self.name = name
         self._lock: Lock | None = None
+        self._session: int | None = None
         with store.transaction() as connection:
             self._id = _entered(connection, name, setup, identity)
         self._lock = self._locked()
@@ -200,11 +202,15 @@ class Keeper:
             provenance: versions, processor and so on.
 
         Raises:
-            StoreFailure: the database refuses.
+            StoreFailure: the database refuses, or somebody else has written the campaign since it was opened here.
         """
         from twinloop.store.schema import sessions
 
-        with self.store.transaction() as connection:
+        with self._writing() as connection:
+            if any(
+                _count(connection, table, self._id) != self.rows[name] for name, table in _entries().items()
+            ):
+                raise taken(self._what, "another one")
             number = _count(connection, sessions, self._id)
             row = {
                 "campaign": self._id,
@@ -213,6 +219,7 @@ class Keeper:
                 "provenance": to_text(provenance),
             }
             connection.execute(sessions.insert(), row)
+        self._session = number
 
     def keep(
         self, entries: Mapping[str, Sequence[Any]], memory: Record | None = None, runs: int | None = None
@@ -234,7 +241,7 @@ class Keeper:
         if memory is None and not any(entries.values()):
             return
         now, grown = _now(), dict(self.rows)
-        with self.store.transaction() as connection:
+        with self._writing() as connection:
             for name, records in entries.items():
                 for record in records:
                     row = {"campaign": self._id, "number": grown[name], "record": to_text(record)}
@@ -265,7 +272,7 @@ class Keeper:
         from twinloop.store.schema import campaigns
 
         flown = None if system is None else to_text(system)
-        with self.store.transaction() as connection:
+        with self._writing() as connection:
             row = update(campaigns).where(campaigns.c.id == self._id)
             connection.execute(row.values(system=flown, experiments=experiments))
 
@@ -282,7 +289,7 @@ class Keeper:
 
         from twinloop.store.schema import progress
 
-        with self.store.transaction() as connection:
+        with self._writing() as connection:
             connection.execute(delete(progress).where(progress.c.campaign == self._id))
             if doing is not None:
                 row = {"campaign": self._id, "said": _now(), "record": to_text(doing)}
@@ -295,14 +302,39 @@ class Keeper:
             self._lock = None
         self.store.close()
 
+    @contextmanager
+    def _writing(self) -> Iterator[Connection]:
+        """A transaction of the only writer.
+
+        A lock can be lost unnoticed: that of a server ends with its connection, that of a file with the file. So the
+        database itself is asked whether somebody has opened the campaign since, while nobody else can.
+        """
+        from sqlalchemy import select
+
+        from twinloop.store.schema import campaigns, sessions
+
+        with self.store.transaction() as connection:
+            connection.execute(select(campaigns.c.id).where(campaigns.c.id == self._id).with_for_update())
+            if self._session is not None and _count(connection, sessions, self._id) != self._session + 1:
+                raise StoreFailure(
+                    f"Store: expected to be the only one who writes {self._what}, found that another one has opened it"
+                    " since; this one writes no more, and what it was last given is not stored: close it, load the"
+                    " campaign again, and repeat the command."
+                )
+            yield connection
+
+    @property
+    def _what(self) -> str:
+        """What is written, for errors."""
+        return f"the campaign {self.name!r} of {self.store.name}"
+
     def _locked(self) -> Lock:
-        what = f"the campaign {self.name!r} of {self.store.name}"
         path = self.store.path
         if path is None:
             with self.store.sentences():
-                return AdvisoryLock(self.store.engine.connect(), self._id, what)
+                return AdvisoryLock(self.store.engine.connect(), self._id, self._what)
         with self.store.sentences():
-            return FileLock(Path(f"{path}-{self._id}.lock"), what)
+            return FileLock(Path(f"{path}-{self._id}.lock"), self._what)
 
 
 def _entered(connection: Connection, name: str, setup: Record, identity: str) -> int:

@@ -59,7 +59,7 @@ class FileLock:
 
 
 class AdvisoryLock:
-    """A lock of a PostgreSQL server, on a connection of its own: it ends with that.
+    """A lock of a PostgreSQL server, on a connection of its own: it ends with that, which its holder may not notice.
 
     Args:
         connection: to the server.
