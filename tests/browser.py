@@ -5,7 +5,7 @@ import os
 import shutil
 from pathlib import Path
 
-import pytest
+from needed import lacking, needed
 
 SHOTS = Path(__file__).parents[1] / "screenshots"
 """Where pictures of pages are kept; git ignores it."""
@@ -15,12 +15,12 @@ SIZES = {"desktop": (1280, 900, "light"), "dark": (1280, 900, "dark"), "phone": 
 @contextlib.contextmanager
 def browser():
     """A browser that has been started, or a skip that says what is missing."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    api = needed("playwright.sync_api", "playwright is not installed")
     found = shutil.which("chromium") or shutil.which("chromium-browser")
     with api.sync_playwright() as playwright:
         path = found or playwright.chromium.executable_path
         if not os.path.exists(path):
-            pytest.skip("no chromium: `apt-get install chromium`, or `playwright install chromium`")
+            lacking("no chromium: `apt-get install chromium`, or `playwright install chromium`")
         started = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         try:
             yield started
@@ -54,7 +54,7 @@ def kept(page, name):
 
 def serious(page):
     """What axe finds that keeps people out, in words."""
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+    axe = needed("axe_playwright_python.sync_playwright", "axe is not installed")
     found = axe.Axe().run(page).response["violations"]
     return [
         f"{each['id']}: {each['help']} ({each['nodes'][0]['html'][:160]})"

@@ -1,4 +1,4 @@
-"""The same store on a PostgreSQL server, which the test starts; skipped where there is none to start."""
+"""The same store on a PostgreSQL server, which the test starts; skipped where there is none, but never in CI."""
 
 import os
 import shutil
@@ -25,15 +25,16 @@ from lives import (
     plain,
     stored,
 )
+from needed import lacking, needed
 from old_store import old_store
 from sameness import same
 from twinloop.faces.cli import main
 from twinloop.logs import write_columns
 from twinloop.store import listed, opened
 
-pytest.importorskip("psycopg", reason="the driver psycopg is not installed")
+needed("psycopg", "the driver psycopg is not installed")
 if not (shutil.which("initdb") and shutil.which("pg_ctl")):
-    pytest.skip("no PostgreSQL server (initdb, pg_ctl) is installed", allow_module_level=True)
+    lacking("no PostgreSQL server (initdb, pg_ctl) is installed")
 
 
 @pytest.fixture(scope="module")
