@@ -90,3 +90,22 @@ def test_only_the_front_of_a_room_is_imported_from_outside():
     unused = {room: sorted(names - found.get(room, set())) for room, names in listed.items()}
     assert not any(entered.values()), f"imported from outside, but not at the front: {entered}"
     assert not any(unused.values()), f"at the front, but not imported from outside: {unused}"
+
+
+LOADERS = {"_ground/showing.py", "campaign/own_progress.py", "campaign/reporting.py"}
+"""Files that load a face when somebody wants to see something; import-linter does not see it, for it is a call."""
+
+
+def loads_itself(file):
+    """Whether a file loads a module of the package by its name, as a text."""
+    calls = [node for node in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(node, ast.Call)]
+    loading = [
+        call for call in calls if ast.unparse(call.func).split(".")[-1] in ("import_module", "__import__")
+    ]
+    parts = [part for call in loading for argument in call.args for part in ast.walk(argument)]
+    return any(isinstance(part, ast.Constant) and str(part.value).startswith("twinloop") for part in parts)
+
+
+def test_only_these_files_below_the_faces_load_one_by_its_name():
+    below = [file for file in PACKAGE.rglob("*.py") if file.relative_to(PACKAGE).parts[0] != "faces"]
+    assert {file.relative_to(PACKAGE).as_posix() for file in below if loads_itself(file)} == LOADERS
