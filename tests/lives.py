@@ -1,11 +1,14 @@
 """Campaigns on a small pendulum: made, begun, lived through all events, kept in a store; and what they came to."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_CONTROLLER, PENDULUM_GAINS, PENDULUM_SIGNALS, TINY, pendulum_step
 from twinloop.records import to_text
+from twinloop.store import Store
 
 SIGNALS, CONTROLLER = PENDULUM_SIGNALS, PENDULUM_CONTROLLER
 SMALL = {
@@ -201,3 +204,31 @@ def one_writer_after_another(campaign, where, system):
     campaign.close()
     assert plain(tl.Campaign.load(where, read_only=True)) == plain(second)
     second.close()
+
+
+@contextmanager
+def behind_commits(monkeypatch, happens):
+    """Something happens behind each commit, before anybody can know of it."""
+    whole = Store.transaction
+
+    @contextmanager
+    def transaction(store):
+        with whole(store) as connection:
+            yield connection
+        happens()
+
+    with monkeypatch.context() as during:
+        during.setattr(Store, "transaction", transaction)
+        yield
+
+
+EVENTS = {
+    "test": lambda campaign, run: campaign.test(OTHER_GAINS),
+    "ask": lambda campaign, run: campaign.ask(),
+    "tell": lambda campaign, run: campaign.tell(campaign.tests[0], run),
+    "attach": lambda campaign, run: campaign.attach(run),
+    "fail": lambda campaign, run: campaign.tell_failed(campaign.tests[0], "the motor cut out"),
+    "abandon": lambda campaign, run: campaign.abandon(campaign.tests[1]),
+    "withdraw": lambda campaign, run: campaign.withdraw(0, "the log of another flight"),
+}
+"""What enters something, done to a campaign with one flight and a test that waits."""

@@ -21,10 +21,12 @@ import twinloop as tl
 from conftest import TINY
 from faults import exit_code_of, killed_and_resumed, telling, withdrawing
 from lives import (
+    EVENTS,
     LIFE,
     OTHER_GAINS,
     SMALL,
     WITHDRAWN_LIFE,
+    behind_commits,
     flown,
     lived,
     one_writer_after_another,
@@ -67,6 +69,54 @@ def test_a_refused_call_leaves_no_row(path, pendulum):
     with pytest.raises(tl.InvalidInput):
         campaign.tell(campaign.experiments[0].test, short)
     assert len(rows(path, "experiments")) == 1 and len(campaign.experiments) == 1
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_ctrl_c_behind_a_commit_leaves_memory_and_store_alike(path, pendulum, monkeypatch, event):
+    """Whatever the call entered is known to both, and so is what comes after it."""
+    campaign = flown(stored(path, "default"), pendulum)
+    campaign.test(OTHER_GAINS)
+    run = pendulum.run(campaign.tests[0])
+    interrupting = behind_commits(monkeypatch, lambda: signal.raise_signal(signal.SIGINT))
+    with interrupting, pytest.raises(KeyboardInterrupt):
+        EVENTS[event](campaign, run)
+    entered = tl.Campaign.load(path, read_only=True)
+    assert plain(campaign) == plain(entered)
+    later = campaign.test(OTHER_GAINS)
+    campaign.tell(later, pendulum.run(later))
+    assert plain(campaign) == plain(tl.Campaign.load(path, read_only=True))
+
+
+def test_an_interruption_behind_the_commit_of_a_flight_does_not_take_it_back(path, pendulum, monkeypatch):
+    """Even one that is no signal: a later flight would be written in its place, or not at all."""
+    campaign = stored(path)
+    first, second = campaign.test(pendulum.default_gains), campaign.test(OTHER_GAINS)
+    with monkeypatch.context() as during:
+        during.setattr(keeping.Keeping, "rest", lambda self: (_ for _ in ()).throw(Killed))
+        with pytest.raises(Killed):
+            campaign.tell(first, pendulum.run(first))
+    campaign.tell(second, pendulum.run(second))
+    held = tl.Campaign.load(path, read_only=True)
+    assert [run.number for run in held.experiments] == [run.number for run in campaign.experiments] == [0, 1]
+
+
+def test_after_a_commit_whose_answer_was_lost_the_campaign_says_that_it_is_to_be_loaded_again(
+    path, pendulum, monkeypatch
+):
+    def lost():
+        raise tl.StoreFailure("the answer was lost")
+
+    campaign = stored(path)
+    first, second = campaign.test(pendulum.default_gains), campaign.test(OTHER_GAINS)
+    with behind_commits(monkeypatch, lost), pytest.raises(tl.StoreFailure, match="lost"):
+        campaign.tell(first, pendulum.run(first))
+    for _ in range(2):
+        with pytest.raises(tl.StoreFailure, match="found experiments: 1 instead of 0"):
+            campaign.tell(second, pendulum.run(second))
+    campaign.close()
+    again = tl.Campaign.load(path)
+    again.tell(second, pendulum.run(second))
+    assert [run.number for run in again.experiments] == [0, 1]
 
 
 class Killed(BaseException):

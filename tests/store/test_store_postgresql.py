@@ -14,11 +14,14 @@ from sqlalchemy import create_engine, text
 
 import twinloop as tl
 from lives import (
+    EVENTS,
     FULL_LIFE,
     LIFE,
+    OTHER_GAINS,
     PLANT,
     WITHDRAWN_LIFE,
     begun,
+    behind_commits,
     flown,
     lived,
     one_writer_after_another,
@@ -84,6 +87,21 @@ def test_a_campaign_on_a_server_is_the_one_in_a_file(server, tmp_path, preset, l
     assert plain(on_server) == plain(in_file)
     assert same(on_server.best_test.genes, in_file.best_test.genes)
     on_server.close()
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_ctrl_c_behind_a_commit_leaves_memory_and_server_alike(server, pendulum, monkeypatch, event):
+    address = fresh(server, f"interrupted_{event}")
+    campaign = flown(stored(address, "default"), pendulum)
+    campaign.test(OTHER_GAINS)
+    run = pendulum.run(campaign.tests[0])
+    interrupting = behind_commits(monkeypatch, lambda: signal.raise_signal(signal.SIGINT))
+    with interrupting, pytest.raises(KeyboardInterrupt):
+        EVENTS[event](campaign, run)
+    later = campaign.test(OTHER_GAINS)
+    campaign.tell(later, pendulum.run(later))
+    assert plain(campaign) == plain(tl.Campaign.load(address, read_only=True))
+    campaign.close()
 
 
 def test_a_second_writer_is_refused_and_a_reader_is_not(server, pendulum):

@@ -87,7 +87,7 @@ class Keeping:
         """
         memory = method.memory
         record = None if memory is self._memory else method.to_record()
-        self._keeper.keep(book.entries(self._keeper.rows), record, self._count())
+        self._keeper.keep(book.entries(self.rows), record, self._count())
         self._memory, self._saved = memory, time.monotonic()
         self.rest()
 
@@ -160,6 +160,11 @@ class Keeping:
         if self._flown is None and self._runs is not None and runs < self._runs:
             setattr(system, "runs", self._runs)  # noqa: B010 - a system need not declare it
         self._flown = system
+
+    @property
+    def rows(self) -> dict[str, int]:
+        """How many entries of each list of the logbook the store holds."""
+        return self._keeper.rows
 
     @property
     def store(self) -> str:

@@ -237,11 +237,14 @@ class Persistent(Recorded):
     def _entering(self) -> Iterator[None]:
         """What is entered in the book meanwhile is committed at the end, or taken back."""
         book, memory = self._book.copied(), self._method.memory
+        rows = None if self._keeping is None else self._keeping.rows
         try:
             yield
             self._keep()
         except BaseException:
-            self._book, self._method.memory = book, memory
+            # Ctrl-C may come behind the commit: what the store holds stays.
+            if self._keeping is None or self._keeping.rows == rows:
+                self._book, self._method.memory = book, memory
             raise
 
     def _chosen(self) -> Method:

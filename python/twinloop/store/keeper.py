@@ -14,6 +14,7 @@ from twinloop.errors import InvalidInput, StoreFailure
 from twinloop.records import Record, from_text, to_text
 from twinloop.store.database import Store
 from twinloop.store.lock import AdvisoryLock, FileLock, Lock, taken
+from twinloop.store.uninterrupted import uninterrupted
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -193,7 +194,7 @@ class Keeper:
             self._id = _entered(connection, name, setup, identity)
         self._lock = self._locked()
         with store.transaction() as connection:
-            self.rows = {name: _count(connection, table, self._id) for name, table in _entries().items()}
+            self.rows = self._counted(connection)
 
     def open_session(self, provenance: Record) -> None:
         """Enters that the campaign is written from now on, and by what.
@@ -232,30 +233,37 @@ class Keeper:
             runs: how many runs the system has made; None where it does not count.
 
         Raises:
-            StoreFailure: the database refuses.
+            StoreFailure: the database refuses, or holds other rows than were kept here.
         """
+        if memory is None and not any(entries.values()):
+            return
+        # Interrupted between the commit and what is known of it, the two would part.
+        with uninterrupted():
+            with self._writing() as connection:
+                self._check_rows(connection)
+                for name, records in entries.items():
+                    self._append(connection, name, records, runs)
+                if memory is not None:
+                    self._replace(connection, memory)
+            self.rows = {name: count + len(entries.get(name, ())) for name, count in self.rows.items()}
+
+    def _append(self, connection: Connection, name: str, records: Sequence[Any], runs: int | None) -> None:
+        for number, record in enumerate(records, self.rows[name]):
+            row = {"campaign": self._id, "number": number, "record": to_text(record)}
+            if name == "experiments":
+                row |= {"told": _now(), "sha256": _hash(str(row["record"])), "runs": runs}
+            if name == "withdrawals":
+                row["withdrawn"] = _now()
+            connection.execute(_entries()[name].insert(), row)
+
+    def _replace(self, connection: Connection, memory: Record) -> None:
         from sqlalchemy import delete
 
         from twinloop.store.schema import checkpoints
 
-        if memory is None and not any(entries.values()):
-            return
-        now, grown = _now(), dict(self.rows)
-        with self._writing() as connection:
-            for name, records in entries.items():
-                for record in records:
-                    row = {"campaign": self._id, "number": grown[name], "record": to_text(record)}
-                    if name == "experiments":
-                        row |= {"told": now, "sha256": _hash(str(row["record"])), "runs": runs}
-                    if name == "withdrawals":
-                        row["withdrawn"] = now
-                    connection.execute(_entries()[name].insert(), row)
-                    grown[name] += 1
-            if memory is not None:
-                connection.execute(delete(checkpoints).where(checkpoints.c.campaign == self._id))
-                row = {"campaign": self._id, "saved": now, "record": to_text(memory)}
-                connection.execute(checkpoints.insert(), row)
-        self.rows = grown
+        connection.execute(delete(checkpoints).where(checkpoints.c.campaign == self._id))
+        row = {"campaign": self._id, "saved": _now(), "record": to_text(memory)}
+        connection.execute(checkpoints.insert(), row)
 
     def fly(self, system: Record | None, experiments: int) -> None:
         """Enters what the campaign flies from now on.
@@ -327,6 +335,23 @@ class Keeper:
     def _what(self) -> str:
         """What is written, for errors."""
         return f"the campaign {self.name!r} of {self.store.name}"
+
+    def _counted(self, connection: Connection) -> dict[str, int]:
+        return {name: _count(connection, table, self._id) for name, table in _entries().items()}
+
+    def _check_rows(self, connection: Connection) -> None:
+        """Refuses to write behind rows that nobody here knows of, such as after a commit whose answer was lost."""
+        found = self._counted(connection)
+        if found != self.rows:
+            other = ", ".join(
+                f"{name}: {count} instead of {self.rows[name]}"
+                for name, count in found.items()
+                if count != self.rows[name]
+            )
+            raise StoreFailure(
+                f"Store {self.store.name}: expected the campaign {self.name!r} as it was last kept here, found"
+                f" {other}; no stored data is lost: load the campaign again and continue from there."
+            )
 
     def _locked(self) -> Lock:
         path = self.store.path
