@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats, number
+from twinloop._ground.texts import text
 from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
@@ -368,10 +369,7 @@ def _check_words(kind: str, name: object, unit: object) -> None:
             f"{kind}: expected a name of letters, digits and underscores, no word of Python's own, found {name!r}; "
             "it becomes a symbol in equations, so rename it."
         )
-    if not isinstance(unit, str):
-        raise InvalidInput(
-            f"{kind} {name!r}, unit: expected a text such as 'rad/s', found {unit!r}; write it so."
-        )
+    text(f"{kind} {name!r}, unit", unit)
 
 
 def _members(what: str, kind: type, values: object) -> tuple[object, ...]:

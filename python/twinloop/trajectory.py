@@ -9,9 +9,11 @@ import numpy as np
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats
 from twinloop._ground.showing import Shown
+from twinloop._ground.texts import text
 from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
+from twinloop.records.reading import MOST_ITEMS
 from twinloop.signals import Signals
 
 ENDINGS = ("completed", "aborted", "diverged")
@@ -34,7 +36,8 @@ class Trajectory(Shown, Value, Recorded, kind="trajectory"):
             predicted the run.
 
     Raises:
-        InvalidInput: shapes that do not fit each other, numbers that are not finite, times that do not grow.
+        InvalidInput: shapes that do not fit each other, numbers that are not finite, times that do not grow, a reason
+            that is no text.
     """
 
     t: Floats
@@ -61,6 +64,7 @@ class Trajectory(Shown, Value, Recorded, kind="trajectory"):
             )
         if self.ended not in ENDINGS:
             raise unknown("end of a trajectory", self.ended, ENDINGS)
+        text("Trajectory.reason", self.reason)
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "states", states)
         object.__setattr__(self, "commands", commands)
@@ -107,6 +111,11 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
         raise InvalidInput(
             f"Trajectory: expected at least {least} step{'s' if least > 1 else ''} to learn from, found"
             f" {trajectory.steps}; run the test again."
+        )
+    if trajectory.steps >= MOST_ITEMS:
+        raise InvalidInput(
+            f"Trajectory: expected less than {MOST_ITEMS} steps, which is what a record may hold, found"
+            f" {trajectory.steps}; cut the record into several."
         )
     if steps is not None and trajectory.steps > steps:
         raise InvalidInput(

@@ -51,6 +51,9 @@ DATA = {
     "complex numbers": lambda: tl.Trajectory(T, X + 1j, U),
     "ragged rows": lambda: tl.Trajectory(T, [[0.0], [0.0, 1.0], [0.0], [0.0]], U),
     "an end that there is none of": lambda: tl.Trajectory(T, X, U, ended="complete"),
+    "no reason at all": lambda: tl.Trajectory(T, X, U, ended="aborted", reason=None),
+    "a number for a reason": lambda: tl.Trajectory(T, X, U, ended="aborted", reason=7),
+    "half a character in a reason": lambda: tl.Trajectory(T, X, U, ended="aborted", reason="\udcff"),
 }
 SIGNALS = {
     "no state": lambda: tl.Signals([], [COMMAND], 0.1),
@@ -76,6 +79,7 @@ SIGNALS = {
     "a scale that is true": lambda: tl.State("x", "m", True),
     "a word of Python's for a name": lambda: tl.State("lambda", "m", 1.0),
     "a unit that is a number": lambda: tl.Command("u", 3, (0.0, 1.0)),
+    "half a character in a unit": lambda: tl.State("x", "m\ud800", 1.0),
     "a name with a space": lambda: tl.State("roll rate", "rad/s", 1.0),
     "a name that is a number": lambda: tl.Command("1", "V", (0.0, 1.0)),
     "the derivative of nothing": lambda: tl.Signals(
@@ -143,6 +147,8 @@ OPTIONS = {
     "constants the wrong way round": lambda: options_of("paper", {"constant_low": 5.0, "constant_high": 1.0}),
     "a form that there is none of": lambda: options_of("paper", {"form": "absolut"}),
     "a trade-off that there is none of": lambda: options_of("paper", {"tradeoff": "best"}),
+    "half a character in a form": lambda: options_of("paper", {"form": "increment\ud800"}),
+    "half a character in a term": lambda: options_of("default", {"seed_terms": ["x\ud800"]}),
     "no operations": lambda: options_of("paper", {"operations": []}),
     "operations in one word": lambda: options_of("paper", {"operations": "+-"}),
     "a number for a choice": lambda: options_of("paper", {"control_quality": 1}),
@@ -251,6 +257,8 @@ CALLS = {
     "a system of another period": lambda e: e.campaign.run(slower(e.system), 2),
     "half an experiment": lambda e: e.campaign.run(e.system, 1.5),
     "no experiment": lambda e: e.campaign.run(e.system, 0),
+    "a failure with half a character": lambda e: e.campaign.tell_failed(e.test, "cut \udcff"),
+    "a withdrawal with half a character": lambda e: e.campaign.withdraw(0, "cut \udcff"),
     "no digits": lambda e: e.twin.equations(digits=0),
     "eighteen digits": lambda e: e.twin.equations(digits=18),
     "a state of another width": lambda e: e.twin.predict([0.0, 0.0, 0.0], [0.0]),
@@ -320,6 +328,25 @@ def test_a_step_function_that_fails_says_where(new_campaign, pendulum_signals, c
         campaign.run(system, 1)
     assert "\n" not in str(failure.value)
     assert campaign.experiments == ()
+
+
+def test_what_a_failing_system_says_is_kept_whatever_is_in_it(new_campaign, pendulum):
+    """Such as the name of a file in another encoding."""
+
+    def torn(run):
+        raise tl.SystemFailure("cannot read log-\udcff.csv")
+
+    campaign = new_campaign()
+    with pytest.raises(tl.SystemFailure):
+        campaign.run(Lying(pendulum, torn), 1)
+    assert [failure.reason for failure in campaign.failures] == [r"cannot read log-\udcff.csv"]
+
+
+def test_a_run_with_more_steps_than_a_record_may_hold_is_refused_when_it_is_told(told, monkeypatch):
+    monkeypatch.setattr("twinloop.trajectory.MOST_ITEMS", 10)
+    with pytest.raises(tl.InvalidInput, match="less than 10 steps"):
+        told.campaign.tell(told.test, told.system.run(told.test))
+    assert len(told.campaign.experiments) == 1
 
 
 def test_the_error_of_a_step_function_is_kept_as_the_cause(new_campaign, pendulum_signals):

@@ -21,9 +21,11 @@ import twinloop as tl
 from conftest import TINY
 from faults import exit_code_of, killed_and_resumed, telling, withdrawing
 from lives import (
+    CONTROLLER,
     EVENTS,
     LIFE,
     OTHER_GAINS,
+    SIGNALS,
     SMALL,
     WITHDRAWN_LIFE,
     behind_commits,
@@ -36,6 +38,7 @@ from lives import (
 from sameness import same
 from twinloop.campaign import keeping
 from twinloop.records import to_text
+from twinloop.records.reading import MOST_ITEMS
 from twinloop.store import Keeper, doing, found, listed, opened
 
 
@@ -69,6 +72,41 @@ def test_a_refused_call_leaves_no_row(path, pendulum):
     with pytest.raises(tl.InvalidInput):
         campaign.tell(campaign.experiments[0].test, short)
     assert len(rows(path, "experiments")) == 1 and len(campaign.experiments) == 1
+
+
+TOO_LONG = "x" * (MOST_ITEMS + 1)
+
+
+def test_what_could_not_be_read_again_is_refused_and_leaves_no_row(path, pendulum):
+    """One such entry would be the end of the campaign, as nobody could open it any more."""
+    campaign = flown(stored(path), pendulum)
+    first = campaign.tests[0]
+    run = pendulum.run(first)
+    long = tl.Trajectory(run.t[:5], run.states[:5], run.commands[:4], ended="aborted", reason=TOO_LONG)
+    for call in (
+        lambda: campaign.tell(first, long),
+        lambda: campaign.tell_failed(first, TOO_LONG),
+        lambda: campaign.withdraw(0, TOO_LONG),
+    ):
+        with pytest.raises(tl.InvalidInput, match="at most 10000000 characters"):
+            call()
+    assert [len(rows(path, name)) for name in ("experiments", "failures", "withdrawals")] == [1, 0, 0]
+    assert plain(campaign) == plain(tl.Campaign.load(path, read_only=True))
+
+
+def test_a_campaign_that_could_not_be_read_again_is_not_begun(path):
+    signals = tl.Signals(SIGNALS.states, [tl.Command("torque", TOO_LONG, (-2.0, 2.0))], SIGNALS.dt)
+    with pytest.raises(tl.InvalidInput, match="at most 10000000 characters"):
+        tl.Campaign(
+            signals, controller=CONTROLLER, initial_state=[0, 0], target_state=[1, 0], duration=1, store=path
+        )
+    assert not path.exists()
+
+
+def test_a_number_that_no_database_can_hold_is_said(path, pendulum):
+    campaign = flown(stored(path), pendulum)
+    with pytest.raises(tl.StoreFailure, match="too large"):
+        campaign.run(pendulum, experiments=2**70)
 
 
 @pytest.mark.parametrize("event", EVENTS)
@@ -383,6 +421,13 @@ def test_a_copy_of_a_kept_campaign_is_not_kept(path, pendulum):
     assert len(rows(path, "tests")) == 1
 
 
+def test_a_command_with_bytes_that_are_no_characters_is_entered_with_their_numbers(path, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["twinloop", "run", "rig-\udcff"])
+    stored(path).close()
+    assert tl.Campaign.load(path, read_only=True).setup is not None
+    assert r"rig-\\udcff" in rows(path, "sessions")[0][3]
+
+
 def test_the_store_says_what_results_come_from(path, pendulum):
     flown(stored(path), pendulum).close()
     stored(path).close()
@@ -618,7 +663,7 @@ def test_without_its_packages_the_store_says_what_to_install(path, monkeypatch, 
         stored(path)
 
 
-@pytest.mark.parametrize("name", ["", "  ", "x" * 201, None])
+@pytest.mark.parametrize("name", ["", "  ", "x" * 201, None, "rig \udcff"])
 def test_a_campaign_needs_a_name_in_its_store(path, name):
     with pytest.raises(tl.InvalidInput, match="name"):
         stored(path, name=name)

@@ -1,6 +1,43 @@
-"""Texts from anybody, made fit for one line."""
+"""Texts from anybody: refused at the door if no file could hold them, or made fit for where they are going."""
 
 from __future__ import annotations
+
+from twinloop.errors import InvalidInput
+
+
+def text(what: str, value: object) -> str:
+    """A text that every file and page can hold.
+
+    Args:
+        what: how to call it in an error, such as "Trajectory.reason".
+        value: the text.
+
+    Returns:
+        The text as it is.
+
+    Raises:
+        InvalidInput: it is no text, or has halves of characters, such as from a file name in another encoding.
+    """
+    if not isinstance(value, str):
+        raise InvalidInput(f"{what}: expected a text, found {value!r}; write it in quotes.")
+    try:
+        value.encode()
+    except UnicodeEncodeError as reason:
+        around = value[max(0, reason.start - 20) : reason.end + 20]
+        raise InvalidInput(
+            f"{what}: expected a text of whole characters, found half of one in {around!r}; remove it, or decode the"
+            " text in the encoding that it was written in."
+        ) from reason
+    return value
+
+
+def whole_characters(words: str) -> str:
+    r"""A text that UTF-8 can hold: half a character becomes its number, such as \udcff.
+
+    Args:
+        words: from anybody, such as those of a command.
+    """
+    return words.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def one_line(text: str) -> str:

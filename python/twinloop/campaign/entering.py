@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._experiment.replay import Replay
+from twinloop._ground.texts import text
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
@@ -82,6 +83,7 @@ def partial_run(partial: Trajectory | None, reason: str) -> Trajectory | None:
         raise InvalidInput(
             f"Campaign.tell_failed, reason: expected what happened, in words, found {reason!r}; write it down."
         )
+    text("Campaign.tell_failed, reason", reason)
     if isinstance(partial, Trajectory):
         ended = "diverged" if partial.ended == "diverged" else "aborted"
         return dataclasses.replace(partial, ended=ended, reason=reason)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from twinloop._ground.arrays import share, whole
+from twinloop._ground.texts import whole_characters
 from twinloop.errors import InvalidInput, NoAnswer, NotAvailable, SystemFailure, TooRisky
 from twinloop.signals import Signals
 from twinloop.systems import System
@@ -135,7 +136,7 @@ def _flown(campaign: Campaign, system: System, test: Test, timeout: float | None
         )
         raise NoAnswer(f"{failure} {kept}") from failure
     except SystemFailure as failure:
-        campaign.tell_failed(test, str(failure))
+        campaign.tell_failed(test, whole_characters(str(failure)))
         if again or not campaign.experiments:
             raise
         return True

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from twinloop import _core
 from twinloop._ground.arrays import whole
+from twinloop._ground.texts import text, whole_characters
 from twinloop._ground.versions import versions
 from twinloop.campaign.differing import differences
 from twinloop.campaign.history import Progress
@@ -51,6 +52,7 @@ class Keeping:
         _check_name(name)
         self._said: float | None = None
         asked = setup.to_record()
+        Setup.from_record(asked)  # what could not be read again is refused before there is a row of it
         store = opened(where, create=True)
         try:
             self._keeper = Keeper(store, name, asked, identity)
@@ -83,11 +85,14 @@ class Keeping:
             method: of the campaign.
 
         Raises:
+            InvalidInput: an entry could not be read again.
             StoreFailure: the store cannot be written; nothing of it was kept.
         """
         memory = method.memory
         record = None if memory is self._memory else method.to_record()
-        self._keeper.keep(book.entries(self.rows), record, self._count())
+        entries = book.entries(self.rows)
+        book.check_readable(entries)
+        self._keeper.keep(entries, record, self._count())
         self._memory, self._saved = memory, time.monotonic()
         self.rest()
 
@@ -251,7 +256,7 @@ def provenance(threads: int) -> Record:
         "processor": _processor(),
         "vectors": _core.vector_widths(),
         "system": platform.platform(),
-        "command": [shown_name(word) for word in as_typed(sys.argv)],
+        "command": [whole_characters(shown_name(word)) for word in as_typed(sys.argv)],
         "versions": versions(),
     }
 
@@ -291,6 +296,7 @@ def _check_name(name: object) -> None:
         raise InvalidInput(
             f"Campaign, name: expected a text of 1 to 200 characters, found {name!r}; name it."
         )
+    text("Campaign, name", name)
 
 
 def _check_same(known: Any, asked: Any, what: str) -> None:

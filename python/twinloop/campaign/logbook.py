@@ -89,15 +89,10 @@ class Logbook(Recorded, kind="logbook"):
                 )
         runs = read(list[tuple[int | None, Any]], found["experiments"], f"{where}.experiments")
         for i, (number, run) in enumerate(runs):
-            at = f"{where}.experiments[{i}]"
-            replayed = replay_of_record(run, setup) if number is None else book._numbered(number, at)
-            read_run = Experiment.from_record(run, replayed)
-            check_recorded(read_run.trajectory, setup.limits, replayed.steps, least=1)
-            book.enter(read_run)
+            book.enter(book._run(number, run, f"{where}.experiments[{i}]"))
         failures = read(list[tuple[int, Any]], found["failures"], f"{where}.failures")
         for i, (number, failure) in enumerate(failures):
-            at = f"{where}.failures[{i}]"
-            book._report(Failure.from_record(failure, book._numbered(number, at)))
+            book._report(book._failure(number, failure, f"{where}.failures[{i}]"))
         book.abandoned = read(list[int], found["abandoned"], f"{where}.abandoned")
         for i, number in enumerate(book.abandoned):
             book._numbered(number, f"{where}.abandoned[{i}]")
@@ -110,6 +105,33 @@ class Logbook(Recorded, kind="logbook"):
         check_withdrawals(book, f"{where}.withdrawals")
         book._recount()
         return book
+
+    def check_readable(self, entries: Mapping[str, list[Any]]) -> None:
+        """Refuses entries of this book that could not be read again: with them the whole campaign would be lost.
+
+        Args:
+            entries: their records, as `entries` gives them.
+
+        Raises:
+            InvalidInput: one of them has a value that is refused on reading.
+        """
+        read(list[Test], entries["tests"], "logbook.tests", (self.setup.family,))
+        for number, run in entries["experiments"]:
+            self._run(number, run, "logbook.experiments")
+        for number, failure in entries["failures"]:
+            self._failure(number, failure, "logbook.failures")
+        read(list[tuple[int, TestLoop | Planned]], entries["asked"], "logbook.asked")
+        read(list[Withdrawal], entries["withdrawals"], "logbook.withdrawals")
+
+    def _run(self, number: int | None, record: Any, where: str) -> Experiment:
+        """An experiment that can be learnt from, of its record behind the number of its test."""
+        replayed = replay_of_record(record, self.setup) if number is None else self._numbered(number, where)
+        run = Experiment.from_record(record, replayed)
+        check_recorded(run.trajectory, self.setup.limits, replayed.steps, least=1)
+        return run
+
+    def _failure(self, number: int, record: Any, where: str) -> Failure:
+        return Failure.from_record(record, self._numbered(number, where))
 
     def first(self, experiments: int) -> Logbook:
         """The same tests with the first experiments only.

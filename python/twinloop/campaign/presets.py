@@ -11,6 +11,7 @@ from typing import Any, Literal, overload
 import numpy as np
 
 from twinloop._experiment.limits import DIVERGENCE_FACTOR
+from twinloop._ground.texts import text
 from twinloop.errors import InvalidInput, unknown
 from twinloop.identification.settings import FORMS as ALL_FORMS
 from twinloop.identification.settings import LEAST_MOVES, IdentificationOptions
@@ -359,7 +360,7 @@ def _typed(name: str, kind: str, value: object) -> object:
     ):
         return float(value)
     if kind == "str" and isinstance(value, str):
-        return value
+        return text(f"Option {name!r}", value)
     if (
         kind.startswith("tuple[float")
         and isinstance(value, (tuple, list))
@@ -372,7 +373,7 @@ def _typed(name: str, kind: str, value: object) -> object:
         and isinstance(value, (tuple, list))
         and all(isinstance(v, str) for v in value)
     ):
-        return tuple(value)
+        return tuple(text(f"Option {name!r}", each) for each in value)
     raise InvalidInput(f"Option {name!r}: expected {_article(kind)}, found {value!r}; change it.")
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from twinloop._ground.texts import text
 from twinloop.campaign.excited import as_excited, excited
 from twinloop.campaign.history import Experiment, Failure, Withdrawal
 from twinloop.errors import InvalidInput
@@ -36,6 +37,7 @@ def withdrawal_of(book: Logbook, which: object, reason: str, known: Sequence[int
             f"Campaign.withdraw, reason: expected what was wrong, in words, found {reason!r}; such as"
             ' "columns exchanged".'
         )
+    text("Campaign.withdraw, reason", reason)
     run, failure = _place(book, which)
     if run is None:
         assert failure is not None

@@ -140,9 +140,11 @@ def read_whole(value: object, where: str) -> int:
 
 def read_text(value: object, where: str) -> str:
     """A text of bounded length."""
-    if isinstance(value, str) and len(value) <= MOST_ITEMS:
-        return value
-    raise InvalidInput(f"Record {where}: expected a text, found {shown(value)}.")
+    if not isinstance(value, str):
+        raise InvalidInput(f"Record {where}: expected a text, found {shown(value)}.")
+    if len(value) > MOST_ITEMS:
+        raise InvalidInput(f"Record {where}: expected at most {MOST_ITEMS} characters, found {len(value)}.")
+    return value
 
 
 def read_flag(value: object, where: str) -> bool:

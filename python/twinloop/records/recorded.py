@@ -13,6 +13,7 @@ from typing import Any, ClassVar, TypeVar, Union
 import numpy as np
 
 from twinloop import _core
+from twinloop._ground.texts import text
 from twinloop.errors import InvalidInput, unknown
 from twinloop.records.native import model_record, read_model, read_program
 from twinloop.records.reading import (
@@ -278,8 +279,15 @@ def beside(hint: Any, given: tuple[object, ...], where: str) -> Any:
 
 
 def to_text(record: Mapping[str, object]) -> str:
-    """A record as one line of JSON; numbers have all their digits."""
-    return json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    """A record as one line of JSON; numbers have all their digits.
+
+    Args:
+        record: plain.
+
+    Raises:
+        InvalidInput: a text in it has halves of characters, which no file can hold.
+    """
+    return text("Record", json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":")))
 
 
 def _hints(cls: type) -> dict[str, Any]:

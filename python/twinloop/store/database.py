@@ -72,7 +72,7 @@ class Store:
             yield
         except TwinloopError:
             raise
-        except (SQLAlchemyError, OSError) as failure:
+        except (SQLAlchemyError, OSError, OverflowError) as failure:  # the last: of a number beyond 64 bits
             raise said(self.name, failure) from failure
 
     def close(self) -> None:
