@@ -453,6 +453,17 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(path, pendulum):
     tl.Campaign.load(path).close()
 
 
+def test_a_second_writer_who_comes_by_a_link_is_refused(path, pendulum):
+    """Each would have had a lock beside its own name, and the learning of one would have replaced the other's."""
+    campaign = flown(stored(path), pendulum)
+    link = path.with_name("link.db")
+    link.symlink_to(path.name)
+    with pytest.raises(tl.StoreFailure, match="only one who writes"):
+        tl.Campaign.load(link)
+    campaign.close()
+    tl.Campaign.load(link).close()
+
+
 def test_a_reader_in_the_middle_of_reading_does_not_hold_up_the_writer(path, pendulum):
     campaign = flown(stored(path), pendulum)
     with opened(path, read_only=True).transaction() as reading:

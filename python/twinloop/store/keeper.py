@@ -359,7 +359,8 @@ class Keeper:
             with self.store.sentences():
                 return AdvisoryLock(self.store.engine.connect(), self._id, self._what)
         with self.store.sentences():
-            return FileLock(Path(f"{path}-{self._id}.lock"), self._what)
+            # Beside the database itself, whatever links lead to it.
+            return FileLock(Path(f"{path.resolve()}-{self._id}.lock"), self._what)
 
 
 def _entered(connection: Connection, name: str, setup: Record, identity: str) -> int:
