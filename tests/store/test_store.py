@@ -39,7 +39,7 @@ from sameness import same
 from twinloop.campaign import keeping
 from twinloop.records import to_text
 from twinloop.records.reading import MOST_ITEMS
-from twinloop.store import Keeper, doing, found, listed, opened
+from twinloop.store import Keeper, doing, found, listed, opened, state
 
 
 def rows(path, table):
@@ -701,6 +701,31 @@ def test_what_is_being_done_is_said_to_whoever_looks_and_ends_with_it(path, pend
     with closing(opened(path, read_only=True)) as store:
         assert doing(store, "campaign") is None
     campaign.close()
+
+
+def test_whatever_is_kept_changes_the_state_also_within_a_second(path, pendulum, monkeypatch):
+    monkeypatch.setattr("twinloop.store.keeper._now", lambda: "1970-01-01T00:00:00+00:00")
+    seen = []
+
+    def look():
+        with closing(opened(path, read_only=True)) as store:
+            seen.append(state(store, "campaign"))
+
+    campaign = stored(path)
+    look()
+    flown(campaign, pendulum)
+    look()
+    for _ in range(3):
+        campaign._keeping._keeper.keep({}, campaign._method.to_record())
+        look()
+    for experiments in (2, 3):
+        campaign._keeping.fly(pendulum, experiments)
+        look()
+    assert len(set(seen)) == len(seen)
+    campaign.close()
+    stored(path).close()
+    look()
+    assert seen[-1] == seen[-2]
 
 
 def test_who_was_killed_is_known_by_the_time_that_he_has_been_silent(path, pendulum):

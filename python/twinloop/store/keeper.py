@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -262,7 +263,9 @@ class Keeper:
         from twinloop.store.schema import checkpoints
 
         connection.execute(delete(checkpoints).where(checkpoints.c.campaign == self._id))
-        row = {"campaign": self._id, "saved": _now(), "record": to_text(memory)}
+        # The time is for a person; the rest tells two within a second apart, and by no clock.
+        saved = f"{_now()} {secrets.token_hex(6)}"
+        row = {"campaign": self._id, "saved": saved, "record": to_text(memory)}
         connection.execute(checkpoints.insert(), row)
 
     def fly(self, system: Record | None, experiments: int) -> None:

@@ -25,6 +25,8 @@ class Doing:
 def state(store: Store, name: str) -> str:
     """A text that is another one whenever anything of a campaign was kept since; it reads no record.
 
+    That somebody has opened the campaign to write changes nothing of it.
+
     Args:
         store: open.
         name: of the campaign.
@@ -38,9 +40,10 @@ def state(store: Store, name: str) -> str:
         select(func.count()).select_from(table).where(table.c.campaign == of_this).scalar_subquery()
         for table in (*ENTRIES.values(), approvals)
     ]
+    budget = select(campaigns.c.experiments).where(campaigns.c.name == name).scalar_subquery()
     saved = select(checkpoints.c.saved).where(checkpoints.c.campaign == of_this).scalar_subquery()
     with store.transaction() as connection:
-        return " ".join(str(value) for value in connection.execute(select(*counts, saved)).one())
+        return " ".join(str(value) for value in connection.execute(select(*counts, budget, saved)).one())
 
 
 def doing(store: Store, name: str) -> Doing | None:
