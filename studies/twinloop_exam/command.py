@@ -15,6 +15,7 @@ from twinloop._ground.arrays import whole
 from twinloop.campaign.remaining import duration
 from twinloop.errors import NotAvailable, unknown
 from twinloop.faces.files import write_text
+from twinloop.faces.result import to_json
 from twinloop.sweep.seeds import seeds_of
 from twinloop.sweep.workers import HERE, processes
 from twinloop_exam.kinds import Fitter, Tuner
@@ -27,7 +28,7 @@ from twinloop_exam.study import work_off
 from twinloop_exam.systems import SUBJECTS
 from twinloop_exam.tables import FORMATS, as_text, render
 from twinloop_exam.tuning import EXPERIMENTS as TUNING_EXPERIMENTS
-from twinloop_exam.tuning import score, tuned, variants
+from twinloop_exam.tuning import score, tuned, tuned_as_values, variants
 from twinloop_exam.version import version
 from twinloop_exam.zoo.command import zoo
 
@@ -57,6 +58,7 @@ bench.add_command(zoo)
     "--cluster", default=HERE, show_default=True, help="here, local:N, or a Dask scheduler's address."
 )
 @click.option("--table", "form", help=f"Only print what the store holds: {', '.join(FORMATS)}.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--page", type=Path, metavar="FILE.md", help="Only write what the store holds as a page.")
 @click.option("--tune", is_flag=True, help="Compare hyper-parameters of the others on seeds 0 to 9.")
 @click.option("--retry", is_flag=True, help="Try again what failed.")
@@ -73,6 +75,7 @@ def power(
     store: Path | None,
     cluster: str,
     form: str | None,
+    as_json: bool,
     page: Path | None,
     tune: bool,
     retry: bool,
@@ -100,7 +103,7 @@ def power(
             raise NotAvailable(f"Store {str(path)!r}: expected a file, found none; run the exam first.")
         scope = Scope(names, chosen, source, chosen_seeds, experiments, retry)
         if tune:
-            click.echo(_tune(scope, path, cluster, yes), nl=False)
+            click.echo(_tune(scope, path, cluster, yes, as_json or form == "json"), nl=False)
             return
         try:
             failed = 0 if shown_only else _run(scope, path, cluster, yes)
@@ -111,9 +114,11 @@ def power(
         try:
             results = Results(kept, names, chosen, source, chosen_seeds)
             if page is None:
-                click.echo(render(results, form or "text"), nl=False)
+                click.echo(render(results, "json" if as_json else form or "text"), nl=False)
             else:
                 write_text(page, as_page(results, kept.versions))
+                if as_json:
+                    click.echo(to_json({"files": [str(page)]}), nl=False)
         finally:
             kept.close()
     if smoke:
@@ -150,24 +155,29 @@ def _with_source(scope: Scope) -> Scope:
     return replace(scope, learners=[scope.data, *scope.learners])
 
 
-def _tune(scope: Scope, path: Path, cluster: str, yes: bool) -> str:
+def _tune(scope: Scope, path: Path, cluster: str, yes: bool, as_json: bool) -> str:
     system = "quadrotor" if "quadrotor" in scope.systems else scope.systems[0]
     grids = [who for who in scope.learners if isinstance(who, Fitter | Tuner) and who.grid]
     tried = [variant for who in grids for variant in variants(who)]
     seeds = scope.seeds or TUNING_SEEDS
     _run(Scope([system], tried, scope.data, seeds, max(TUNING_EXPERIMENTS), scope.retry), path, cluster, yes)
-    shown = []
     store = Store(path)
     try:
-        for who in grids:
-            scores = [
-                (variant, score(Results(store, [system], [variant], scope.data, seeds), system, variant))
-                for variant in variants(who)
-            ]
-            shown.append(as_text(tuned(who, scores)))
+        scored = [
+            (
+                who,
+                [
+                    (variant, score(Results(store, [system], [variant], scope.data, seeds), system, variant))
+                    for variant in variants(who)
+                ],
+            )
+            for who in grids
+        ]
     finally:
         store.close()
-    return "\n\n".join(shown) + "\n"
+    if as_json:
+        return to_json({"tuned": [value for who, scores in scored for value in tuned_as_values(who, scores)]})
+    return "\n\n".join(as_text(tuned(who, scores)) for who, scores in scored) + "\n"
 
 
 def _chosen(kind: str, asked: str | None, by_default: Sequence[str], known: Iterable[str]) -> list[str]:

@@ -87,3 +87,24 @@ def tuned(who: Tunable, scores: Sequence[tuple[Tunable, float]]) -> Table:
         for variant, found in sorted(scores, key=lambda pair: pair[1])
     ]
     return Table(f"{who.name}: geometric mean of medians over seeds", [*names, "score", ""], rows)
+
+
+def tuned_as_values(who: Tunable, scores: Sequence[tuple[Tunable, float]]) -> list[dict[str, object]]:
+    """The same for a program to read.
+
+    Args:
+        who: the learner with the settings that the code has.
+        scores: of each variant.
+
+    Returns:
+        Its settings, its score and whether it is in the code, of each variant, the best first.
+    """
+    return [
+        {
+            "learner": who.name,
+            "settings": {name: variant.settings[name] for name in who.grid},
+            "score": found,
+            "in_the_code": variant.settings == who.settings,
+        }
+        for variant, found in sorted(scores, key=lambda pair: pair[1])
+    ]

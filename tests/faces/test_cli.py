@@ -9,10 +9,12 @@ import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
+import click
 import pytest
 
 import twinloop
 from command import hearing_ctrl_c, invoke, same_but_for_run_info, twinloop_command
+from twinloop.faces.cli import main
 
 PAPER = ["run", "quadrotor", "--preset", "paper"]
 SMALL = [*PAPER, "--generations", "30", "--experiments", "2", "--set", "model_population=40"]
@@ -42,6 +44,21 @@ def test_the_answer_is_exactly_one_json_object(answer):
     assert result["seed"] == 0 and result["system"]["name"] == "quadrotor"
     assert len(result["controller"]["gains"]) == 9
     assert result["run_info"]["versions"]["twinloop"] == twinloop.__version__
+
+
+def test_every_command_takes_json():
+    def verbs(command, context):
+        if not isinstance(command, click.Group):
+            return {context.command_path: command}
+        inside = [command.get_command(context, name) for name in command.list_commands(context)]
+        contexts = [click.Context(each, parent=context, info_name=each.name) for each in inside]
+        return {k: v for each, of in zip(inside, contexts, strict=True) for k, v in verbs(each, of).items()}
+
+    found = verbs(main, click.Context(main, info_name="twinloop"))
+    assert len(found) > 20 and "twinloop bench power" in found
+    assert [
+        name for name, verb in found.items() if not any("--json" in each.opts for each in verb.params)
+    ] == []
 
 
 def test_the_page_names_every_key_of_the_answer(answer):

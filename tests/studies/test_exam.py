@@ -28,7 +28,7 @@ from twinloop_exam.results import Results, spread
 from twinloop_exam.store import Address, Row, Store
 from twinloop_exam.systems import Subject, subject
 from twinloop_exam.tables import as_markdown, render, tables
-from twinloop_exam.tuning import score, tuned, variants
+from twinloop_exam.tuning import score, tuned, tuned_as_values, variants
 
 PAPER = for_smoke(LEARNERS["paper"])
 RANDOM = LEARNERS["random-gains"]
@@ -686,6 +686,8 @@ def test_tuning_ranks_a_grid(store):
         scores.append((variant, score(results, "quadrotor", variant)))
     assert [found for _, found in scores] == pytest.approx([1e-1, 1e-3])
     assert [row[0] for row in tuned(who, scores).rows] == ["2.0", "1.0"]
+    values = [(value["settings"], value["in_the_code"]) for value in tuned_as_values(who, scores)]
+    assert values == [({"ridge": 2.0}, False), ({"ridge": 1.0}, True)]
     assert score(Results(store, ["quadrotor"], [who], RANDOM, [5]), "quadrotor", who) == math.inf
 
 
@@ -727,8 +729,10 @@ def test_the_store_prints_its_tables_without_working(tmp_path):
     assert "0 jobs" in again.stderr
     shown = json.loads(bench(*asked, "--table", "json").stdout)
     assert [cell["violated"]["seeds"] for cell in shown["cells"]] == [2, 2]
+    assert json.loads(bench(*asked, "--experiments", "1", "--json").stdout) == shown
     page = tmp_path / "results.md"
     assert bench(*asked, "--page", str(page)).stdout == ""
+    assert json.loads(bench(*asked, "--page", str(page), "--json").stdout) == {"files": [str(page)]}
     assert f"one version of the code: {tl.__version__}" in page.read_text(encoding="utf-8")
 
 
