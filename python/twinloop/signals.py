@@ -53,6 +53,8 @@ class State(Recorded, kind="state"):
 
     def __post_init__(self) -> None:
         _check_words("State", self.name, self.unit)
+        if self.derivative_of is not None:
+            text(f"State {self.name!r}, derivative_of", self.derivative_of)
         object.__setattr__(self, "scale", number(f"State {self.name!r}, scale", self.scale, above=0.0))
         if self.envelope is not None:
             object.__setattr__(self, "envelope", ordered(f"State {self.name!r}, envelope", self.envelope))
@@ -135,8 +137,9 @@ class RigidBody(Recorded, kind="rigid_body"):
     rates: Sequence[str]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "angles", tuple(self.angles))
-        object.__setattr__(self, "rates", tuple(self.rates))
+        for which in ("angles", "rates"):
+            names = tuple(text(f"RigidBody, {which}", name) for name in getattr(self, which))
+            object.__setattr__(self, which, names)
         if len(self.angles) != 3 or len(self.rates) != 3 or len({*self.angles, *self.rates}) != 6:
             raise InvalidInput(
                 f"RigidBody: expected three angles and three rates that differ, found {self.angles} and"

@@ -62,7 +62,7 @@ class Trajectory(Shown, Value, Recorded, kind="trajectory"):
                 f"Trajectory.t: expected times that grow, found {t[k]:g} s then {t[k + 1]:g} s at rows {k}"
                 f" and {k + 1}; sort the record or remove repeated rows."
             )
-        if self.ended not in ENDINGS:
+        if text("Trajectory.ended", self.ended) not in ENDINGS:
             raise unknown("end of a trajectory", self.ended, ENDINGS)
         text("Trajectory.reason", self.reason)
         object.__setattr__(self, "t", t)

@@ -8,6 +8,7 @@ import pytest
 
 import twinloop as tl
 from conftest import PENDULUM_GAINS, pendulum_step
+from lives import made
 from twinloop.campaign.presets import options_of, parsed
 
 STATE, COMMAND = tl.State("x", "m", 1.0), tl.Command("u", "V", (-1.0, 1.0))
@@ -51,6 +52,7 @@ DATA = {
     "complex numbers": lambda: tl.Trajectory(T, X + 1j, U),
     "ragged rows": lambda: tl.Trajectory(T, [[0.0], [0.0, 1.0], [0.0], [0.0]], U),
     "an end that there is none of": lambda: tl.Trajectory(T, X, U, ended="complete"),
+    "an end that is no text": lambda: tl.Trajectory(T, X, U, ended=np.array(["completed", "aborted"])),
     "no reason at all": lambda: tl.Trajectory(T, X, U, ended="aborted", reason=None),
     "a number for a reason": lambda: tl.Trajectory(T, X, U, ended="aborted", reason=7),
     "half a character in a reason": lambda: tl.Trajectory(T, X, U, ended="aborted", reason="\udcff"),
@@ -79,6 +81,10 @@ SIGNALS = {
     "a scale that is true": lambda: tl.State("x", "m", True),
     "a word of Python's for a name": lambda: tl.State("lambda", "m", 1.0),
     "a unit that is a number": lambda: tl.Command("u", 3, (0.0, 1.0)),
+    "the derivative of a list": lambda: tl.State("v", "m/s", 1.0, derivative_of=[]),
+    "a body of lists": lambda: tl.RigidBody([[], [], []], [[], [], []]),
+    "a scale beyond all numbers": lambda: tl.State("x", "m", 10**400),
+    "a scale that nobody can print": lambda: tl.State("x", "m", 10**5000),
     "half a character in a unit": lambda: tl.State("x", "m\ud800", 1.0),
     "a name with a space": lambda: tl.State("roll rate", "rad/s", 1.0),
     "a name that is a number": lambda: tl.Command("1", "V", (0.0, 1.0)),
@@ -98,6 +104,8 @@ SIGNALS = {
     ),
 }
 PIDS = {
+    "a mixer whose unit is a number": lambda: tl.controllers.Mixer([[1.0]], unit=3),
+    "a mixer without a unit": lambda: tl.controllers.Mixer([[1.0]], unit=None),
     "an unknown gain": lambda: tl.controllers.PID(axes=[("x", None)], gains={**GAINS, "x.kq": (0, 1)}),
     "a missing gain": lambda: tl.controllers.PID(axes=[("x", None)], gains={"x.kp": (0.0, 1.0)}),
     "gain bounds the wrong way round": lambda: tl.controllers.PID(
@@ -151,6 +159,8 @@ OPTIONS = {
     "half a character in a term": lambda: options_of("default", {"seed_terms": ["x\ud800"]}),
     "no operations": lambda: options_of("paper", {"operations": []}),
     "operations in one word": lambda: options_of("paper", {"operations": "+-"}),
+    "an option beyond all numbers": lambda: options_of("default", {"margin": 10**400}),
+    "numbers beyond all": lambda: options_of("default", {"initial_range": [10**400, 1.0]}),
     "a number for a choice": lambda: options_of("paper", {"control_quality": 1}),
     "a word for a number": lambda: parsed("paper", "pages", "three"),
     "a word for a choice": lambda: parsed("paper", "control_quality", "maybe"),
@@ -229,6 +239,24 @@ def test_a_campaign_that_cannot_work_is_refused_before_anything_is_flown(new_cam
     with pytest.raises(tl.InvalidInput) as refusal:
         new_campaign(**CAMPAIGNS[case])
     one_sentence(refusal.value)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.int8])
+def test_numbers_of_numpy_count_as_the_same_of_python(kind):
+    """Also those that have no room for the largest number."""
+    records = [
+        made(
+            options={"margin": of(0), "initial_range": [of(1), of(2)]},
+            weights={"rate": of(2)},
+            controller=tl.controllers.PID(
+                axes=[("angle", "rate")],
+                gains={"angle.kp": (of(0), of(6)), "angle.ki": of(1), "angle.kd": (0.0, 1.0)},
+            ),
+        ).setup.to_record()
+        for of in (kind, float)
+    ]
+    assert records[0] == records[1]
 
 
 @pytest.fixture

@@ -78,7 +78,12 @@ def number(what: str, value: object, *, above: float | None = None) -> float:
     """
     limit = "" if above is None else f" above {above:g}"
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-        found = float(value)
+        try:
+            found = float(value)
+        except OverflowError as reason:
+            raise InvalidInput(
+                f"{what}: expected a finite number{limit}, found one beyond 1.8e308; change it."
+            ) from reason
         if np.isfinite(found) and (above is None or found > above):
             return found
     raise InvalidInput(f"{what}: expected a finite number{limit}, found {value!r}; change it.")

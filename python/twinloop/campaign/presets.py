@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, overload
@@ -11,6 +10,7 @@ from typing import Any, Literal, overload
 import numpy as np
 
 from twinloop._experiment.limits import DIVERGENCE_FACTOR
+from twinloop._ground.arrays import number
 from twinloop._ground.texts import text
 from twinloop.errors import InvalidInput, unknown
 from twinloop.identification.settings import FORMS as ALL_FORMS
@@ -352,22 +352,12 @@ def _typed(name: str, kind: str, value: object) -> object:
         return bool(value)
     if kind.startswith("int") and isinstance(value, (int, np.integer)) and not isinstance(value, bool):
         return int(value)
-    if (
-        kind == "float"
-        and isinstance(value, (int, float, np.integer, np.floating))
-        and not isinstance(value, bool)
-        and -sys.float_info.max <= value <= sys.float_info.max
-    ):
-        return float(value)
+    if kind == "float":
+        return number(f"Option {name!r}", value)
     if kind == "str" and isinstance(value, str):
         return text(f"Option {name!r}", value)
-    if (
-        kind.startswith("tuple[float")
-        and isinstance(value, (tuple, list))
-        and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
-        and all(-sys.float_info.max <= v <= sys.float_info.max for v in value)
-    ):
-        return tuple(float(v) for v in value)
+    if kind.startswith("tuple[float") and isinstance(value, (tuple, list)):
+        return tuple(number(f"Option {name!r}", each) for each in value)
     if (
         kind.startswith("tuple[str")
         and isinstance(value, (tuple, list))
@@ -378,7 +368,7 @@ def _typed(name: str, kind: str, value: object) -> object:
 
 
 def _article(kind: str) -> str:
-    words = {"bool": "true or false", "float": "a number", "str": "a word"}
+    words = {"bool": "true or false", "str": "a word"}
     if kind.startswith("tuple"):
         return "a list of finite numbers" if "float" in kind else "a list of names"
     return words.get(kind, "a whole number")

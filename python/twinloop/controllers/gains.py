@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from twinloop._ground.arrays import number
 from twinloop.errors import InvalidInput, unknown
 from twinloop.signals import ordered
@@ -114,7 +116,7 @@ def gain_bounds(what: str, bounds: object) -> GainBounds:
     Raises:
         InvalidInput: anything else, the wrong way round, or a logarithm of what is not above 0.
     """
-    if isinstance(bounds, (int, float)):
+    if isinstance(bounds, (int, float, np.integer, np.floating)):
         return number(what, bounds)
     items = tuple(bounds) if isinstance(bounds, Iterable) and not isinstance(bounds, str) else ()
     if len(items) == 3 and items[2] != "log":

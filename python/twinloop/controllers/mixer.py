@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twinloop._ground.arrays import Floats, floats, number
+from twinloop._ground.texts import text
 from twinloop.errors import InvalidInput
 from twinloop.records import Recorded
 
@@ -20,7 +21,7 @@ class Mixer(Recorded, kind="mixer"):
         unit: the unit of u, for the units of the gains.
 
     Raises:
-        InvalidInput: a shape that does not fit, or numbers that are not finite.
+        InvalidInput: a shape that does not fit, numbers that are not finite, or a unit that is no text.
     """
 
     matrix: Floats
@@ -35,6 +36,7 @@ class Mixer(Recorded, kind="mixer"):
         object.__setattr__(self, "matrix", matrix)
         object.__setattr__(self, "offset", floats("Mixer, offset (one entry a command)", offset, (rows,)))
         object.__setattr__(self, "power", number("Mixer, power", self.power, above=0.0))
+        text("Mixer, unit", self.unit)
 
     @property
     def engine(self) -> tuple[Floats, Floats, float]:

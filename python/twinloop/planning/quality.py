@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from twinloop import _core
-from twinloop._ground.arrays import Floats
+from twinloop._ground.arrays import Floats, at_least_zero
 from twinloop.errors import InvalidInput, unknown
 from twinloop.flights import quality as engine_quality
 from twinloop.signals import Signals
@@ -110,14 +109,12 @@ def weights_of(kind: str, signals: Signals, changed: Mapping[str, float] | None 
 
 def _numbers(weights: object) -> dict[str, float]:
     """Weights by name, checked: finite numbers of at least 0."""
-    expected = "Campaign, weights: expected a finite number of at least 0 for each state by name"
     if not isinstance(weights, Mapping):
-        raise InvalidInput(f'{expected}, found {weights!r}; write {{"angle": 2.0}}.')
-    for name, value in weights.items():
-        is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-        if not (is_number and 0.0 <= value <= sys.float_info.max):
-            raise InvalidInput(f"{expected}, found {name!r}: {value!r}; change it.")
-    return {name: float(value) for name, value in weights.items()}
+        raise InvalidInput(
+            "Campaign, weights: expected a finite number of at least 0 for each state by name, found"
+            f' {weights!r}; write {{"angle": 2.0}}.'
+        )
+    return {name: at_least_zero(f"Campaign, weights, {name!r}", value) for name, value in weights.items()}
 
 
 def quality_unit(quality: Quality) -> str:
