@@ -112,7 +112,7 @@ def row(**changed):
         "ended": "completed", "left": False, "flown": 1.0, "gains_quality": 1.0, "best_test": 1.0,
         "gains_in_noise": 1.0, "best_test_in_noise": 1.0, "predicted": 1.0, "measured": 1.0, "spread": 0.01,
         "error": 0.1, "error_repeated": 0.1, "diverged": 0, "found": [], "false": [], "empty": [],
-        "missed": 0.5, "serious": [], "follows": True, "ask_seconds": 2.0, **changed,
+        "missed": 0.5, "missed_repeated": 0.5, "serious": [], "follows": True, "ask_seconds": 2.0, **changed,
     }  # fmt: skip
 
 
@@ -158,8 +158,9 @@ def test_a_good_campaign_meets_every_bar_but_the_share_within_two_spreads():
         (11, 2, {"false": ["lasting"], "found": ["lasting"]}),
         (12, 2, {"empty": ["velocity"]}),
         (13, 2, {"missed": "inf"}),
-        (15, 2, {"left": True}),
-        (16, 2, {"ask_seconds": 61.0}),
+        (14, 2, {"missed_repeated": "inf"}),
+        (16, 2, {"left": True}),
+        (17, 2, {"ask_seconds": 61.0}),
     ],
 )
 def test_a_bar_is_missed_by_what_it_measures(place, number, change):
@@ -178,10 +179,10 @@ def test_a_bar_is_missed_by_what_it_measures(place, number, change):
 def test_what_is_said_excuses_a_lost_campaign_and_a_miss():
     one = good()
     for each in one["flights"]:
-        each.update(flown=1.3, serious=["free-run"], missed="inf")
-    assert verdicts(one)[2] is True and verdicts(one)[13] is True
+        each.update(flown=1.3, serious=["free-run"], missed="inf", missed_repeated="inf")
+    assert verdicts(one)[2] is True and verdicts(one)[13:15] == [True, True]
     one["confident"] = True
-    assert verdicts(one)[14] is False
+    assert verdicts(one)[15] is False
 
 
 def test_that_gains_elsewhere_are_still_open_is_said_of_a_twin_that_more_flights_made_worse():

@@ -218,15 +218,22 @@ def _empty(campaigns: Sequence[Measured]) -> Found:
     return Found(f"{count} of {len(rows)} lessons", count == 0, float(count)) if rows else _NOTHING
 
 
-def _missed(campaigns: Sequence[Measured]) -> Found:
+def _missed(campaigns: Sequence[Measured], name: str = "missed") -> Found:
     missed, others = (
-        [row for row in _rows(campaigns) if (number(row["missed"]) > 1.0) is off] for off in (True, False)
+        [row for row in _rows(campaigns) if name in row and (number(row[name]) > 1.0) is off]
+        for off in (True, False)
     )
+    if not missed and not others:
+        return _NOTHING
     share, count = _share(bool(row["serious"]) for row in missed)
     # A remark that is always made says nothing.
     falsely = sum("free-run" in row["serious"] for row in others)
     text = f"{_percent(share)} of {count}" if count else "none missed"
     return Found(f"{text}; said of {falsely} of {len(others)} that do not", share >= 0.95 or not count, share)
+
+
+def _missed_repeated(campaigns: Sequence[Measured]) -> Found:
+    return _missed(campaigns, "missed_repeated")
 
 
 def _confident(campaigns: Sequence[Measured]) -> Found:
@@ -267,6 +274,7 @@ BARS: tuple[Bar, ...] = (
     Bar("lessons with an actuator, offset, hidden state or lasting disturbance where there is none", "≤ 3 %", _false),
     Bar("lessons with an empty equation of a state that moves", "0", _empty),
     Bar("free run misses its own flights: a serious remark", "95 %", _missed),
+    Bar("the same of flights that the plant repeats: a serious remark", "95 %", _missed_repeated),
     Bar("free run misses, and the report says that models agree", "0", _confident),
     Bar("flights that left the envelope, after the first", "0", _left),
     Bar("CPU time of one ask", "median ≤ 10 s, largest ≤ 60 s", _asks),

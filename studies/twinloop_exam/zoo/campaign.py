@@ -21,7 +21,7 @@ from twinloop_exam.ablations import ablation
 from twinloop_exam.measures import violated
 from twinloop_exam.version import version
 from twinloop_exam.zoo import honesty
-from twinloop_exam.zoo.held_out import COUNT, HeldOut, held_out
+from twinloop_exam.zoo.held_out import COUNT, HeldOut, held_out, repeats
 from twinloop_exam.zoo.honesty import Flight
 from twinloop_exam.zoo.optima import best_quality, under_noise
 from twinloop_exam.zoo.plant import Plant
@@ -196,6 +196,7 @@ def _known(plant: Plant, campaign: Campaign, judge: HeldOut, flown: list[Flight]
             ],
             "empty": honesty.empty_equations(twin, flown),
             "missed": honesty.misses(plant, twin, flown),
+            "missed_repeated": honesty.misses(plant, twin, [run for run in flown if repeats(plant, run[0])]),
             "serious": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if one.serious}),
             "noted": sorted({one.code for one in (*lesson.remarks, *twin.remarks) if not one.serious}),
             "follows": lesson.follows,
