@@ -83,6 +83,13 @@ def chosen(
     return ("tuned" if (found.genes == TUNED).all() else "flown"), told[0] if gusts is UNMOVED else told
 
 
+def test_gains_that_are_better_by_more_than_any_miss_are_taken_whatever_predictions_missed():
+    """Predicted three times as bad as they were, so misses are twice the quality: a third of it is asked for."""
+    runs = [experiment(3.0, spread=2.0), experiment(3.2, spread=2.0)]
+    assert chosen(0.3, experiments=runs)[0] == "tuned"
+    assert chosen(0.4, experiments=runs)[0] == "flown"
+
+
 def test_gains_that_have_not_flown_must_promise_more_than_predictions_have_missed_of_late():
     """Two misses by 4 % and 9 %: their geometric mean is 6 %."""
     runs = [experiment(1.04, spread=0.1), experiment(1.09, spread=0.1)]

@@ -83,7 +83,7 @@ class Choice:
             return self._tuned(tuned, judged, recorded, reason)
         flies, own = standing.flies(self.book, flown.number), self._fared(flown)
         new, old = judged.qualities[:, :, 0].ravel(), judged.qualities[:, :, 1].ravel()
-        better = float((new < (1.0 - self._worth) * old).mean())
+        better = float(((1.0 + self._worth) * new < old).mean())
         if flies and not refused:
             refused = self._not_preferred(recorded, tuned, flown, better)
         if not refused:
@@ -108,7 +108,10 @@ class Choice:
 
     @cached_property
     def _worth(self) -> float:
-        """Share of a quality by which tuned gains must be better: by more than predictions have missed of late."""
+        """Share of tuned gains' quality by which flown ones must be worse: more than predictions have missed of late.
+
+        A share of the other quality would forbid all gains once predictions miss by more than the whole quality.
+        """
         least = missed(self.book.experiments) if self.planner.options.track_record else 0.0
         return max(WORTH, least)
 
@@ -204,7 +207,7 @@ class Choice:
         Predictions that are too bad for the flown gains are no evidence for others. Arguments as for `_spoken_against`.
         """
         predicted, _ = of_others()
-        if predicted < (1.0 - self._worth) * alone:
+        if (1.0 + self._worth) * predicted < alone:
             return ""
         return f"{_reaches(alone, flown)}, and the twin predicts {predicted:.3g} for others: not better by {self._more}"
 
