@@ -89,12 +89,14 @@ ABLATIONS: dict[str, Ablation] = {
     "second-pass": Ablation("a second selection on smoothed states", {"passes": 1}),
     "parts": Ablation("models of parts of a single flight", {"parts": False}),
     "committee": Ablation("a committee: the best model only", {"committee_size": 1, "tuning_members": 1}),
+    "anew": Ablation("laws searched with each flight, not only with the first", {"anew": False}),
     "steady": Ablation(
         "a lead that a law found anew needs over the one known before for each term more", {"steady": False}
     ),
     "earlier-twin": Ablation(
         "the earlier twin kept where the new one explains less", {"earlier_twin": False}
     ),
+    "tame": Ablation("the law known before, tuned again, kept where the new one is wild", {"tame": False}),
     "rough": Ablation("a linear law beside one that does not explain the flights", {"rough": False}),
     "causes": Ablation("disturbances separated from model errors", {"causes": False}),
     "exactness": Ablation("the inaccuracy of a law separated from disturbances", {"exactness": False}),

@@ -158,7 +158,7 @@ def identify_runs(
             context.watch("noise")
             searches.append(Found(start()))
             keep(replace(under_way, searches=tuple(searches)))
-        for propose in PROPOSALS[searches[number].made :] if goes_on(searches, number) else ():
+        for propose in PROPOSALS[searches[number].made :] if goes_on(context, searches, number) else ():
             searches[number] = decided(searches[number], propose(context, searches[number].best))
             keep(replace(under_way, searches=tuple(searches)))
     first, *others = searches
@@ -168,11 +168,14 @@ def identify_runs(
     return concluded(context, found, under_way.said)
 
 
-def goes_on(searches: Sequence[Found], number: int) -> bool:
+def goes_on(context: Context, searches: Sequence[Found], number: int) -> bool:
     """Whether proposals are made from a start: not from a law known before that those found anew are ahead of.
 
-    What is hidden they may have missed, so from such a law they are made in any case.
+    What is hidden they may have missed, so from such a law they are made in any case. None where only what is known is
+    tuned.
     """
+    if context.earlier is not None and not context.options.anew:
+        return False
     own = searches[number].best
     known = own.fit is not None and not own.actuation.hidden
     return not (known and any(other.best.evidence > own.evidence for other in searches[:number]))

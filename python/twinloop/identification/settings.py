@@ -81,10 +81,14 @@ class IdentificationOptions:
         passes: number of selections of terms; from the second on with states that the model has smoothed.
         committee_size: models that judge tests, the best included.
         parts: whether, as long as there is one run, models of its parts are members too.
+        anew: whether laws are searched with each flight; otherwise the constants of the one that was learnt first are
+            tuned again.
         steady: whether a law found anew must be ahead of the one known before, tuned on all flights, by a margin
             for each term that it has more.
         earlier_twin: whether the earlier twin is kept if it follows all flights and the new
             one does not.
+        tame: whether the law known before, tuned on all flights, is kept if the new one diverges under most controllers
+            of the box of gains and follows the flights hardly better.
         rough: whether a linear law is learnt beside one that does not explain the flights.
         causes: whether slow disturbances are separated into external ones and model errors; otherwise
             all count as external.
@@ -135,8 +139,10 @@ class IdentificationOptions:
     passes: int = 2
     committee_size: int = 8
     parts: bool = True
+    anew: bool = True
     steady: bool = True
     earlier_twin: bool = True
+    tame: bool = True
     rough: bool = True
     causes: bool = True
     exactness: bool = True
@@ -166,6 +172,11 @@ class IdentificationOptions:
             directions=False,
             mixer=False,
         )
+
+    @property
+    def as_known(self) -> IdentificationOptions:
+        """The same for the law that was known before: its constants are tuned, and nothing is searched."""
+        return replace(self, anew=False)
 
     def brief(self) -> IdentificationOptions:
         """The same for a short look: a fourth of the moves, and terms of libraries only, where there are any."""

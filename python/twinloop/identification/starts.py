@@ -43,6 +43,8 @@ def starts(context: Context, form: str) -> tuple[Callable[[], Hypothesis], ...]:
     known = context.earlier
     if known is None:
         return (lambda: from_both_sides(context, aligned()),)
+    if not context.options.anew:
+        return (lambda: renewed(context, known, aligned()),)
     # A law that followed fewer runs may be lost in a search among more; what is hidden shows when terms are nearly
     # right, and these when it shows.
     return (

@@ -19,6 +19,7 @@ from twinloop.campaign.identify_and_plan.lessons import lesson_of
 from twinloop.campaign.identify_and_plan.memory import Ensemble, Learnt
 from twinloop.campaign.identify_and_plan.rests import resting_commands
 from twinloop.campaign.identify_and_plan.selection import Selected, learnt_from
+from twinloop.campaign.identify_and_plan.tame import TAME, follows_nearly, is_wild
 from twinloop.campaign.identify_and_plan.two_laws import Kind, TwoLaws, better_foretold
 from twinloop.campaign.identify_and_plan.wrong_readings import without_wrong_readings
 from twinloop.campaign.logbook import Logbook
@@ -32,6 +33,8 @@ from twinloop.remarks import Remark, note, serious
 
 PLAIN = 1_000_000
 """Added to the number of an identification whose law may be linear only, so that it draws from streams of its own."""
+AGAIN = 2_000_000
+"""Added likewise where the law known before is tuned again."""
 ROUGH = serious(
     "rough",
     "No law explains the flights, and a linear one follows them in free run, or predicted later ones, better than"
@@ -110,6 +113,11 @@ class Learner:
         )
         if not answer.explained and self.options.earlier_twin and earlier is not None:
             answer = or_known_before(answer, earlier, answered)
+        if self.options.tame and earlier is not None and self._wild(answer, earlier, flights):
+            again = identify(self.options.as_known, iteration=AGAIN + experiments, earlier=earlier)
+            tame = answered(with_remark(again, TAME), number=4)
+            if follows_nearly(tame, answer) and self._wild(answer, again, flights):
+                answer = tame
         two = Two() if asked is None else Two(asked.two_laws, asked.rough)
         if self.options.plain != self.options and self._doubted(answer, flights):
             rough = with_remark(identify(self.options.plain, iteration=PLAIN + experiments), ROUGH)
@@ -145,6 +153,11 @@ class Learner:
             return True
         (lasting,) = lasting_under(answer.believed[:1], self.setup, self._drawn(flights, 0), self.workers)
         return 2 * lasting < DRAWN and bool(answer.misses(flights, self.setup, self.workers))
+
+    def _wild(self, answer: Answer, known: Identified, flights: Sequence[Experiment]) -> bool:
+        """Whether a law is wild beside the one known before."""
+        unit = self._drawn(flights, 2)
+        return is_wild(answer.identified.model, known.model, self.setup, unit, self.workers)
 
     def _drawn(self, flights: Sequence[Experiment], number: int) -> Unit:
         """Of work, from which controllers of the whole box are drawn for one of the looks at them."""
@@ -254,7 +267,8 @@ def stands_in(identified: Identified) -> bool:
 
 def as_known_before(identified: Identified, said: Remark) -> Identified:
     """What was known before the last flights, which says so."""
-    others = [each for each in identified.remarks if each.code not in (BEFORE.code, LASTED.code)]
+    earlier = (BEFORE.code, LASTED.code, TAME.code)
+    others = [each for each in identified.remarks if each.code not in earlier]
     return with_remark(replace(identified, remarks=others), said)
 
 
