@@ -186,6 +186,7 @@ class _Screen:
         hypothesis: with the hidden states' nodes in its pool.
         terms: that were found without them.
         inputs: of the law without hidden states.
+        problem: without hidden states.
         unit: of work.
         numbers: of the searches.
     """
@@ -194,6 +195,7 @@ class _Screen:
     hypothesis: Hypothesis
     terms: Sequence[int]
     inputs: Stages
+    problem: Problem
     unit: Unit
     numbers: Iterator[int]
 
@@ -213,8 +215,12 @@ class _Screen:
             sums=tuple(without_hidden(found, hypothesis.pool) for found in hypothesis.sums),
         )
         inputs = stages(bare.runs, context.signals, bare.actuation)
+        problem = Problem(context, bare, inputs)
+        usable = problem.usable(terms)
+        for found in bare.sums if usable else ():
+            problem.feedthrough(found.chain, usable)
         unit = context.unit.part(hypothesis.start + STORED)
-        return _Screen(context, bare, terms, inputs, unit, itertools.count(1))
+        return _Screen(context, bare, terms, inputs, problem, unit, itertools.count(1))
 
     def beside(self) -> _Screen:
         """The same with a unit of work of its own."""
@@ -231,7 +237,7 @@ class _Screen:
             self.unit.part(next(self.numbers)), context.options.moves // 25, purpose="hidden_subsets"
         )
         driven = [found.chain for found in bare.sums]
-        problem = Problem(context, tried, inputs)
+        problem = Problem(context, tried, inputs, self.problem)
         sums = search(problem, driven, terms, list(bare.sums), walks, fixed_noise=True)
         return replace(tried, sums=tuple(sums))
 

@@ -29,9 +29,16 @@ class Problem:
         context: of the identification.
         hypothesis: whose pool the terms are of.
         inputs: the same for another hypothesis of the same runs and actuation, if they are there already.
+        bare: the problem of the same hypothesis without hidden states, whose terms have the same values here.
     """
 
-    def __init__(self, context: Context, hypothesis: Hypothesis, inputs: Stages | None = None) -> None:
+    def __init__(
+        self,
+        context: Context,
+        hypothesis: Hypothesis,
+        inputs: Stages | None = None,
+        bare: Problem | None = None,
+    ) -> None:
         signals = context.signals
         self.pool, self.runs = hypothesis.pool, hypothesis.runs
         self.stages = stages(self.runs, signals, hypothesis.actuation) if inputs is None else inputs
@@ -40,9 +47,9 @@ class Problem:
         self.as_integrated = context.as_integrated
         self.room = room(signals, self.stages.start[:, : signals.n_x])
         """Bounds of each state within which a denominator must not vanish."""
-        self._values: dict[int, Floats] = {}
-        self._feedthrough: dict[tuple[int, int], Floats] = {}
-        self._usable: set[int] = set()
+        self._values: dict[int, Floats] = dict(bare._values) if bare else {}
+        self._feedthrough: dict[tuple[int, int], Floats] = dict(bare._feedthrough) if bare else {}
+        self._usable: set[int] = set(bare._usable) if bare else set()
 
     def usable(self, terms: Sequence[int]) -> list[int]:
         """Terms whose values are finite on all rows, with the values; those of a hidden state only where one is."""

@@ -47,6 +47,7 @@ class Pool(Expressions, Recorded, kind="pool"):
         self.rungs: dict[int, int] = {}
         self.found: dict[int, float] = {}
         self._lengths: dict[int, float] = {}
+        self._hidden: dict[int, frozenset[int]] = {}
         for place in range(inputs):
             self.input(place)
         self.one = self.constant(1.0)
@@ -110,7 +111,7 @@ class Pool(Expressions, Recorded, kind="pool"):
         other = Pool(self.inputs, self.operations)
         other.nodes, other._numbers = list(self.nodes), dict(self._numbers)
         other.rungs, other.found = dict(self.rungs), dict(self.found)
-        other._lengths = dict(self._lengths)
+        other._lengths, other._hidden = dict(self._lengths), dict(self._hidden)
         return other
 
     def extends(self, other: Pool) -> bool:
@@ -130,11 +131,13 @@ class Pool(Expressions, Recorded, kind="pool"):
         """Whether a node is made of a hidden state."""
         return bool(self.hidden_in(number))
 
-    def hidden_in(self, number: int) -> set[int]:
+    def hidden_in(self, number: int) -> frozenset[int]:
         """Numbers of the hidden states that a node is made of."""
-        parts = (self[part] for part in self.needed([number]))
-        places = (int(part.value) - self.inputs for part in parts if part.operation == INPUT)
-        return {place for place in places if place >= 0}
+        if number not in self._hidden:
+            parts = (self[part] for part in self.needed([number]))
+            places = (int(part.value) - self.inputs for part in parts if part.operation == INPUT)
+            self._hidden[number] = frozenset(place for place in places if place >= 0)
+        return self._hidden[number]
 
     def reach(self, number: int) -> int:
         """How many inputs, hidden states among them, a node needs at least; `inputs` where nothing is hidden in it."""
