@@ -473,6 +473,18 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
     full = np.vstack([run.commands, run.commands[-1:]])
     np.savez(tmp_path / "log.npz", t=run.t, states=run.states, commands=full)
     assert same(tl.load(tmp_path / "log.npz", SIGNALS), run)
+    (tmp_path / "log.npz").rename(tmp_path / "LOG.NPZ")
+    assert same(tl.load(tmp_path / "LOG.NPZ", SIGNALS), run)
+
+
+@pytest.mark.parametrize("mark", ["\v", "\f", "\x1c", "\x85", "\u2028"])
+def test_a_note_may_hold_any_mark_and_a_line_end_in_quotes(tmp_path, mark):
+    text = f't,angle,rate,torque,note\n0,1,0,0,"two\nlines"\n0.05,2,0,0,a{mark}b\n0.1,3,0,,c\n'
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    assert tl.load(tmp_path / "log.csv", SIGNALS).states[:, 0].tolist() == [1.0, 2.0, 3.0]
+    (tmp_path / "log.csv").write_text(text.replace("0.1,3", "0.1,x"), encoding="utf-8")
+    with pytest.raises(tl.InvalidInput, match="line 5: expected a number for angle, found 'x'"):
+        tl.load(tmp_path / "log.csv", SIGNALS)
 
 
 @pytest.mark.parametrize(
@@ -505,6 +517,11 @@ def test_a_log_comes_back_to_the_bit(tmp_path):
             "t,angle,rate,torque\n0,0,0,0\n0.05,0,nan,0\n",
             "log.csv: .*for rate in each row, found nan in row 2, t = 0.05 s",
         ),
+        (
+            "t,angle,rate,torque\n0,1_000,0,0\n0.05,0,0,0\n",
+            "line 2: expected a number for angle, found '1_000'",
+        ),
+        ("t,angle,rate,torque\n0,0,٣,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found '٣'"),
         ("t,angle,rate,torque\n0,0,0,inf\n0.05,0,0,0\n", "for torque in each row, found inf in row 1"),
         ("t,angle,rate,torque\n", "log.csv: .*record the run"),
     ],
@@ -524,6 +541,11 @@ def test_no_log_and_an_archive_of_something_else_are_refused(tmp_path):
     np.savez(tmp_path / "log.npz", t=np.array([object()], dtype=object), states=[0], commands=[0])
     with pytest.raises(tl.InvalidInput, match="file of NumPy"):
         tl.load(tmp_path / "log.npz", SIGNALS)
+    arrays = {"t": np.arange(3.0), "states": np.zeros((3, 2)), "commands": np.zeros((2, 1))}
+    for name in arrays:
+        np.savez(tmp_path / "log.npz", **{**arrays, name: np.float64(1.0)})
+        with pytest.raises(tl.InvalidInput, match=f"an array {name} .*a single value"):
+            tl.load(tmp_path / "log.npz", SIGNALS)
 
 
 @pytest.mark.parametrize(

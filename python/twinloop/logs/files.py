@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import zipfile
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
@@ -106,7 +107,7 @@ def read_log(
                 f"Log {called}: expected a .ulg to take a part of, found another file; cut it first."
             )
         t, states, commands = (
-            _arrays(path, called) if path.suffix == ".npz" else _columns(path, called, signals)
+            _arrays(path, called) if path.suffix.lower() == ".npz" else _columns(path, called, signals)
         )
     except OSError as reason:
         raise InvalidInput(
@@ -166,7 +167,7 @@ def _arrays(path: Path, called: str) -> tuple[Floats, Floats, Floats]:
                 raise InvalidInput(
                     f"Log {called}: expected arrays t, states and commands, found no {', '.join(missing)}; add them."
                 )
-            return arrays[TIME], arrays["states"], arrays["commands"]
+            found = arrays[TIME], arrays["states"], arrays["commands"]
     except OSError:
         raise
     except InvalidInput:
@@ -175,6 +176,13 @@ def _arrays(path: Path, called: str) -> tuple[Floats, Floats, Floats]:
         raise InvalidInput(
             f"Log {called}: expected a file of NumPy with arrays of numbers, found another one: {reason}."
         ) from reason
+    for name, values in zip((TIME, "states", "commands"), found, strict=True):
+        if values.ndim == 0:
+            raise InvalidInput(
+                f"Log {called}: expected an array {name} with a row for each reading, found a single value; write all"
+                " of them."
+            )
+    return found
 
 
 def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats, Floats]:
@@ -187,12 +195,13 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
     head = text.partition("\n")[0]
     delimiter = max(DELIMITERS, key=head.count)
     try:
-        lines = list(csv.reader(text.splitlines(), delimiter=delimiter))
+        # Not `splitlines`, which ends a row at any form feed or vertical tab in a note.
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except csv.Error as reason:
         raise InvalidInput(
             f"Log {called}: expected columns of numbers, found: {reason}; save it as CSV."
         ) from reason
-    rows = [(line, row) for line, row in enumerate(lines, 1) if any(cell.strip() for cell in row)]
     names = [name.strip() for name in rows[0][1]] if rows else []
     wanted = (TIME, *signals.state_names, *signals.command_names)
     twice = next((name for name in wanted if names.count(name) > 1), None)
@@ -247,11 +256,18 @@ def _number(row: Sequence[str], place: int, name: str, line: int, called: str) -
         )
     text = row[place].strip()
     try:
-        return float(text) if text else np.nan
+        return _read(text) if text else np.nan
     except ValueError as reason:
         raise InvalidInput(
             f"Log {called}, line {line}: expected a number for {name}, found {text!r}; {_advice(text, name)}."
         ) from reason
+
+
+def _read(text: str) -> float:
+    """A number as instruments write it: Python would take 1_000 and digits of other scripts as well."""
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return float(text)
 
 
 def _advice(text: str, name: str) -> str:
