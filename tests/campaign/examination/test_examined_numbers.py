@@ -120,6 +120,17 @@ def test_poles_are_read_with_their_damping_and_time():
         assert swings.time == pytest.approx(1.0 / (zeta * wn))
 
 
+@pytest.mark.parametrize("unit", [1e-10, 1e3, 1e11])
+def test_poles_are_the_same_whatever_the_unit_of_time(unit):
+    values = np.array([-1.0 + 2.0j, -1.0 - 2.0j, 0.0])
+    for found in (poles(values * unit), poles(np.exp(0.01 * values), 0.01 / unit)):
+        rests, swings = found
+        assert (rests.damping, rests.time) == (1.0, math.inf)
+        assert swings.damping == pytest.approx(1.0 / math.sqrt(5.0)) and swings.time * unit == pytest.approx(
+            1.0
+        )
+
+
 # Steps, use, data
 
 

@@ -9,6 +9,8 @@ import numpy as np
 
 FAR = 1e-9
 """Poles of discrete time nearer to 0 than this are memories that are gone after a period: they have no rate."""
+ROUNDING = 1e-9
+"""Of the fastest pole, or of 1 / dt: what is smaller is rounding, in whatever unit time is."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +39,16 @@ def poles(values: np.ndarray, dt: float | None = None) -> tuple[Pole, ...]:
         values: eigenvalues (n,).
         dt: period, s, where they are those of discrete time.
     """
+    rates = np.asarray(values, dtype=complex)
+    if dt is not None:
+        rates = np.log(rates[np.abs(rates) >= FAR]) / dt
+    fastest = np.abs(rates).max(initial=0.0) if dt is None else 1.0 / dt
     found = []
-    for value in np.asarray(values, dtype=complex):
-        if dt is not None:
-            if abs(value) < FAR:
-                continue
-            value = np.log(value) / dt
-        if value.imag < -1e-9 * max(1.0, abs(value)):
-            continue
+    for value in rates:
         size = float(abs(value))
-        still = size < 1e-9
+        still = size <= ROUNDING * fastest
+        if value.imag < -ROUNDING * (fastest if still else size):
+            continue
         found.append(
             Pole(
                 float(value.real),
