@@ -13,17 +13,19 @@ from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop._ground.arrays import Floats
-from twinloop.signals import Signals
+from twinloop.signals import Signals, State
 
 
-def usages_of(signals: Signals, states: Floats) -> Floats:
+def usages_of(signals: Signals, states: Floats, only: State | None = None) -> Floats:
     """The most that any state uses of its envelope (n,); 0 where none is declared.
 
     Args:
         signals: of the system.
         states: (n, n_x).
+        only: the state that counts; None: all do.
     """
-    return _core.usages(signals.engine, [state.envelope for state in signals.states], states)
+    envelope = [state.envelope if only is None or state == only else None for state in signals.states]
+    return _core.usages(signals.engine, envelope, states)
 
 
 def outside(usages: Floats) -> NDArray[np.bool_]:

@@ -10,7 +10,9 @@ import pytest
 import scipy.signal
 
 import lives
+import twinloop as tl
 from conftest import pendulum_step
+from twinloop._experiment.envelope import usages_of
 from twinloop.campaign.examination.data import fingerprint
 from twinloop.campaign.examination.frequency import frequency_responses
 from twinloop.campaign.examination.loops import loops_around, noise_of_commands
@@ -161,6 +163,16 @@ def test_effort_and_envelope_are_counted_number_by_number(good):
     assert found.moved == pytest.approx(math.sqrt(sum(s * s for s in steps) / len(steps)))
     ((name, most),) = envelope_use(run.states, signals)
     assert name == "rate" and most == pytest.approx(max(abs(x) for x in run.states[:, 1]) / 12.0)
+
+
+def test_an_angle_that_wraps_uses_its_envelope_the_short_way_round():
+    signals = tl.Signals(
+        [tl.State("turn", "rad", 1.0, envelope=(2.0, 4.0), periodic=True), tl.State("rest", "m", 1.0)],
+        [tl.Command("torque", "N m", (-1.0, 1.0))], 0.1,
+    )  # fmt: skip
+    states = np.array([[3.0, 9.0], [3.5 - 2.0 * math.pi, 9.0]])
+    ((name, most),) = envelope_use(states, signals)
+    assert name == "turn" and most == pytest.approx(0.5) == usages_of(signals, states).max()
 
 
 def test_what_lies_outside_of_what_was_flown_is_counted():

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twinloop._experiment.envelope import usages_of
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.setup import Setup
 from twinloop.law.flight import fly
@@ -140,13 +141,11 @@ def envelope_use(states: Floats, signals: Signals) -> tuple[tuple[str, float], .
         states: (n, n_x).
         signals: of the system.
     """
-    found = []
-    for state, values in zip(signals.states, states.T, strict=True):
-        if state.envelope is not None:
-            low, high = state.envelope
-            most = float(np.abs(values - 0.5 * (low + high)).max() / (0.5 * (high - low)))
-            found.append((state.name, most))
-    return tuple(found)
+    return tuple(
+        (state.name, float(usages_of(signals, states, state).max()))
+        for state in signals.states
+        if state.envelope is not None
+    )
 
 
 def outside_of(flown: Floats, planned: Floats) -> float:
