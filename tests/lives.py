@@ -81,11 +81,11 @@ def lived(campaign, life, look=lambda campaign, step: campaign):
     return campaign
 
 
-def learnt(step, experiments):
+def learnt(step, experiments, signals=SIGNALS):
     """A campaign on a pendulum that is read with noise."""
-    plant = tl.systems.Simulated(SIGNALS, step)
+    plant = tl.systems.Simulated(signals, step)
     campaign = tl.Campaign(
-        SIGNALS, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=2.0,
+        signals, controller=CONTROLLER, initial_state=[0.0, 0.0], target_state=[1.0, 0.0], duration=2.0,
         threads=1, options={"moves": 3000, "generations": 0, "lags": False, "candidates": 64, "draws": 4},
     )  # fmt: skip
     stream, test = np.random.default_rng(3), campaign.test(PENDULUM_GAINS)

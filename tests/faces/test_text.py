@@ -66,7 +66,7 @@ def result_of_default(**advice):
             **{"kind": "iae", "unit": "rad s", "effort": 0.0, "effort_rate": 0.0},
             "counts": [{"name": "angle", "unit": "rad", "weight": 1.0}],
         },
-        "signals": {"states": [{"unit": "rad"}, {"unit": "rad/s"}]},
+        "signals": {"states": [{"unit": "rad", "envelope": None}, {"unit": "rad/s", "envelope": [-1.0, 1.0]}]},
         "experiments": [
             {
                 "test": 0, "ended": "aborted", "reason": "rate above 12", "open_loop": 1e-4, "closed_loop": 1e-3,
@@ -147,6 +147,13 @@ def test_a_risk_that_no_predicted_flight_shows_is_no_estimate():
     assert "< 0.4 %" in text and "0.003876" not in text
     result["controller"]["risk"] = 2.5 / 129.0
     assert "Risk of leaving the envelope: 1.9 %." in render(result)
+
+
+def test_without_an_envelope_the_risk_is_that_of_diverging():
+    result = result_of_default()
+    result["signals"]["states"][1]["envelope"] = None
+    text = render(result)
+    assert "Risk of diverging, without a declared envelope: 1 %." in text and "leav" not in text
 
 
 def test_gains_that_are_fixed_at_nothing_are_counted_rather_than_listed():

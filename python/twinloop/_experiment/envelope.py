@@ -16,6 +16,11 @@ from twinloop._ground.arrays import Floats
 from twinloop.signals import Signals, State
 
 
+def is_bounded(signals: Signals) -> bool:
+    """Whether any state has an envelope; otherwise no flight can leave one."""
+    return any(state.envelope is not None for state in signals.states)
+
+
 def usages_of(signals: Signals, states: Floats, only: State | None = None) -> Floats:
     """The most that any state uses of its envelope (n,); 0 where none is declared.
 

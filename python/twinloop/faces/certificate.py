@@ -21,7 +21,7 @@ from twinloop.faces.figures.svg import panel_svg
 from twinloop.faces.figures.units import labelled, shown_unit, words
 from twinloop.faces.result import plain_dict
 from twinloop.faces.text.words import quality_words
-from twinloop.planning.leaving import risk_words
+from twinloop.planning.leaving import risk_of_what, risk_words
 from twinloop.planning.quality import quality_unit
 
 
@@ -124,12 +124,15 @@ def page(facts: Mapping[str, Any], names: Sequence[str], units: Sequence[str]) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    bounded = any(use["envelope"] is not None for use in facts["envelope"])
     return room.get_template("certificate.html").render(
         c=facts,
         title="Gain certificate" if facts["granted"] else "Gain certificate: refused",
         number=_number,
         quality=quality_words,
         risk=risk_words,
+        bounded=bounded,
+        what=risk_of_what(bounded),
         degrees=lambda value: None if value is None else math.degrees(value),
         plots=_plots(facts["prediction"], names, units),
         figures=f":root{{{variables(LIGHT)}}}@media (prefers-color-scheme:dark){{:root{{{variables(DARK)}}}}}{RULES}",

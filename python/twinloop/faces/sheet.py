@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.setup import Setup
 from twinloop.faces.cautions import band_leaves, leaving, not_reliable
 from twinloop.faces.text import quality_words, table
 from twinloop.logs import TIME
-from twinloop.planning.leaving import risk_words
+from twinloop.planning.leaving import risk_of_what, risk_words
 from twinloop.planning.quality import quality_unit
 from twinloop.remarks import Remark
 from twinloop.test import Test
@@ -225,8 +226,13 @@ def sheet(
         )
     if test.excitation is not None or predicted is not None:
         lines += ["", _expected(test, predicted), ""]
-    risk = unknown_risk(test) if test.risk is None else f"{risk_words(test.risk, setup.predicted_flights)}."
-    lines.append(f"Risk of leaving the envelope: {risk}")
+    bounded = is_bounded(signals)
+    risk = (
+        unknown_risk(test)
+        if test.risk is None
+        else f"{risk_words(test.risk, setup.predicted_flights, bounded)}."
+    )
+    lines.append(f"Risk of {risk_of_what(bounded)}: {risk}")
     lines += band_leaves(signals, predicted)
     lines += not_reliable(store, against)
     lines.append(reason(test, predicted is not None))

@@ -33,17 +33,28 @@ def none_leaves(risk: float, flights: int | None) -> bool:
     return flights is not None and risk > 0.0 and 1.5 / risk > (flights + 1.0) * (1.0 + 1e-9)
 
 
-def risk_words(risk: float, flights: int | None) -> str:
+def risk_of_what(bounded: bool) -> str:
+    """What a risk is the probability of.
+
+    Args:
+        bounded: whether any state has an envelope; without one a predicted flight can only diverge.
+    """
+    return "leaving the envelope" if bounded else "diverging, without a declared envelope"
+
+
+def risk_words(risk: float, flights: int | None, bounded: bool = True) -> str:
     """A risk for a person, such as "1.2 %" or "less than 0.4 % (none of 128 predicted flights leaves it)".
 
     Args:
         risk: probability.
         flights: that are predicted at most; None: unknown.
+        bounded: whether any state has an envelope.
     """
     if not none_leaves(risk, flights):
         return _percent(risk)
     count = round(0.5 / risk - 1.0)
-    return f"less than {_above(100.0 * risk):g} % (none of {count} predicted flights leaves it)"
+    happens = "leaves it" if bounded else "diverges"
+    return f"less than {_above(100.0 * risk):g} % (none of {count} predicted flights {happens})"
 
 
 def short_risk(risk: float | None, flights: int | None) -> str | None:

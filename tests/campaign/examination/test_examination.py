@@ -140,6 +140,18 @@ def test_a_twin_of_a_pendulum_passes_and_says_how_sure_it_is(good):
     assert all(check.sentence and check.subject in ("twin", "controller") for check in checks)
 
 
+def test_nothing_is_said_of_an_envelope_that_nobody_declared():
+    states = [dataclasses.replace(state, envelope=None) for state in lives.SIGNALS.states]
+    campaign = lives.learnt(
+        pendulum_step, 2, signals=tl.Signals(states, lives.SIGNALS.commands, lives.SIGNALS.dt)
+    )
+    checks = {check.name: check for check in campaign.checks()}
+    assert "envelope" not in checks and checks["no-envelope"].verdict == "look"
+    assert "diverges" in checks["divergence"].sentence
+    said = "\n".join(each.sentence for name, each in checks.items() if name != "no-envelope")
+    assert "envelope" not in said
+
+
 def test_what_was_known_is_kept_with_the_campaign(good):
     again = tl.Campaign.from_record(good.to_record(), threads=1)
     assert [str(check) for check in again.checks()] == [str(check) for check in good.checks()]

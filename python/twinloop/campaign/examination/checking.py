@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
 from twinloop.law.linear.margins import LoopMargins
@@ -175,17 +176,24 @@ def _of_controller(found: Examination) -> Iterator[Check]:
         if stable:  # of a loop that is not, a sensitivity says nothing
             yield _damping(max(margins.worst, key=lambda loop: loop.sensitivity))
             yield _delay(min(margins.worst, key=lambda loop: loop.delay), found.signals.dt)
+    bounded = is_bounded(found.signals)
+    if not bounded:
+        yield Check(
+            "no-envelope", "controller", None, None, False, False,
+            "No envelope is declared: whether a flight stays where it is safe was not checked.",
+        )  # fmt: skip
     if best.risk is not None:
         safe = best.risk <= RISK
+        name, happens = ("envelope", "leaves the envelope") if bounded else ("divergence", "diverges")
         yield Check(
-            "envelope", "controller", best.risk, RISK, safe, True,
-            f"The probability that it leaves the envelope is"
-            f" {risk_words(best.risk, found.setup.predicted_flights)} according to the committee, to gusts as the"
-            f" flights felt them and to flights of these gains; at most {100.0 * RISK:g} % is allowed.",
+            name, "controller", best.risk, RISK, safe, True,
+            f"The probability that it {happens} is"
+            f" {risk_words(best.risk, found.setup.predicted_flights, bounded)} according to the committee, to gusts as"
+            f" the flights felt them and to flights of these gains; at most {100.0 * RISK:g} % is allowed.",
         )  # fmt: skip
     kept = any(run.kept_envelope for run in found.best_flights)
-    not_kept = "not completed a flight within the envelope" if found.best_flights else "not flown yet"
+    completed = f"completed a flight{' within the envelope' * bounded}"
+    not_kept = f"not {completed}" if found.best_flights else "not flown yet"
     yield Check(
-        "flown", "controller", None, None, kept, False,
-        f"These gains have {'completed a flight within the envelope' if kept else not_kept}.",
+        "flown", "controller", None, None, kept, False, f"These gains have {completed if kept else not_kept}.",
     )  # fmt: skip

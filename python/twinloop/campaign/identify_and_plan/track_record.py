@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.history import Experiment
 from twinloop.planning.proposal import Fared
 from twinloop.signals import Signals
@@ -172,8 +173,7 @@ def unproven_risk(
         explains: whether the twin explains its own flights.
     """
     least = UNPROVEN if explains else UNEXPLAINED
-    bounded = any(state.envelope is not None for state in signals.states)
-    if not bounded or fared.flights > 0 or nearly_confirmed_in_a_row(experiments) > 0:
+    if not is_bounded(signals) or fared.flights > 0 or nearly_confirmed_in_a_row(experiments) > 0:
         return 0.0
     predicted = [run for run, _ in reversed(_predicted(experiments))]
     untrue = list(takewhile(lambda run: not _came_true(run, NEARLY), predicted))

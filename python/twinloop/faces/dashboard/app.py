@@ -16,6 +16,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
+from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.assessment import foreseen, latest_lesson
 from twinloop.errors import InvalidInput, StoreFailure, TwinloopError
 from twinloop.faces.cautions import serious_of
@@ -27,7 +28,7 @@ from twinloop.faces.sheet import columns, sheet
 from twinloop.faces.telling import numbered
 from twinloop.faces.withdrawing import recorded
 from twinloop.logs import MOST_BYTES, write_columns
-from twinloop.planning.leaving import risk_words
+from twinloop.planning.leaving import risk_of_what, risk_words
 from twinloop.planning.quality import quality_unit
 
 MOST_WORDS = 10_000
@@ -197,6 +198,7 @@ class Pages:
     def _waiting(self, name: str) -> dict[str, object]:
         campaign, may = self.desk.look(name), self.desk.approved(name)
         units = {gain.name: gain.unit for gain in campaign.family.law_gains}
+        bounded = is_bounded(campaign.signals)
         return {
             "experiments": len(campaign.experiments),
             "tests": [
@@ -211,7 +213,8 @@ class Pages:
                     "unit": quality_unit(campaign.setup.quality),
                     "risk": None
                     if test.risk is None
-                    else risk_words(test.risk, campaign.setup.predicted_flights),
+                    else risk_words(test.risk, campaign.setup.predicted_flights, bounded),
+                    "risk_of": risk_of_what(bounded),
                     "reason": test.reason,
                     "approved": may.get(test.number) if test.number is not None else None,
                 }

@@ -51,7 +51,7 @@
     one(".reason").textContent = test.reason || "";
     const rows = Object.entries(test.gains);
     if (test.predicted !== null) rows.push(["quality predicted", (test.predicted + (test.spread === null ? "" : " ± " + test.spread) + " " + test.unit).trim()]);
-    if (test.risk !== null) rows.push(["risk of leaving the envelope", test.risk]);
+    if (test.risk !== null) rows.push(["risk of " + test.risk_of, test.risk]);
     for (const [name, value] of rows) {
       const row = one("tbody").insertRow(), head = document.createElement("th");
       head.scope = "row";

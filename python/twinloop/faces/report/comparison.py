@@ -6,13 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 
 from twinloop import _core
+from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.assessment import predicted_quality
 from twinloop.campaign.examination.checking import checks
 from twinloop.faces.figures.units import words
 from twinloop.faces.report.page import templates
 from twinloop.faces.report.source import Source
 from twinloop.faces.report.tables.table import Table, shown_value
-from twinloop.planning.leaving import short_risk
+from twinloop.planning.leaving import risk_of_what, short_risk
 from twinloop.planning.quality import quality_unit
 
 Row = tuple[str, object]
@@ -90,7 +91,10 @@ def _answers(source: Source) -> list[Row]:
             (f"quality predicted{unit}, lower is better", predicted),
             (f"± spread{unit}", spread),
             (f"quality flown{unit}", best.measured),
-            ("risk of leaving the envelope", short_risk(best.risk, campaign.setup.predicted_flights)),
+            (
+                f"risk of {risk_of_what(is_bounded(found.signals))}",
+                short_risk(best.risk, campaign.setup.predicted_flights),
+            ),
         ]
     rows.append((f"quality of the first gains, flown{unit}", None if first is None else first.quality))
     if found.margins is not None and found.twin.follows:

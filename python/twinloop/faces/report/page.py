@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib import resources
 from typing import Any
 
 from twinloop import _core
+from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign import Campaign
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.examination.examination import Examination
@@ -117,7 +119,7 @@ def report_page(
             *((cost_table(result, elapsed), of_flights.flights(result)) if controller else ()), of_flights.data(found)
         ),
         next=_next(campaign, result),
-        risk=risk_words,
+        risk=partial(risk_words, bounded=is_bounded(found.signals)),
         failures=campaign.failures,
         withdrawals=campaign.withdrawals,
         sessions=sessions,

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from twinloop.faces.text.table import cell, table
-from twinloop.faces.text.words import held_at, predicted_flights, with_unit
-from twinloop.planning.leaving import risk_words
+from twinloop.faces.text.words import held_at, is_bounded, predicted_flights, with_unit
+from twinloop.planning.leaving import risk_of_what, risk_words
 
 
 def _gains(best: Mapping[str, Any], first: Mapping[str, Any] | None) -> list[list[object]]:
@@ -68,13 +68,16 @@ def controller_text(result: Mapping[str, Any]) -> str:
             _table(best, first),
             "",
             table(["quality", "predicted", "± spread", "measured"], qualities),
-            f"{best['why']}{_risk(best['risk'], predicted_flights(result))}{excited}",
+            f"{best['why']}{_risk(best['risk'], result)}{excited}",
         ]
     )
 
 
-def _risk(risk: float | None, flights: int | None) -> str:
-    return "" if risk is None else f" Risk of leaving the envelope: {risk_words(risk, flights)}."
+def _risk(risk: float | None, result: Mapping[str, Any]) -> str:
+    if risk is None:
+        return ""
+    bounded = is_bounded(result)
+    return f" Risk of {risk_of_what(bounded)}: {risk_words(risk, predicted_flights(result), bounded)}."
 
 
 def advice_text(result: Mapping[str, Any]) -> str:

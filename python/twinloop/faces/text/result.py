@@ -9,7 +9,7 @@ from twinloop.faces.text.controller import advice_text, controller_text, tuned_c
 from twinloop.faces.text.table import table
 from twinloop.faces.text.twin import equations_text, errors_text, program_errors_text, states_text
 from twinloop.faces.text.verdict import verdict
-from twinloop.faces.text.words import counted, predicted_flights, quality_words
+from twinloop.faces.text.words import counted, is_bounded, predicted_flights, quality_words
 from twinloop.planning.leaving import short_risk
 
 
@@ -112,7 +112,7 @@ def _flights(result: Mapping[str, Any]) -> str:
     )
     note = (
         "Spread: standard deviation that the measured quality is expected to have.\nRisk: probability that the flight"
-        " leaves the envelope."
+        f" {'leaves the envelope' if is_bounded(result) else 'diverges; no envelope is declared'}."
     )
     return "\n".join([title, table(head, rows), note, *reasons])
 

@@ -56,6 +56,15 @@ def predicted_flights(result: Mapping[str, Any]) -> int | None:
     return None if members is None or draws is None else members * draws
 
 
+def is_bounded(result: Mapping[str, Any]) -> bool:
+    """Whether any state of a result has an envelope.
+
+    Args:
+        result: of a campaign.
+    """
+    return any(state["envelope"] is not None for state in result["signals"]["states"])
+
+
 def flown_words(found: Examination) -> str:
     """Whether the gains of the controller to fly have flown, for a person.
 
