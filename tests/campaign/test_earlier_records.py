@@ -35,6 +35,21 @@ def test_what_was_told_and_learnt_is_read(written):
     assert LAWS[campaign.setup.preset] in campaign.twin.equations()
 
 
+def test_errors_in_the_units_of_states_are_read_as_those_of_the_preset(written):
+    campaign = tl.Campaign.from_record(written, threads=1)
+    scales = np.array(
+        [state.scale if campaign.setup.preset == "default" else 1.0 for state in SIGNALS.states]
+    )
+    for experiment, (_, run) in zip(campaign.experiments, written["logbook"]["experiments"], strict=True):
+        states = np.array(run["trajectory"]["states"]) / scales
+        assert experiment.frozen == pytest.approx(np.square(states[1:] - states[0]).mean(), rel=1e-12)
+        if run["before"] is None:
+            assert experiment.normalised_before is None
+        else:
+            ratio = run["before"] / run["frozen"]
+            assert experiment.normalised_before == pytest.approx(ratio, rel=1e-12)
+
+
 def test_subsets_that_had_no_names_are_read():
     written = json.loads((EARLIER / "default.json").read_text(encoding="utf-8"))
     (before,) = written["memory"]["latest"]["identified"]["sums"]

@@ -162,6 +162,20 @@ class Outflow(Tanks):
                          heat + 0.125 * (0.1 * u / max(pressure, 0.05) - 0.25 * heat)])  # fmt: skip
 
 
+class Adrift(Tanks):
+    """The same beside a heat that wanders about, which no law foretells."""
+
+    def __init__(self, units):
+        super().__init__(units)
+        self.random = np.random.default_rng(1)
+
+    def step(self, x, u):
+        pressure, heat = x
+        return np.array(
+            [pressure + 0.125 * (0.75 * u - 0.5 * pressure), heat + 0.25 * self.random.standard_normal()]
+        )
+
+
 def decisions(plant, units, flights=3, **changes):
     """What a campaign of some flights decides, its numbers taken back to SI units."""
     system = plant(units)
@@ -185,6 +199,9 @@ def decisions(plant, units, flights=3, **changes):
         "bits": [plan.bits for lesson in lessons for plan in lesson.asked],
         "members": len(campaign.committee),
         "best": (campaign.best_test.genes / scales).tolist(),
+        "followed": twin.follows,
+        "errors": [(row.open_loop, row.closed_loop, row.normalised, row.before) for row in twin.errors],
+        "unseen": [each.error for each in campaign.examine().unseen],
         "predictions": (flown.states / units.states).tolist(),
         "structure": [
             [(name, destination, first, second if isinstance(second, int) else None)
@@ -239,6 +256,13 @@ def test_a_cart_is_learnt_and_flown_alike_in_any_units(in_si, units, cart):
 @pytest.mark.parametrize("units", TANKS.values(), ids=TANKS)
 def test_vessels_are_learnt_and_flown_alike_in_any_units(in_si, units, law):
     same(decisions(Tanks, units, options=LAWS[law]), in_si[law])
+
+
+@pytest.mark.parametrize("units", [Units([2.0**17, 2.0**-7]), Units([2.0**-17, 2.0**7])])
+def test_a_twin_that_foretells_one_state_of_two_follows_or_not_in_any_units(units):
+    expected = decisions(Adrift, Units([1.0, 1.0]), flights=2, options=LAWS["increments"])
+    assert expected["followed"] == expected["committees"][-1]
+    same(decisions(Adrift, units, flights=2, options=LAWS["increments"]), expected)
 
 
 # A root is of a state in units of its scale, and what is divided by is too: no power of two is too odd or too far.

@@ -41,12 +41,12 @@ from twinloop.campaign.ranking import ranked
 from twinloop.campaign.reporting import plots, reported
 from twinloop.campaign.setup import Choices, Flights, checked, refuse_arguments
 from twinloop.campaign.taking_away import taken_controller, taken_twin
+from twinloop.campaign.twin_errors import whole_error
 from twinloop.controllers import Controller, Family, UnboundFamily
 from twinloop.errors import InvalidInput, NotAvailable
 from twinloop.guard import Guard, Guarded
 from twinloop.law.linear.margins import Margins, margins_of
 from twinloop.law.twin import Twin
-from twinloop.objectives import closed_loop
 from twinloop.remarks import warn
 from twinloop.signals import Signals
 from twinloop.systems import System
@@ -485,8 +485,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
         self._learn()
         known = self._method.knowledge(self._book)
         twins = known.twins_before()
-        errors = closed_loop([before.twin.model for before in twins], self._book.selected, self._workers)
-        return Examination(self, Earlier(twins, errors, known.innovations(self._workers), known.rivals()))
+        innovations = known.innovations(self._workers)
+        return Examination(self, Earlier(twins, self._error_on, innovations, known.rivals()))
 
     def checks(self) -> Checks:
         """Whether the twin can be trusted and the controller flown, check by check; printable.
@@ -699,13 +699,16 @@ class Campaign(Shown, Persistent, kind="campaign"):
         if isinstance(latest, Lesson):
             warn(latest.remarks, stacklevel=3)
 
-    def _error_so_far(self, alone: _core.SelectedTests) -> float | None:
+    def _error_so_far(self, run: Experiment) -> float | None:
         """On a new run, of the model at the last `ask`: a look must not change it.
 
         None where that model had learnt a flight that is withdrawn: only a look has learnt again what is left.
         """
         model = None if self._book.forgot_last_ask else self._method.asked_model
-        return None if model is None else float(closed_loop([model], alone, self._workers)[0, 0])
+        return None if model is None else self._error_on(model, run)
+
+    def _error_on(self, model: _core.Model, run: Experiment) -> float:
+        return whole_error(model, run, self.setup, self._workers)
 
     @contextmanager
     def _at_work(self, name: str = "campaign", experiments: int | None = None) -> Iterator[None]:

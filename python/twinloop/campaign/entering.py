@@ -13,6 +13,7 @@ from twinloop._ground.texts import text
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
+from twinloop.law.accuracy import squares
 from twinloop.objectives import frozen_error
 from twinloop.test import Test, final_distance
 from twinloop.trajectory import Trajectory, check_recorded, continued
@@ -21,8 +22,8 @@ FAR = 5.0
 """A first reading is refused if it is this many times further off than the second, and than the next readings move."""
 NEXT = 9
 """Readings after the first that are looked at for this."""
-Judge = Callable[[_core.SelectedTests], float | None]
-"""The error, on the one test of a set, of what is known so far; None where nothing is."""
+Judge = Callable[[Experiment], float | None]
+"""The error, on a run, of what is known so far; None where nothing is."""
 
 
 def flown_test(setup: Setup, test: Test, trajectory: Trajectory, judge: Judge, least: int = 2) -> Experiment:
@@ -46,8 +47,8 @@ def flown_test(setup: Setup, test: Test, trajectory: Trajectory, judge: Judge, l
         distance = quality = final_distance(recorded.states[-1], test.target(test.steps), setup.signals)
         if setup.preset != "paper":
             quality = setup.quality.flown(recorded, test.target_state)
-    before = judge(with_run(setup.none_selected(), test, recorded))
-    return Experiment(test, recorded, before, frozen_error(recorded, setup.signals), distance, quality)
+    run = Experiment(test, recorded, None, _frozen(recorded, setup), distance, quality)
+    return dataclasses.replace(run, before=judge(run))
 
 
 def attached_run(setup: Setup, trajectory: Trajectory, judge: Judge) -> Experiment:
@@ -64,9 +65,22 @@ def attached_run(setup: Setup, trajectory: Trajectory, judge: Judge) -> Experime
     check_recorded(trajectory, setup.limits, None)
     recorded = continued(trajectory, setup.signals, trajectory.states[0])
     replayed = Replay(setup.signals, recorded.states[0], recorded.commands)
-    before = judge(with_run(setup.none_selected(), replayed, recorded))
-    frozen = frozen_error(recorded, setup.signals)
-    return Experiment(replayed, recorded, before, frozen, None, None, attached=True)
+    run = Experiment(replayed, recorded, None, _frozen(recorded, setup), None, None, attached=True)
+    return dataclasses.replace(run, before=judge(run))
+
+
+def renewed_run(run: Experiment, setup: Setup) -> Experiment:
+    """A run that an earlier version has entered, with errors in the units of the states: their ratio stays.
+
+    Args:
+        run: as it was read.
+        setup: of the campaign.
+    """
+    frozen = _frozen(run.trajectory, setup)
+    before = run.before
+    if before is not None and run.frozen > 0.0:
+        before *= frozen / run.frozen
+    return dataclasses.replace(run, before=before, frozen=frozen)
 
 
 def partial_run(partial: Trajectory | None, reason: str) -> Trajectory | None:
@@ -116,6 +130,13 @@ def with_run(selected: _core.SelectedTests, replayed: Test | Replay, run: Trajec
     return selected.with_test(
         replayed.genes, replayed.target_state, run.states, run.commands, replayed.excitation, held
     )
+
+
+def _frozen(recorded: Trajectory, setup: Setup) -> float:
+    """Error of the model that never moves."""
+    if not setup.in_scales:
+        return frozen_error(recorded, setup.signals)
+    return float(squares(recorded.states[1:], recorded.states[0], setup.signals).mean())
 
 
 def check_first_reading(trajectory: Trajectory, test: Test) -> None:

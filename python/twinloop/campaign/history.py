@@ -18,6 +18,9 @@ from twinloop.trajectory import Trajectory
 Cause = Literal["disturbance", "law", "undecided"]
 """Of what disturbs for long: something from outside; a model error; or what flights so far do not tell apart."""
 
+IN_SCALES = 2
+"""Version of an experiment from which the errors of the preset `default` are in units of the states' scales."""
+
 
 @dataclass(frozen=True)
 class Experiment(Recorded, kind="experiment", given=("replayed",)):
@@ -26,8 +29,9 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     Args:
         replayed: what a twin flies for the comparison: the test, or the recorded commands.
         trajectory: the measured run.
-        before: closed-loop error on this run of the twin at the last `ask`; None if there was no `ask` yet.
-        frozen: closed-loop error of the model that never moves, on the run.
+        before: closed-loop error on this run of the twin at the last `ask`, over steps and states, each in units of its
+            scale (the preset "paper": SI units squared); None if there was no `ask` yet.
+        frozen: closed-loop error of the model that never moves, on the run; the same units.
         final_distance: distance of the last measured state to the target; None if the run was cut, or has no target.
         quality: measured quality, which the campaign minimises; None if the run was cut, or has no target.
         attached: whether it is a run without a test.
@@ -40,6 +44,8 @@ class Experiment(Recorded, kind="experiment", given=("replayed",)):
     final_distance: float | None
     quality: float | None
     attached: bool = False
+
+    VERSION = IN_SCALES
 
     @property
     def test(self) -> Test | None:
@@ -203,7 +209,8 @@ class Lesson(Recorded, kind="lesson"):
         hidden: unmeasured states: which commands or states drive each, whether squared, the mean at rest in units of
             their scale (None: that of the first period), the time constant in s, how it begins, and whether it turns.
         offsets: delay of each state's readings against those of the driven states, s.
-        closed_loop: of the best model, one for each selected test, SI units squared; infinite where it diverges.
+        closed_loop: of the best model, one for each selected test, in units of the states' scales; infinite where it
+            diverges.
         normalised: closed_loop over that of the model that never moves.
         follows: whether free runs of the best model follow at least half of the runs that it was learnt from; if not,
             no test is planned with it.

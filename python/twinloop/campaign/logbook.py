@@ -8,8 +8,15 @@ from typing import Any
 
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats
-from twinloop.campaign.entering import Judge, flown_test, partial_run, replay_of_record, with_run
-from twinloop.campaign.history import Experiment, Failure, Planned, TestLoop, Withdrawal
+from twinloop.campaign.entering import (
+    Judge,
+    flown_test,
+    partial_run,
+    renewed_run,
+    replay_of_record,
+    with_run,
+)
+from twinloop.campaign.history import IN_SCALES, Experiment, Failure, Planned, TestLoop, Withdrawal
 from twinloop.campaign.setup import Setup
 from twinloop.campaign.withdrawing import as_it_counts, check_withdrawals, withdrawal_of
 from twinloop.errors import InvalidInput
@@ -127,6 +134,8 @@ class Logbook(Recorded, kind="logbook"):
         """An experiment that can be learnt from, of its record behind the number of its test."""
         replayed = replay_of_record(record, self.setup) if number is None else self._numbered(number, where)
         run = Experiment.from_record(record, replayed)
+        if record["version"] < IN_SCALES and self.setup.in_scales:
+            run = renewed_run(run, self.setup)
         check_recorded(run.trajectory, self.setup.limits, replayed.steps, least=1)
         return run
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,62 +12,12 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.logbook import Logbook
 from twinloop.identification.records import Run, guessed_noise
+from twinloop.law.accuracy import squares
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
-from twinloop.law.pieces import held, in_pieces, judged_length
-from twinloop.objectives import closed_loop, normalised_error
+from twinloop.law.pieces import in_pieces, judged_length
 from twinloop.test import Test
-
-
-@dataclass(frozen=True)
-class FreeError:
-    """What a free run of a model is off from a flight.
-
-    Args:
-        error: mean square over steps and components, SI units; infinite where it diverges.
-        frozen: of the model that never moves, from where each piece begins.
-        length: steps of a piece; all steps of the flight where it is followed in whole.
-    """
-
-    error: float
-    frozen: float
-    length: int
-
-    @property
-    def normalised(self) -> float:
-        """Error over that of the model that never moves."""
-        return normalised_error(self.error, self.frozen)
-
-
-def free_errors(
-    model: _core.Model, book: Logbook, workers: _core.Workers, noise: Noise | None = None
-) -> list[FreeError]:
-    """What the free runs of a model are off from each flight.
-
-    Args:
-        model: to be judged.
-        book: with the flights.
-        workers: how the work is carried out.
-        noise: of the sensors, and disturbances, as identified; None: of sensors alone, guessed from each flight.
-    """
-    whole = closed_loop([model], book.selected, workers)[0].tolist()
-    limits = book.setup.limits
-    found = []
-    for run, error in zip(book.experiments, whole, strict=True):
-        flown, length = run.trajectory, length_of(model, run, limits, workers, noise)
-        if length == flown.steps:
-            found.append(FreeError(error, run.frozen, length))
-            continue
-        runs = drawn_runs(model, as_flown(model, run, length), limits, workers=workers)
-        lasted = int(runs.lasted[0]) == flown.steps
-        off, still = (
-            float(np.square(limits.signals.difference(flown.states[1:], states)).mean())
-            for states in (np.asarray(runs.read[0])[1:], held(flown.states, length))
-        )
-        found.append(FreeError(off if lasted else np.inf, still, length))
-    return found
 
 
 def lengths_of(
@@ -127,6 +76,24 @@ def as_flown(model: _core.Model, flight: Experiment, length: int) -> Test | Repl
     states = flight.trajectory.states
     flown = cut(flight.replayed, start_of(model, states[0]), flight.trajectory.steps)
     return in_pieces(flown, model, states, length) if isinstance(flown, Replay) else flown
+
+
+def missed_by(
+    model: _core.Model, flown: Test | Replay, read: Floats, limits: Limits, workers: _core.Workers
+) -> tuple[Floats, int]:
+    """Squares of what a free run misses of the readings after its start (n, n_x), and how many steps it lasts.
+
+    They are in units of the states' scales.
+
+    Args:
+        model: that is flown.
+        flown: from where, and under which controller or commands.
+        read: of the flight (n, n_x).
+        limits: where a run counts as diverged.
+        workers: how the work is carried out.
+    """
+    runs = drawn_runs(model, flown, limits, workers=workers)
+    return squares(np.asarray(runs.read[0])[1:], read, limits.signals), int(runs.lasted[0])
 
 
 def start_of(model: _core.Model, reading: Floats) -> Floats:

@@ -78,6 +78,11 @@ class Setup(Value, Recorded, kind="setup"):
         options = self.options
         return options.committee_size * options.draws if isinstance(options, DefaultOptions) else None
 
+    @property
+    def in_scales(self) -> bool:
+        """Whether errors are in units of the states' scales; the paper takes states as they are."""
+        return isinstance(self.options, DefaultOptions)
+
     @cached_property
     def limits(self) -> Limits:
         """Where simulated runs count as diverged."""

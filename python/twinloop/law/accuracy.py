@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from twinloop._ground.arrays import Floats
 from twinloop.records import Recorded
 from twinloop.signals import Signals
 
+WRONG = 0.5
+"""Share of the error of the model that never moves above which a flight is not followed."""
+
 
 @dataclass(frozen=True)
 class TestErrors(Recorded, kind="test_errors"):
@@ -17,7 +21,8 @@ class TestErrors(Recorded, kind="test_errors"):
 
     Args:
         test: number of the test, None for an attached run; a replicate has its own row.
-        open_loop: mean squared error one step ahead, over steps and components, SI units squared.
+        open_loop: mean squared error one step ahead, over steps and states, each in units of its scale (the preset
+            "paper": SI units squared).
         closed_loop: mean squared error of the free run under the test's own controller, or, for an attached run,
             under its recorded commands; the same units; infinite if it diverges.
         normalised: closed_loop over that of the model that never moves; 1 means useless.
@@ -37,6 +42,18 @@ class TestErrors(Recorded, kind="test_errors"):
 
 class ErrorTable(tuple[TestErrors, ...]):
     """Errors of a twin, one row for each selected test in the order of `tell`; printable."""
+
+    def follow(self, noise: float = 0.0) -> bool:
+        """Whether free runs follow at least half of the tests.
+
+        Args:
+            noise: mean square of the sensors' noise, in the units of the errors.
+        """
+        lost = 0
+        for row in self:
+            frozen = row.closed_loop / row.normalised if row.normalised > 0.0 else math.inf
+            lost += left(row.closed_loop, frozen, noise)
+        return 2 * lost <= len(self)
 
     def __str__(self) -> str:
         """A table as text."""
@@ -84,6 +101,29 @@ class FitTable(tuple[StateFit, ...]):
             fit, r2 = ("-" if value is None else f"{value:.4g}" for value in (row.fit, row.r2))
             lines.append(f"{row.name:<16} {row.unit or '1':<8} {row.rmse:>10.4g}  {fit:>8}  {r2:>8}")
         return "\n".join(lines)
+
+
+def squares(states: Floats, others: Floats, signals: Signals) -> Floats:
+    """Squares of differences between states (…, n_x), each in units of its scale: so units decide nothing.
+
+    Args:
+        states: (…, n_x).
+        others: the same shape, or one that goes with it.
+        signals: of the system.
+    """
+    scales = np.array([state.scale for state in signals.states])
+    return np.asarray(np.square(signals.difference(states, others) / scales))
+
+
+def left(free: float, frozen: float, noise: float) -> bool:
+    """Whether a free run does not follow its flight.
+
+    Args:
+        free: its mean square error; infinite where it diverges.
+        frozen: that of the model that never moves.
+        noise: of the sensors, in the same unit.
+    """
+    return not free - noise <= WRONG * max(frozen - noise, 2.0 * noise)
 
 
 def fit_table(signals: Signals, read: Floats, free: Floats | None) -> FitTable:

@@ -23,12 +23,11 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats
 from twinloop._ground.elementary import exp
+from twinloop.law.accuracy import left, squares
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise, reaches
 from twinloop.trajectory import Trajectory, continued
 
-WRONG = 0.5
-"""Share of the error of the model that never moves above which a flight is not followed."""
 SHARE = 0.02
 """Of how far a state moves: by so much a right model is taken to be off from where a piece begins, if noise is less."""
 SMALL = 0.02
@@ -44,17 +43,6 @@ Deviations = tuple[Floats, Floats, Floats]
 are those of the states, in units of how far these move, and the correlated disturbances behind them."""
 STARTS = 64
 """Readings, spread over the flight, from which the growth is followed."""
-
-
-def left(free: float, frozen: float, noise: float) -> bool:
-    """Whether a free run does not follow its flight.
-
-    Args:
-        free: its mean square error; infinite where it diverges.
-        frozen: that of the model that never moves.
-        noise: of the sensors, in the same unit.
-    """
-    return not free - noise <= WRONG * max(frozen - noise, 2.0 * noise)
 
 
 def in_pieces(replay: Replay, model: _core.Model, readings: Floats, length: int) -> Replay:
@@ -105,7 +93,7 @@ def judged_length(
     whole = Replay(signals, start, flight.commands)
     runs = drawn_runs(model, whole, limits, workers=workers)
     free, frozen = (
-        float(np.square(signals.difference(readings[1:], states) / scales).mean())
+        float(squares(readings[1:], states, signals).mean())
         for states in (np.asarray(runs.read[0])[1:], readings[0])
     )
     if int(runs.lasted[0]) < flight.steps:

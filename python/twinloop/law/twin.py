@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -30,9 +29,9 @@ from twinloop.law.law import Law
 from twinloop.law.linear.plant import linearised, resting, trimmed
 from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import Noise
-from twinloop.law.pieces import in_pieces, judged_length, left
+from twinloop.law.pieces import in_pieces, judged_length
 from twinloop.law.uncertainty import DRAWS, NINE_OF_TEN, committee_runs, spread_of
-from twinloop.records import Recorded, checked_record, from_text, read
+from twinloop.records import Record, Recorded, checked_record, from_text, read
 from twinloop.remarks import Remark, warn
 from twinloop.signals import Signals
 from twinloop.test import Test, check_signals
@@ -55,6 +54,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         seed: of the band's random numbers.
         inflation: calibration factor on the spread of the members.
         remarks: diagnostics of the twin and the data.
+        follows: whether its free runs follow at least half of the flights that it was learnt from; None: by its
+            errors.
         flights: that it was learnt from; its exports are checked on them.
     """
 
@@ -70,6 +71,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         inflation: float = 1.0,
         flights: Sequence[Trajectory] = (),
         remarks: Sequence[Remark] = (),
+        follows: bool | None = None,
     ) -> None:
         self.flights = tuple(flights)
         self.inflation = inflation
@@ -80,6 +82,7 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         self.model = model
         self.signals = signals
         self.errors = ErrorTable(errors)
+        self.follows = self.errors.follow() if follows is None else follows
         self._limits = Limits(signals) if limits is None else limits
         if self._limits.signals != signals:
             raise InvalidInput(
@@ -97,15 +100,20 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         """Multiple of a state's scale at which that is, as records have it."""
         return self._limits.divergence_factor
 
-    VERSION = 5
+    VERSION = 6
 
     @classmethod
     def recorded_fields(cls) -> tuple[str, ...]:
         """Names of the fields that a record has, in order."""
         return (
             *("signals", "model", "errors", "divergence_factor", "members", "noise", "seed", "inflation"),
-            "flights",
+            *("flights", "follows"),
         )
+
+    @classmethod
+    def renewed(cls, record: Record) -> Record:
+        """A record of an earlier version, which told from the errors whether the twin follows."""
+        return {"follows": None, **super().renewed(record)}
 
     @classmethod
     def _read(cls, record: object, where: str, given: tuple[object, ...]) -> Twin:
@@ -119,18 +127,25 @@ class Twin(Shown, Value, Recorded, kind="twin"):
         if found.get("offsets"):
             late = read(tuple[float, ...], found["offsets"], f"{where}.offsets")
             models = [model.with_offsets(late) for model in models]
+        errors = ErrorTable(read(tuple[TestErrors, ...], found["errors"], f"{where}.errors"))
+        noise = read(Noise | None, found["noise"], f"{where}.noise")
+        follows = read(bool | None, found["follows"], f"{where}.follows")
+        if follows is None and noise is not None:
+            # Earlier versions had errors in the units of the states, as noise is.
+            follows = errors.follow(float(np.square(noise.sensors).mean()))
         twin = cls(
             models[0],
             signals,
-            read(tuple[TestErrors, ...], found["errors"], f"{where}.errors"),
+            errors,
             Limits(
                 signals, number(f"Record {where}.divergence_factor", found["divergence_factor"], above=0.0)
             ),
             models[1:],
-            read(Noise | None, found["noise"], f"{where}.noise"),
+            noise,
             read(int, found["seed"], f"{where}.seed"),
             at_least_zero(f"Record {where}.inflation", found["inflation"]),
             read(tuple[Trajectory, ...], found["flights"], f"{where}.flights"),
+            follows=follows,
         )
         widths = {(flight.states.shape[1], flight.commands.shape[1]) for flight in twin.flights}
         noisy = twin.noise is None or len(twin.noise.sensors) == len(twin.noise.moves) == signals.n_x
@@ -140,16 +155,6 @@ class Twin(Shown, Value, Recorded, kind="twin"):
                 " commands, found others; it is damaged."
             )
         return twin
-
-    @property
-    def follows(self) -> bool:
-        """Whether the twin's free runs follow at least half of the flights that it was learnt from."""
-        noise = 0.0 if self.noise is None else float(np.square(self.noise.sensors).mean())
-        lost = 0
-        for row in self.errors:
-            frozen = row.closed_loop / row.normalised if row.normalised > 0.0 else math.inf
-            lost += left(row.closed_loop, frozen, noise)
-        return 2 * lost <= len(self.errors)
 
     def export(
         self,

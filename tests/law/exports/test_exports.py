@@ -292,8 +292,14 @@ def test_a_file_that_holds_no_twin_is_refused(tmp_path):
         tl.load_twin(path)
     record = twin_of(PENDULUM).to_record()
     # What the first version wrote.
-    path.write_text(json.dumps({**record, "version": 1, "offsets": [0.003, 0.0]}))
+    earlier = {key: value for key, value in record.items() if key != "follows"}
+    path.write_text(json.dumps({**earlier, "version": 1, "offsets": [0.003, 0.0]}))
     assert tl.load_twin(path).law.offsets == (0.003, 0.0)
+    # What told from the errors whether it follows.
+    bad = twin_of(PENDULUM, errors=[TestErrors(0, 1.0, 2.0, 0.9, None, 2.0)]).to_record()
+    for errors, follows in ((record["errors"], True), (bad["errors"], False)):
+        path.write_text(json.dumps({**earlier, "version": 5, "errors": errors}))
+        assert tl.load_twin(path).follows is follows
     for offsets, words in (([0.1], "one for each of 2 states"), ([0.0, 0.1], "no other states give")):
         path.write_text(json.dumps({**record, "model": {**record["model"], "offsets": offsets}}))
         with pytest.raises(tl.InvalidInput, match=words):

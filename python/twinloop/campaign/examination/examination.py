@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.examination.beside import Beside, beside
 from twinloop.campaign.examination.correlation import (
@@ -57,13 +58,13 @@ class Earlier:
 
     Args:
         twins: that were known earlier, the oldest first.
-        errors: of each of them on all experiments, SI units squared (twins, experiments).
+        error: of a model on an experiment, over the whole of it.
         innovations: of each experiment that was learnt (n + 1, n_x), whitened; None where there are none.
         rivals: sums of terms that were considered, the chosen ones among them.
     """
 
     twins: Sequence[TwinBefore]
-    errors: Floats
+    error: Callable[[_core.Model, Experiment], float]
     innovations: Sequence[Floats] | None
     rivals: Sequence[Rival]
 
@@ -102,7 +103,7 @@ class Examination:
         self.setup, self.signals = campaign.setup, campaign.signals
         self.experiments: tuple[Experiment, ...] = campaign.experiments
         self.twin: Twin = campaign.twin
-        self.twins_before, self._errors = earlier.twins, earlier.errors
+        self.twins_before, self._error = earlier.twins, earlier.error
         self.innovations = earlier.innovations
         self.rivals = tuple(earlier.rivals)
         self.best: Test | None = None
@@ -129,7 +130,7 @@ class Examination:
     @cached_property
     def unseen(self) -> tuple[Unseen, ...]:
         """Flights beside their predictions from before learning, in the order of `tell`."""
-        return unseen_flights(self.experiments, self.twins_before)
+        return unseen_flights(self.experiments, self.twins_before, self.setup)
 
     @cached_property
     def beside(self) -> tuple[Beside, ...]:
@@ -159,8 +160,8 @@ class Examination:
     @cached_property
     def errors(self) -> ErrorMap:
         """Error of each twin on each flight, learnt or not."""
-        known = {before.learnt: row for before, row in zip(self.twins_before, self._errors, strict=True)}
-        return error_map(self.campaign.history, self.experiments, known)
+        known = {before.learnt: before.twin.model for before in self.twins_before}
+        return error_map(self.campaign.history, self.experiments, known, self._error)
 
     @cached_property
     def open_poles(self) -> tuple[Pole, ...]:

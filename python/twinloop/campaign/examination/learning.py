@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from twinloop import _core
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment, Iteration, Lesson
 from twinloop.objectives import normalised_error
@@ -35,14 +36,16 @@ class ErrorMap:
 def error_map(
     history: Sequence[Iteration | Lesson],
     experiments: Sequence[Experiment],
-    earlier: Mapping[int, Floats],
+    earlier: Mapping[int, _core.Model],
+    error: Callable[[_core.Model, Experiment], float],
 ) -> ErrorMap:
     """The map of a campaign.
 
     Args:
         history: of it.
         experiments: in the order of `tell`.
-        earlier: errors of earlier twins on all experiments, SI units squared, by how many they had learnt.
+        earlier: models of earlier twins, by how many experiments they had learnt.
+        error: of a model on an experiment, over the whole of it.
     """
     shown: Sequence[Iteration | Lesson] = history[-MOST:]
     values = np.full((len(experiments), len(shown)), np.nan)
@@ -53,7 +56,8 @@ def error_map(
         learnt[:told, column] = True
         if told in earlier:
             for row in range(told, len(experiments)):
-                values[row, column] = normalised_error(float(earlier[told][row]), experiments[row].frozen)
+                run = experiments[row]
+                values[row, column] = normalised_error(error(earlier[told], run), run.frozen)
     return ErrorMap(
         tuple(record.iteration for record in shown), tuple(run.number for run in experiments), values, learnt
     )

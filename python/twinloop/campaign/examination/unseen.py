@@ -9,6 +9,8 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.campaign.history import Experiment
+from twinloop.campaign.setup import Setup
+from twinloop.law.accuracy import squares
 from twinloop.law.pieces import held
 from twinloop.law.twin import Twin
 from twinloop.objectives import normalised_error
@@ -57,12 +59,15 @@ class TwinBefore:
     twin: Twin
 
 
-def unseen_flights(experiments: Sequence[Experiment], twins: Sequence[TwinBefore]) -> tuple[Unseen, ...]:
+def unseen_flights(
+    experiments: Sequence[Experiment], twins: Sequence[TwinBefore], setup: Setup
+) -> tuple[Unseen, ...]:
     """Each flight beside the free run of the latest twin that had not learnt it.
 
     Args:
         experiments: in the order of `tell`.
         twins: that were known earlier, in any order.
+        setup: of the campaign.
 
     Returns:
         One for each flight of which such a twin is known.
@@ -71,20 +76,21 @@ def unseen_flights(experiments: Sequence[Experiment], twins: Sequence[TwinBefore
     for place, run in enumerate(experiments):
         known = [before for before in twins if before.learnt <= place]
         if known:
-            found.append(_beside(place, run, max(known, key=lambda before: before.learnt)))
+            found.append(_beside(place, run, max(known, key=lambda before: before.learnt), setup))
     return tuple(found)
 
 
-def _beside(place: int, run: Experiment, before: TwinBefore) -> Unseen:
+def _beside(place: int, run: Experiment, before: TwinBefore, setup: Setup) -> Unseen:
     twin = before.twin
     predicted = twin.free_run(run.replayed, run.trajectory)
     rmse, fit, inside = followed(twin, run.trajectory, predicted)
     lasted = bool(np.isfinite(rmse).all())
-    squares = float(np.square(rmse).mean()) if lasted else float("inf")
-    # Of whole flights as the campaign counts them, which is over all states.
-    whole = squares if run.before is None else run.before
+    sizes = np.array([state.scale if setup.in_scales else 1.0 for state in setup.signals.states])
+    missed = float(np.square(rmse / sizes).mean()) if lasted else float("inf")
+    # Of whole flights as the campaign counts them.
+    whole = missed if run.before is None else run.before
     frozen = None if run.test is not None else _frozen_in_pieces(twin, run.trajectory)
-    error = normalised_error(whole, run.frozen) if frozen is None else normalised_error(squares, frozen)
+    error = normalised_error(whole, run.frozen) if frozen is None else normalised_error(missed, frozen)
     return Unseen(place, run.number, before.learnt, run.trajectory, predicted, error, rmse, fit, inside)
 
 
@@ -93,8 +99,7 @@ def _frozen_in_pieces(twin: Twin, flown: Trajectory) -> float | None:
     length = twin.piece_of(flown)
     if length == flown.steps:
         return None
-    moved = twin.signals.difference(flown.states[1:], held(flown.states, length))
-    return float(np.square(moved).mean())
+    return float(squares(flown.states[1:], held(flown.states, length), twin.signals).mean())
 
 
 def followed(twin: Twin, flown: Trajectory, predicted: Trajectory) -> tuple[Floats, Floats, float | None]:

@@ -22,7 +22,7 @@ from twinloop.campaign.identify_and_plan.unmoved import unmoved_states
 from twinloop.campaign.setup import Setup
 from twinloop.identification.identified import Identified
 from twinloop.identification.settings import IdentificationOptions
-from twinloop.law.pieces import left
+from twinloop.law.accuracy import left
 
 
 @dataclass(frozen=True, eq=False)

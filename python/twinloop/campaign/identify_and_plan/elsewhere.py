@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from twinloop import _core
 from twinloop._ground.streams import Unit
-from twinloop.campaign.identify_and_plan.following import squares
 from twinloop.campaign.setup import Setup
+from twinloop.law.accuracy import squares
 
 DRAWN = 32
 """Controllers that are drawn uniformly from the box of gains."""
@@ -95,7 +95,7 @@ def _flown(
 
 def _part(first: _core.Runs, other: _core.Runs, setup: Setup) -> NDArray[np.bool_]:
     """Under which controllers two laws part (m,)."""
-    off = squares(first.states, other.states, setup.limits).mean(axis=(1, 2))
-    moved = squares(first.states, first.states[:, :1], setup.limits).mean(axis=(1, 2))
+    off = squares(first.states, other.states, setup.signals).mean(axis=(1, 2))
+    moved = squares(first.states, first.states[:, :1], setup.signals).mean(axis=(1, 2))
     lasts = [run.lasted == setup.steps for run in (first, other)]
     return np.asarray(np.where(lasts[0] & lasts[1], off > APART * moved, lasts[0] != lasts[1]))

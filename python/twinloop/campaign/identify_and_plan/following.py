@@ -12,11 +12,10 @@ from twinloop._experiment.limits import Limits
 from twinloop._experiment.replay import Replay
 from twinloop._ground.arrays import Floats, Integers
 from twinloop.campaign.history import Experiment
-from twinloop.campaign.replaying import as_flown, lengths_of, start_of
-from twinloop.law.flight import drawn_runs
+from twinloop.campaign.replaying import as_flown, lengths_of, missed_by, start_of
+from twinloop.law.accuracy import squares
 from twinloop.law.noise import Noise
 from twinloop.law.pieces import held
-from twinloop.test import Test
 
 FEWEST = 4
 """Members of a committee that are kept in any case."""
@@ -99,7 +98,7 @@ def following(
     lengths = lengths_of(models[0], flights, limits, workers, noise)
     for j, flight in enumerate(flights):
         states, steps = flight.trajectory.states, flight.trajectory.steps
-        frozen[j] = squares(states[1:], held(states, lengths[j]), limits).mean()
+        frozen[j] = squares(states[1:], held(states, lengths[j]), limits.signals).mean()
         for i, model in enumerate(models):
             flown = as_flown(model, flight, lengths[j])
             missed, length = missed_by(model, flown, states[1:], limits, workers)
@@ -134,43 +133,6 @@ def in_pieces(
             flown = Replay(limits.signals, start_of(model, states[first]), piece)
             missed, length = missed_by(model, flown, read, limits, workers)
             off += float(missed.sum()) if length == len(piece) else np.inf
-            moved += float(squares(read, states[first], limits).sum())
+            moved += float(squares(read, states[first], limits.signals).sum())
         found[j] = off / moved if moved > 0.0 else np.inf
     return found
-
-
-def free_run(
-    model: _core.Model, flown: Test | Replay, limits: Limits, workers: _core.Workers
-) -> tuple[Floats, int]:
-    """A model flown by itself: the states as sensors read them without noise (n + 1, n_x), and how many steps it lasts.
-
-    Args:
-        model: that is flown.
-        flown: from where, and under which controller or commands.
-        limits: where a run counts as diverged.
-        workers: how the work is carried out.
-    """
-    runs = drawn_runs(model, flown, limits, workers=workers)
-    return np.asarray(runs.read[0]), int(runs.lasted[0])
-
-
-def missed_by(
-    model: _core.Model, flown: Test | Replay, read: Floats, limits: Limits, workers: _core.Workers
-) -> tuple[Floats, int]:
-    """Squares of what a free run misses of the readings after its start (n, n_x), and how many steps it lasts.
-
-    Args:
-        model: that is flown.
-        flown: from where, and under which controller or commands.
-        read: of the flight (n, n_x).
-        limits: where a run counts as diverged.
-        workers: how the work is carried out.
-    """
-    states, lasted = free_run(model, flown, limits, workers)
-    return squares(states[1:], read, limits), lasted
-
-
-def squares(states: Floats, others: Floats, limits: Limits) -> Floats:
-    """Squares of differences between states, in units of their scales (…, n_x)."""
-    scales = np.array([state.scale for state in limits.signals.states])
-    return np.asarray(np.square(limits.signals.difference(states, others) / scales))

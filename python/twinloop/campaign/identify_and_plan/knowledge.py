@@ -65,6 +65,7 @@ class Knowledge:
             seed=self.setup.seed,
             inflation=inflation,
             remarks=learnt.lessons[-1].remarks,
+            follows=learnt.follows,
             flights=[run.trajectory for run in self.book.experiments],
         )
 

@@ -17,7 +17,7 @@ from twinloop.campaign.identify_and_plan.elsewhere import elsewhere
 from twinloop.campaign.identify_and_plan.selection import Selected, shortened
 from twinloop.campaign.identify_and_plan.stand_ins import claimed, stand_ins
 from twinloop.campaign.logbook import Logbook
-from twinloop.campaign.replaying import free_errors
+from twinloop.campaign.twin_errors import free_errors
 
 
 def lesson_of(

@@ -16,8 +16,9 @@ from twinloop._ground.arrays import Floats, Integers
 from twinloop._ground.streams import Unit
 from twinloop.campaign.data.sent import in_pulses
 from twinloop.campaign.history import Cause, Experiment
-from twinloop.campaign.identify_and_plan.following import Following, missed_by, squares
-from twinloop.campaign.replaying import as_flown, lengths_of
+from twinloop.campaign.identify_and_plan.following import Following
+from twinloop.campaign.replaying import as_flown, lengths_of, missed_by
+from twinloop.law.accuracy import squares
 from twinloop.law.flight import drawn_runs
 from twinloop.law.noise import Noise
 from twinloop.law.pieces import held
@@ -178,7 +179,7 @@ def expected_misses(
         # What is measured where a piece begins is its anchor; what a free run misses there is what it came to before.
         read = np.asarray(runs.read)
         with np.errstate(invalid="ignore"):
-            off = squares(read[1:] + seen, read[0], limits).mean(axis=(0, 1))
+            off = squares(read[1:] + seen, read[0], limits.signals).mean(axis=(0, 1))
         found[j] = off if lasted else np.inf
     return found
 
@@ -242,5 +243,5 @@ def of_each_state(
         flown = as_flown(model, flight, lengths[j])
         missed, lasted = missed_by(model, flown, states[1:], limits, workers)
         off[j] = missed.mean(axis=0) if lasted == steps else np.inf
-        frozen[j] = squares(states[1:], held(states, lengths[j]), limits).mean(axis=0)
+        frozen[j] = squares(states[1:], held(states, lengths[j]), limits.signals).mean(axis=0)
     return off, frozen

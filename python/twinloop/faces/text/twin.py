@@ -145,13 +145,8 @@ def errors_text(result: Mapping[str, Any]) -> str:
         for run in result["experiments"]
     ]
     note = (
-        f"Mean squares over steps and states ({squared_units(result)}), to the noisy readings. Normalised: over that of"
-        " a model that\nnever moves; 1 is useless. Before learning: the same, of the twin that had not seen the flight."
+        "Mean squares over steps and states, each in units of its scale, to the noisy readings. Normalised: over that"
+        " of a\nmodel that never moves; 1 is useless. Before learning: the same, of the twin that had not seen the"
+        " flight."
     )
     return "ERRORS OF THE TWIN, ONE ROW PER TEST\n" + table(head, rows) + "\n" + note
-
-
-def squared_units(result: Mapping[str, Any]) -> str:
-    """Units of the states, squared."""
-    units = dict.fromkeys(state["unit"] or "1" for state in result["signals"]["states"])
-    return ", ".join(f"({unit})²" if "/" in unit or " " in unit else f"{unit}²" for unit in units)
