@@ -6,12 +6,14 @@ import control
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.optimize
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import twinloop as tl
 from law_twins import PENDULUM, SIGNALS, model_of
 from strategies import programs
+from twinloop.campaign.examination.loops import loops_around
 from twinloop.errors import NotAvailable
 from twinloop.law.expressions import Expressions
 from twinloop.law.forms import DERIVATIVES, FORMS
@@ -299,3 +301,33 @@ def test_the_margins_of_a_campaign_are_those_of_its_twin_and_the_worst_of_its_co
     assert len(campaign.margins(system.default_gains, broken_at="commands").nominal) == 4
     with pytest.raises(tl.InvalidInput, match="axes"):
         campaign.margins(broken_at="wires")
+
+
+def heated(power):
+    """A heater of 20 kW at most that cools by 1 % of its temperature a second, under a PI: the loops at 40 degC."""
+    signals = tl.Signals([tl.State("temp", "degC", 50.0)], [tl.Command("heater", "kW", (0.0, 20.0))], dt=5.0)
+    pi = tl.controllers.PID(
+        [("temp", None)], {"temp.kp": (0.0, 5.0), "temp.ki": (0.0, 0.1), "temp.kd": 0.0}
+    )
+    campaign = tl.Campaign(
+        signals, controller=pi, initial_state=[20.0], target_state=[40.0], duration=600.0
+    )
+    model = twin(["r2 = r0 * -0.01", f"r3 = r1 * {power}", "r2 = r2 + r3"], inputs=2, signals=signals)
+    return loops_around(model, campaign.setup, np.array([2.0, 0.02]), "axes")[0][0]
+
+
+def test_a_heater_that_rests_on_its_bound_has_the_margins_of_where_it_holds_its_target():
+    found = heated(0.5).margins(0, "temp")
+
+    def loop(w):
+        z, a = np.exp(5j * w), math.exp(-0.05)
+        return (2.0 + 0.02 * 5.0 * z / (z - 1.0)) * 0.025 * (1.0 - a) / 0.01 / (z - a)
+
+    crossover = scipy.optimize.brentq(lambda w: abs(loop(w)) - 1.0, 1e-3, 0.3)
+    assert found.stable and found.crossover == pytest.approx(crossover, rel=1e-4)
+    assert found.phase == pytest.approx(math.pi + np.angle(loop(crossover)), rel=1e-4)
+
+
+def test_a_heater_that_is_too_weak_for_its_target_has_no_margins_there():
+    with pytest.raises(NotAvailable, match="heater at a bound"):
+        heated(0.3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,11 +14,14 @@ from twinloop.law.law import Law
 from twinloop.law.linear.margins import Loops, closed_loops
 from twinloop.law.noise import Noise
 from twinloop.law.twin import Twin
+from twinloop.signals import Signals
 
 FREQUENCIES = 160
 """At which loops are drawn, in equal ratios."""
 SLOWEST = 1e-3
 """Lowest of them, as a share of half the frequency of the periods."""
+FAR = 1000.0
+"""Ranges of a command between its bounds and those of a command without any."""
 
 
 def loops_around(
@@ -37,7 +40,7 @@ def loops_around(
 
     Raises:
         InvalidInput: another place.
-        NotAvailable: the twin or the controller has no derivatives there.
+        NotAvailable: the twin or the controller has no derivatives there, or the target needs a command at its bound.
     """
     if broken_at not in ("axes", "commands"):
         raise unknown("place to break a loop at", broken_at, ("axes", "commands"))
@@ -48,7 +51,18 @@ def loops_around(
         axes = getattr(setup.controller, "axes", None)
         names = [f"u{i + 1}" if axes is None else axes[i][0] for i in range(mixer.matrix.shape[1])]
     laws = [twin.law, *(Law.of(member, signals) for member in twin.members)]
-    return closed_loops(laws, setup.family, genes, setup.final_target, mixer, broken_at), names
+    family = setup.controller.bind(_without_bounds(signals))
+    return closed_loops(laws, family, genes, setup.final_target, mixer, broken_at), names
+
+
+def _without_bounds(signals: Signals) -> Signals:
+    """The same signals, the bounds of the commands so far away that a small departure meets none."""
+    commands = []
+    for command in signals.commands:
+        low, high = command.bounds
+        far = FAR * (high - low)
+        commands.append(replace(command, bounds=(low - far, high + far)))
+    return replace(signals, commands=tuple(commands))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.controllers import Family, Mixer
+from twinloop.errors import NotAvailable
 from twinloop.law.law import Law
 from twinloop.law.linear.controller import LinearController, linear_controller
 from twinloop.law.linear.plant import linearised, trimmed
@@ -204,7 +205,8 @@ def closed_loops(
 
     Args:
         laws: the twin's, then those of the committee.
-        family: of the controller.
+        family: of the controller, over commands without bounds: a heater that rests on its bound at zero error does
+            not rest there once the integral has found the power that holds the target.
         genes: its gains (size,).
         target: state that it leads to (n_x,).
         mixer: from axes to commands; None: axis i is command i.
@@ -214,12 +216,27 @@ def closed_loops(
         As many as laws.
 
     Raises:
-        NotAvailable: a law or the controller has no derivatives there.
+        NotAvailable: a law or the controller has no derivatives there, or on the first law a command that the
+            controller moves is at a bound there.
     """
     controller = linear_controller(family, genes, target)
     outputs = None if mixer is None or broken_at == "commands" else _slopes(mixer, controller.rest)
-    plants = (linearised(law, target, trimmed(law, target, controller.rest), discrete=True) for law in laws)
+    held = [trimmed(law, target, controller.rest) for law in laws]
+    _check_held(laws[0], controller, held[0])
+    plants = (linearised(law, target, by, discrete=True) for law, by in zip(laws, held, strict=True))
     return [Loops(plant, controller, outputs) for plant in plants]
+
+
+def _check_held(law: Law, controller: LinearController, held: Floats) -> None:
+    """Refuses a target at which a command is at a bound: feedback has nothing left to move there."""
+    moved = np.abs(np.hstack([controller.C, controller.D])).sum(axis=1) > 0.0
+    for command, value, moves in zip(law.signals.commands, held.tolist(), moved.tolist(), strict=True):
+        if moves and value in command.bounds:
+            raise NotAvailable(
+                f"Linear analysis: expected commands within their bounds that hold the target, found {command.name} at"
+                " a bound on the twin, where feedback moves nothing more; choose a target that they can hold, or"
+                " correct their bounds."
+            )
 
 
 def margins_of(loops: Sequence[Loops], names: Sequence[str], broken_at: str) -> Margins:
