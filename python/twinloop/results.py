@@ -15,6 +15,7 @@ from twinloop.campaign.examination.learning import ErrorMap
 from twinloop.campaign.examination.log_check import Column, LogCheck
 from twinloop.campaign.examination.loops import ClosedCurves, LoopCurves
 from twinloop.campaign.examination.poles import Pole
+from twinloop.campaign.examination.reaching import Ending, Miss
 from twinloop.campaign.examination.steps import StepAnswer
 from twinloop.campaign.examination.unseen import Unseen
 from twinloop.campaign.examination.use import Effort, GainSlope
@@ -54,6 +55,7 @@ __all__ = [
     "Cost",
     "DataQuality",
     "Effort",
+    "Ending",
     "ErrorMap",
     "ErrorTable",
     "Examination",
@@ -75,6 +77,7 @@ __all__ = [
     "LoopCurves",
     "LoopMargins",
     "Margins",
+    "Miss",
     "Model",
     "ModelSearch",
     "Noise",

@@ -14,6 +14,7 @@ import lives
 import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.reaching import Ending, Miss
 from twinloop.faces.certificate import facts
 from twinloop.faces.cli import main
 from twinloop.faces.figures.axis import axis
@@ -27,6 +28,8 @@ from twinloop.faces.report.source import OWN
 from twinloop.faces.report.tables.controller import margins as margins_table
 from twinloop.faces.report.verdict import of_next, verdict
 from twinloop.faces.result import summary
+from twinloop.faces.text.controller import advice_text
+from twinloop.faces.text.verdict import verdict as verdict_text
 from twinloop.records import to_text
 
 pytest.importorskip("jinja2", reason="twinloop[report] is not installed")
@@ -343,6 +346,33 @@ def test_bands_that_an_older_version_has_not_kept_are_said_to_be_unknown(good):
 def test_where_the_twin_is_good_and_its_controller_is_not_another_flight_is_no_answer(fails, answer):
     delay = Check("delay", "controller", 0.6, 1.0, not fails, True, "It bears 0.6 periods more.")
     result = {"quality": {"unit": "rad s"}, "advice": {"gain": 1e-5, "scatter": 1e-3, "stop": True}}
-    said = of_next(SimpleNamespace(best=object()), Checks([delay]), result)
+    found = SimpleNamespace(best=object(), margins=object(), ending=None)
+    said = of_next(found, Checks([delay]), result)
     assert said.answer == answer and said.good is (None if fails else True)
     assert ("delay" in said.text) is fails
+
+
+def test_where_the_target_is_missed_nobody_is_told_just_to_stop(good, monkeypatch):
+    miss = Miss(tl.State("temp", "degC", 50.0), 40.0, 19.8, 0.99)
+    end = Ending((miss,), ((tl.Command("heater", "kW", (0.0, 20.0)), 20.0),))
+    words = "19.8 degC from temp's target of 40 degC, with heater at its bound of 20 kW"
+    result = {"quality": {"unit": ""}, "advice": {"gain": 1e-5, "scatter": 1e-3, "stop": True}}
+    said = of_next(SimpleNamespace(best=object(), margins=object(), ending=end), Checks([]), result)
+    assert said.answer != "Stop" and said.good is None and words in said.text
+    found = good.examine()
+    found.ending, checked = end, Checks([])
+    _, of_controller, _ = verdict(found, checked, summary(good, {"name": "p"}, {}))
+    assert of_controller.good is None and words in of_controller.text
+    shown = summary(good, {"name": "p"}, {})
+    shown["controller"]["off_target"] = str(end)
+    shown["advice"] |= {"trusted": True, "stop": True, "gain": 1e-5, "scatter": 1e-3}
+    assert all(words in said(shown) for said in (verdict_text, advice_text))
+
+
+def test_checks_that_could_not_be_made_are_what_comes_next(good):
+    result = {"quality": {"unit": ""}, "advice": {"gain": 0.0, "scatter": 1e-3, "stop": True}}
+    found = SimpleNamespace(best=object(), margins=None, ending=None, no_margins="There is no slope.")
+    unmade = Check("stable", "controller", None, None, False, True, "Not made: there is no slope.")
+    said = of_next(found, Checks([unmade]), result)
+    assert "There is no slope." in said.text and "narrower bounds" not in said.text
+    assert "margins" not in dict(said.links)  # there is no table of them on the page

@@ -75,6 +75,11 @@ class Certificate:
         return tuple(check.sentence for check in self.checks.failed)
 
     @property
+    def cautions(self) -> tuple[str, ...]:
+        """What does not forbid to fly it, but is worth a look, in sentences."""
+        return tuple(check.sentence for check in self.checks if check.verdict == "look")
+
+    @property
     def granted(self) -> bool:
         """Whether the controller may be flown, as far as checks can tell."""
         return self.best is not None and not self.refusals
@@ -95,10 +100,7 @@ def certificate(campaign: Campaign) -> Certificate:
     uses = () if step is None else _uses(found.experiments, step)
     # Around a twin that does not follow its own flights margins say nothing of the system's.
     margins = found.margins if twin.follows else None
-    slopes = "the controller or the twin has no slope at the target"
-    why_none = (
-        "" if margins is not None else slopes if twin.follows else "the twin does not follow its flights"
-    )
+    why_none = found.no_margins if twin.follows else "The twin does not follow its flights."
     return Certificate(
         checks=checks(found),
         law_gains=tuple(campaign.family.law_gains),
@@ -154,6 +156,6 @@ def _not_tested(
             f"No envelope is declared for {', '.join(bare)}: whether the flight stays safe there was not checked."
         )
     if no_margins:
-        said.append(f"Margins of stability: {no_margins}.")
+        said.append(f"Margins of stability. {no_margins}")
     said.append("Another load, battery, temperature or wind than in these flights, and wear.")
     return said

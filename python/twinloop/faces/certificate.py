@@ -52,6 +52,7 @@ def facts(
         "version": 1,
         "granted": found.granted,
         "refusals": found.refusals,
+        "cautions": found.cautions,
         "campaign": {
             "name": name,
             "store": store,

@@ -57,6 +57,7 @@ def certify(
     files = [str(output / file) for file, _ in texts.values()]
     sheet = output / "certificate.html"
     text = f"Granted: {'; '.join([str(sheet), *([', '.join(files)] if files else [])])}."
+    text = " ".join([text, *found.cautions])
     if not found.granted:
         text = f"Refused. {' '.join(found.refusals)} Details: {sheet}"
     written = [str(sheet), str(output / "certificate.json"), *files]

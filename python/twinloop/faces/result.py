@@ -144,7 +144,14 @@ def _controller(
     }
     if identified:
         flown = bool(examination.best_flights)
-        found |= {"spread": spread, "risk": best.risk, "why": best.reason, "flown": flown}
+        end = "" if examination.ending is None else str(examination.ending)
+        found |= {
+            "spread": spread,
+            "risk": best.risk,
+            "why": best.reason,
+            "flown": flown,
+            "off_target": end or None,
+        }
     return found
 
 

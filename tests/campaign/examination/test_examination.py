@@ -12,9 +12,10 @@ import lives
 import twinloop as tl
 from conftest import pendulum_step
 from twinloop.campaign.examination.check import Check, Checks
-from twinloop.campaign.examination.checking import _damping, _delay, _of_controller
+from twinloop.campaign.examination.checking import _damping, _delay, _of_controller, _of_target
 from twinloop.campaign.examination.correlation import autocorrelation, crosscorrelation, lags_of
 from twinloop.campaign.examination.data import movements
+from twinloop.campaign.examination.reaching import ending
 from twinloop.campaign.examination.use import strongest_commands
 from twinloop.law.linear.margins import LoopMargins
 
@@ -211,6 +212,54 @@ def test_a_loop_that_bears_less_than_a_period_of_delay_is_not_flown(good, delay,
     check = _delay(dataclasses.replace(loop, delay=delay), 0.05)
     assert check.verdict == verdict and check.binding
     assert (loop.loop in check.sentence) == np.isfinite(delay)
+
+
+def test_a_binding_check_that_could_not_be_made_does_not_hold(good):
+    found = good.examine()
+    found._found_loops = "Linear analysis: expected a slope, found none."
+    unmade = [check for check in Checks(_of_controller(found)).failed if "Not made" in check.sentence]
+    assert [check.name for check in unmade] == ["stable", "sensitivity", "delay"]
+    assert "expected a slope, found none" in unmade[0].sentence
+    assert all(check.value is None and check.verdict == "failed" for check in unmade)
+
+
+HEATED = tl.Signals(
+    states=[tl.State("temp", "degC", 50.0), tl.State("level", "m", 1.0)],
+    commands=[tl.Command("heater", "kW", (0.0, 20.0)), tl.Command("pump", "l/s", (0.0, 2.0))],
+    dt=5.0,
+)
+
+
+def ended(temp, heater, weights=(0.02, 1.0), sensor=0.05):
+    """The end of a flight from 20 to 40 degC at a level that stays, of 100 periods; the pump is used in part."""
+    states = np.stack([np.linspace(20.0, temp, 101), np.full(101, 0.5)], axis=1)
+    states[-10:, 0] = temp
+    flight = tl.Trajectory(
+        5.0 * np.arange(101), states, np.stack([np.full(100, heater), np.full(100, 0.8)], 1)
+    )
+    start, target = np.array([20.0, 0.5]), np.array([40.0, 0.5])
+    return ending(flight, HEATED, start, target, np.array(weights), np.array([sensor, 0.002]))
+
+
+def test_a_flight_that_ends_far_from_its_target_says_how_far_and_which_command_had_nothing_left():
+    end = ended(20.2, 20.0)
+    assert str(end) == "It ends 19.8 degC from temp's target of 40 degC, with heater at its bound of 20 kW."
+    (miss,) = end.misses
+    assert miss.share == pytest.approx(0.99)
+    check = _of_target(end)
+    assert check.verdict == "look" and str(end) in check.sentence
+    for reached in (ended(39.0, 20.0), ended(20.2, 20.0, weights=(0.0, 1.0)), ended(37.0, 3.0, sensor=2.0)):
+        assert not reached.misses and _of_target(reached).verdict == "passed" and not str(reached)
+    assert not ended(20.2, 19.0).held
+
+
+def test_a_target_that_moves_is_not_missed_at_its_end(good):
+    found = good.examine()
+    assert found.ending is not None
+    moving = np.tile(found.setup.target_state, (found.setup.steps + 1, 1))
+    again = good.examine()
+    again.setup = dataclasses.replace(found.setup, target_state=moving)
+    assert again.ending is None
 
 
 def test_only_what_binds_decides():

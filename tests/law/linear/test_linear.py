@@ -306,12 +306,8 @@ def test_the_margins_of_a_campaign_are_those_of_its_twin_and_the_worst_of_its_co
 def heated(power):
     """A heater of 20 kW at most that cools by 1 % of its temperature a second, under a PI: the loops at 40 degC."""
     signals = tl.Signals([tl.State("temp", "degC", 50.0)], [tl.Command("heater", "kW", (0.0, 20.0))], dt=5.0)
-    pi = tl.controllers.PID(
-        [("temp", None)], {"temp.kp": (0.0, 5.0), "temp.ki": (0.0, 0.1), "temp.kd": 0.0}
-    )
-    campaign = tl.Campaign(
-        signals, controller=pi, initial_state=[20.0], target_state=[40.0], duration=600.0
-    )
+    pi = tl.controllers.PID([("temp", None)], {"temp.kp": (0.0, 5.0), "temp.ki": (0.0, 0.1), "temp.kd": 0.0})
+    campaign = tl.Campaign(signals, controller=pi, initial_state=[20.0], target_state=[40.0], duration=600.0)
     model = twin(["r2 = r0 * -0.01", f"r3 = r1 * {power}", "r2 = r2 + r3"], inputs=2, signals=signals)
     return loops_around(model, campaign.setup, np.array([2.0, 0.02]), "axes")[0][0]
 

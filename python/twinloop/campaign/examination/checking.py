@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from twinloop._experiment.envelope import is_bounded
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.examination import Examination
+from twinloop.campaign.examination.reaching import REACHED, Ending
 from twinloop.law.linear.margins import LoopMargins
 from twinloop.planning.leaving import risk_words
 
@@ -156,6 +157,16 @@ def _delay(worst: LoopMargins, dt: float) -> Check:
     )  # fmt: skip
 
 
+def _without_margins(why: str) -> Iterator[Check]:
+    """A check that binds and that could not be made does not hold."""
+    for name, limit, what in (
+        ("stable", None, f"whether the loops around the target are stable. {why}"),
+        ("sensitivity", SENSITIVITY, "the largest sensitivity, of loops around the target."),
+        ("delay", PERIODS, "the smallest delay margin, of loops around the target."),
+    ):
+        yield Check(name, "controller", None, limit, False, True, f"Not made: {what}")
+
+
 def _of_controller(found: Examination) -> Iterator[Check]:
     best = found.best
     why = found.no_controller if best is None else f"There is a controller to fly. {best.reason}".strip()
@@ -164,8 +175,10 @@ def _of_controller(found: Examination) -> Iterator[Check]:
     )  # fmt: skip
     if best is None:
         return
-    # Loops around a twin that does not follow its own flights say nothing of the system's.
+    # Loops around a twin that does not follow its own flights say nothing of the system's, and `follows` binds already.
     margins = found.margins if found.twin.follows else None
+    if margins is None and found.twin.follows:
+        yield from _without_margins(found.no_margins)
     if margins is not None:
         stable = all(loop.stable for loop in margins.worst)
         yield Check(
@@ -196,4 +209,19 @@ def _of_controller(found: Examination) -> Iterator[Check]:
     not_kept = f"not {completed}" if found.best_flights else "not flown yet"
     yield Check(
         "flown", "controller", None, None, kept, False, f"These gains have {completed if kept else not_kept}.",
+    )  # fmt: skip
+    if found.ending is not None:
+        yield _of_target(found.ending)
+
+
+def _of_target(end: Ending) -> Check:
+    """Whether the target is reached: a target may be meant to lie beyond reach, so that this does not bind."""
+    worst = max((miss.share for miss in end.misses), default=0.0)
+    there = "Each state that counts ends within a tenth of its way of its target, or as near as noise allows."
+    missed = (
+        f"{end} That is more than a tenth of the way, and more than noise explains. It forbids nothing: a target may be"
+        " out of reach on purpose."
+    )
+    return Check(
+        "target", "controller", worst, REACHED, not end.misses, False, missed if end.misses else there,
     )  # fmt: skip

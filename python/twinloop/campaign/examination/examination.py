@@ -30,6 +30,7 @@ from twinloop.campaign.examination.loops import (
     loops_around,
 )
 from twinloop.campaign.examination.poles import Pole, poles
+from twinloop.campaign.examination.reaching import Ending, ending
 from twinloop.campaign.examination.rivals import Rival
 from twinloop.campaign.examination.steps import StepAnswer, moved_states, step_answer
 from twinloop.campaign.examination.unseen import TwinBefore, Unseen, unseen_flights
@@ -220,13 +221,23 @@ class Examination:
         return None
 
     @cached_property
-    def _loops(self) -> tuple[list[Loops], Sequence[str]] | None:
+    def _found_loops(self) -> tuple[list[Loops], Sequence[str]] | str:
+        """The loops with their names, or why there are none."""
         if self.best is None:
-            return None
+            return self.no_controller
         try:
             return loops_around(self.twin, self.setup, self.best.genes, "axes")
-        except NotAvailable:
-            return None
+        except NotAvailable as reason:
+            return str(reason)
+
+    @property
+    def _loops(self) -> tuple[list[Loops], Sequence[str]] | None:
+        return None if isinstance(self._found_loops, str) else self._found_loops
+
+    @property
+    def no_margins(self) -> str:
+        """Why there are no margins; empty where there are some."""
+        return self._found_loops if isinstance(self._found_loops, str) else ""
 
     @cached_property
     def margins(self) -> Margins | None:
@@ -300,6 +311,18 @@ class Examination:
         """The last flight of the controller to fly without excitation; None: there was none."""
         quiet = [run for run in self.best_flights if run.test is not None and run.test.excitation is None]
         return quiet[-1] if quiet else None
+
+    @cached_property
+    def ending(self) -> Ending | None:
+        """Where the controller to fly ends its task; None where it moves with time, or no whole flight is known."""
+        flight = self.planned if self.best_flown is None else self.best_flown.trajectory
+        if flight is None or flight.steps < self.setup.steps or self.setup.target_state.ndim > 1:
+            return None
+        sensors = None if self.twin.noise is None else self.twin.noise.sensors
+        setup = self.setup
+        return ending(
+            flight, self.signals, setup.initial_state, setup.final_target, setup.quality.weights, sensors
+        )
 
     @cached_property
     def first_flown(self) -> Experiment | None:

@@ -25,7 +25,7 @@ from twinloop.faces.report.tables import controller as of_controller
 from twinloop.faces.report.tables import flights as of_flights
 from twinloop.faces.report.tables import twin as of_twin
 from twinloop.faces.report.tables.table import Table
-from twinloop.faces.report.verdict import EVIDENCE, verdict
+from twinloop.faces.report.verdict import evidence, verdict
 from twinloop.faces.result import summary
 from twinloop.planning.leaving import risk_words
 
@@ -100,7 +100,7 @@ def report_page(
         tuned=controller,
         verdict=verdict(found, checked, result)[: None if controller else 1],
         checks=[check for check in checked if controller or check.subject == "twin"],
-        evidence=EVIDENCE,
+        evidence=evidence(found),
         moot=moot(found),
         equations="\n".join(result["twin"]["equations"]),  # type: ignore[call-overload,index,arg-type]
         remarks=campaign.twin.remarks,
@@ -164,6 +164,7 @@ def _next(campaign: Campaign, result: Mapping[str, Any]) -> dict[str, object]:
         "waiting": campaign.waiting,
         "advice": result.get("advice"),
         "unit": result["quality"]["unit"],
+        "off_target": (result["controller"] or {}).get("off_target"),
         "flights": campaign.setup.predicted_flights,
     }
 

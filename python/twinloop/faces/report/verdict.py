@@ -30,8 +30,20 @@ EVIDENCE = {
     "delay": "margins",
     "envelope": "envelope",
     "flown": "step",
+    "target": "step",
 }
 """Where on the page each check can be looked at."""
+
+
+def evidence(found: Examination) -> dict[str, str]:
+    """Where on the page of a campaign each check can be looked at.
+
+    Args:
+        found: its examination; where it has no margins, there is no table of them.
+    """
+    return {
+        name: place for name, place in EVIDENCE.items() if place != "margins" or found.margins is not None
+    }
 
 
 @dataclass(frozen=True)
@@ -95,7 +107,7 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
                 f" (up to {100.0 * share:.0f} % of the correlations are beyond their 99 % limits): it lacks"
             )
             text += " an effect"
-        return Sentence("Twin", "Do not trust it", False, f"{_capital(text)}.{unseen}", _links(failed))
+        return Sentence("Twin", "Do not trust it", False, f"{_capital(text)}.{unseen}", _links(found, failed))
     text = unseen.strip()
     if found.autocorrelation is not None:
         text += " Its residuals are noise: they are correlated neither in time nor with the commands."
@@ -158,8 +170,8 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
             "Controller",
             "Do not fly it",
             False,
-            f"{failed[0].sentence} {_capital(worth)}.",
-            _links(failed),
+            f"{failed[0].sentence} {_capital(worth)}.{_off_target(found)}",
+            _links(found, failed),
         )
     if not checks.twin_passed:
         rests = "The prediction rests on a twin that is not to be trusted: rely on what was flown."
@@ -171,10 +183,17 @@ def _of_controller(found: Examination, checks: Checks, result: Mapping[str, Any]
             text,
             (("step", "step"), ("qualities", "flights")),
         )
+    off = _off_target(found)
+    answer = "Fly it" if best["measured"] is None else "Keep it"
     return Sentence(
-        "Controller", "Fly it" if best["measured"] is None else "Keep it", True, f"{_capital(worth)}.{margins}",
+        "Controller", f"{answer}, but it misses its target" if off else answer, None if off else True,
+        f"{_capital(worth)}.{off}{margins}",
         (("step", "step"), ("margins", "margins"), ("gains-table", "gains")),
     )  # fmt: skip
+
+
+def _off_target(found: Examination) -> str:
+    return f" {found.ending}" if found.ending is not None and found.ending.misses else ""
 
 
 def _predicted(found: Examination, best: Mapping[str, Any]) -> str:
@@ -213,6 +232,8 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
     advice = result.get("advice")
     unit = result["quality"]["unit"]
     links = (("next", "next experiment"),)
+    off = _off_target(found)
+    stop = ("Stop, or change the task", None) if off else ("Stop", True)
     if advice is None:
         return Sentence(
             "Next", "You decide", None, "The preset paper does not say what another test would bring.", links
@@ -227,27 +248,32 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
         )
     failed = [check for check in checks.failed if check.subject == "controller"]
     if failed and found.best is not None and (advice["stop"] or advice["gain"] == 0.0):
+        knows = "The twin knows enough: another flight would hardly improve the quality."
+        if found.margins is None:
+            text = f"{knows} But its controller could not be checked.{off} {found.no_margins}"
+            return Sentence(
+                "Next", "Change the task or the controller", None, text, (*_links(found, failed), *links)
+            )
         text = (
-            "The twin knows enough: another flight would hardly improve the quality. What fails is the controller:"
+            f"{knows} What fails is the controller:"
             f" {failed[0].name}. Begin again from these flights with narrower bounds of its gains, or with effort in"
-            " the quality."
+            f" the quality.{off}"
         )
-        return Sentence("Next", "Ask for a calmer controller", None, text, (*_links(failed), *links))
+        return Sentence("Next", "Ask for a calmer controller", None, text, (*_links(found, failed), *links))
     if advice["gain"] is None:
         return Sentence(
             "Next", "Ask", None, "No flight was planned yet; ask for one to see what it would bring.", links
         )
     if advice["gain"] == 0.0:
-        text = "The models agree on what to fly: another flight would not improve the quality."
-        return Sentence("Next", "Stop", True, text, links)
+        text = f"The models agree on what to fly: another flight would not improve the quality.{off}"
+        return Sentence("Next", *stop, text, links)
     gain, scatter = _number(advice["gain"]), _number(advice["scatter"])
     if advice["stop"]:
         text = f"Another flight would improve the quality by {gain} {unit}".rstrip()
         return Sentence(
             "Next",
-            "Stop",
-            True,
-            f"{text}; the same flight repeated scatters by {scatter} {unit}".rstrip() + ".",
+            *stop,
+            f"{text}; the same flight repeated scatters by {scatter} {unit}".rstrip() + f".{off}",
             links,
         )
     text = f"Another flight may improve the quality by {gain} {unit}".rstrip()
@@ -260,11 +286,12 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
     )
 
 
-def _links(failed: list[Check]) -> tuple[tuple[str, str], ...]:
-    found = [
-        (EVIDENCE[check.name], check.name.replace("-", " ")) for check in failed[:3] if check.name in EVIDENCE
+def _links(found: Examination, failed: list[Check]) -> tuple[tuple[str, str], ...]:
+    places = evidence(found)
+    links = [
+        (places[check.name], check.name.replace("-", " ")) for check in failed[:3] if check.name in places
     ]
-    return (*found, ("checks", "all checks"))
+    return (*links, ("checks", "all checks"))
 
 
 def _number(value: float | None) -> str:

@@ -93,12 +93,19 @@ def advice_text(result: Mapping[str, Any]) -> str:
     words = f"{title}When test {advice['before_test']} was planned, knowing which model is right would"
     size = None if scatter is None else with_unit(scatter, unit)
     if advice["gain"] == 0.0:
-        stop = " For the controller, stop." if advice["stop"] else ""
+        stop = f" {_stop(result)}" if advice["stop"] else ""
         scattered = "" if size is None else f"\nThe scatter of one measurement is {size}."
         return f"{words} not have improved\nthe quality.{stop}{scattered}"
     words += f" have improved the quality\nby {with_unit(advice['gain'], unit)}{share}."
     if size is None:
         return words
     if advice["stop"]:
-        return f"{words}\nThat is below the scatter of one measurement, {size}. For the controller, stop."
+        return f"{words}\nThat is below the scatter of one measurement, {size}. {_stop(result)}"
     return f"{words}\nThat is above the scatter of one measurement, {size}: another experiment may pay."
+
+
+def _stop(result: Mapping[str, Any]) -> str:
+    """That no flight is needed, with what it does not bring the controller to."""
+    best = result["controller"]
+    off = None if best is None else best.get("off_target")
+    return f"For the controller, stop, or change the task. {off}" if off else "For the controller, stop."

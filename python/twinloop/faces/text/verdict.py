@@ -62,5 +62,7 @@ def _next(result: Mapping[str, Any]) -> str:
         return "look into the remarks, then fly another test: the twin cannot say what it would bring."
     if advice["stop"]:
         last = "fly this controller, then stop" if result["controller"]["measured"] is None else "stop"
-        return f"{last}; another flight would bring less than the scatter of one measurement."
+        less = "another flight would bring less than the scatter of one measurement."
+        off = result["controller"].get("off_target")
+        return f"{last}, or change the task; {less} {off}" if off else f"{last}; {less}"
     return f"another flight may bring {with_unit(advice['gain'], result['quality']['unit'])}."
