@@ -1,10 +1,15 @@
 """Pictures of a campaign: what was flown, what was foretold, and equal files for equal campaigns."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import twinloop as tl
-from twinloop.faces.plots import campaign_picture
+from twinloop.faces.figures.units import shown_unit
+from twinloop.faces.plots import _near, _runs, campaign_picture
 
 QUICK = {
     "moves": 1000,
@@ -70,3 +75,18 @@ def test_the_share_inside_the_band_is_counted_from_the_readings(campaign, drawn)
     rows = min(len(low), len(run.trajectory.states))
     inside = (run.trajectory.states[1:rows] >= low[1:rows]) & (run.trajectory.states[1:rows] <= high[1:rows])
     assert f"{100.0 * np.mean(inside):.0f} % of the readings inside the band" in drawn
+
+
+def test_a_target_that_no_flight_came_near_is_on_the_axis(campaign):
+    run = campaign.experiments[1]
+    far = run.test.target_state + 9.0
+    run = SimpleNamespace(test=replace(run.test, target_state=far), trajectory=run.trajectory)
+    beside = SimpleNamespace(run=run, simulated=run.trajectory, places=None)
+    found = SimpleNamespace(twin=SimpleNamespace(noise=None), best=None, beside=[beside])
+    figure = Figure()
+    _runs(figure, SimpleNamespace(signals=campaign.signals, experiments=[run], examine=lambda: found))
+    ends = run.trajectory.states[-1]
+    for axes, state, target, last in zip(figure.axes, campaign.signals.states, far, ends, strict=True):
+        value = shown_unit(state.unit)[0] * _near(target, last, state)
+        low, high = axes.get_ylim()
+        assert low < value < high

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from twinloop._ground.arrays import Floats
 from twinloop.campaign import Campaign, assessment, controller_to_fly
 from twinloop.campaign.examination.beside import Beside
 from twinloop.errors import NotAvailable
@@ -236,8 +237,9 @@ def _runs(figure: Any, campaign: Campaign) -> None:
             _inside_the_band(grid[-1, column], each, first=column == 0)
         grid[-1, column].set_xlabel("time (s)")
     for row, state in enumerate(states):
-        low, high = _extent([shown_unit(state.unit)[0] * run.trajectory.states[:, row] for run in runs])
-        grid[row, 0].set_ylim(low, high)
+        curves = [run.trajectory.states[:, row] for run in runs]
+        curves += [_target(run.test, row, run.trajectory)[1] for run in runs if run.test is not None]
+        grid[row, 0].set_ylim(*_extent([shown_unit(state.unit)[0] * curve for curve in curves]))
     figure.align_ylabels(grid[:, 0])
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
@@ -260,16 +262,23 @@ def _inside_the_band(axes: Any, found: Beside, first: bool) -> None:
 
 def _draw_target(axes: Any, test: Test, row: int, factor: float, flown: Trajectory) -> None:
     """The target of a state: a line, or a curve where it varies with time."""
-    signals, style = (
-        test.family.signals,
-        {"color": TARGET, "linewidth": 0.8, "linestyle": ":", "label": "target"},
-    )
-    if test.target_state.ndim == 1:
-        target = _near(test.target_state[row], flown.states[-1, row], signals.states[row])
-        axes.axhline(factor * target, **style)
+    style: dict[str, Any] = {"color": TARGET, "linewidth": 0.8, "linestyle": ":", "label": "target"}
+    t, target = _target(test, row, flown)
+    if len(target) == 1:
+        axes.axhline(factor * target[0], **style)
     else:
-        curve = signals.continued(test.target_state, flown.states[0])[:, row]
-        axes.plot(signals.dt * np.arange(len(curve)), factor * curve, **style)
+        axes.plot(t, factor * target, **style)
+
+
+def _target(test: Test, row: int, flown: Trajectory) -> tuple[Floats, Floats]:
+    """Times and values of the target of a state, next to what was flown; one value where it stays."""
+    signals = test.family.signals
+    if test.target_state.ndim == 1:
+        value = _near(test.target_state[row], flown.states[-1, row], signals.states[row])
+        return np.zeros(1), np.array([value])
+    curve = signals.continued(test.target_state, flown.states[0])[:, row]
+    t = np.asarray(signals.dt * np.arange(len(curve)), dtype=np.float64)
+    return t, np.asarray(curve, dtype=np.float64)
 
 
 def _near(value: float, reading: float, state: State) -> float:
@@ -279,7 +288,7 @@ def _near(value: float, reading: float, state: State) -> float:
 
 
 def _extent(curves: Sequence[Any]) -> tuple[float, float]:
-    """Limits that show the real runs; a twin that diverges must not flatten them."""
+    """Limits that show the real runs and their targets; a twin that diverges must not flatten them."""
     values = np.concatenate(curves)
     low, high = float(values.min()), float(values.max())
     margin = 0.25 * max(high - low, 1e-3)
