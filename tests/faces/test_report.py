@@ -79,6 +79,10 @@ def test_the_verdict_comes_first_with_numbers(good, bad, page):
         f"FIT of its free run is {np.min(last.fit):.3g} %" in words
         and f"{100 * last.inside:.0f} % of the readings" in words
     )
+    found = good.examine()
+    for share in (found.autocorrelation.outside, found.crosscorrelation.outside):
+        assert f"{100 * share:.0f} % of " in words
+    assert "residuals are noise" not in words
     of_bad = first_words(report_page(bad, "stop", {"name": "a pendulum"}, {}))
     assert "Do not trust it" in of_bad and "Fly it" not in of_bad
 

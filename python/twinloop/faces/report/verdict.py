@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from twinloop.campaign.examination.check import Check, Checks
+from twinloop.campaign.examination.checking import COLOURED
 from twinloop.campaign.examination.examination import Examination
 from twinloop.faces.figures.units import in_words, words
 from twinloop.faces.report.tables.table import shown_spread, shown_value
@@ -109,8 +110,13 @@ def _of_twin(found: Examination, checks: Checks) -> Sentence:
             text += " an effect"
         return Sentence("Twin", "Do not trust it", False, f"{_capital(text)}.{unseen}", _links(found, failed))
     text = unseen.strip()
-    if found.autocorrelation is not None:
-        text += " Its residuals are noise: they are correlated neither in time nor with the commands."
+    own, causes = found.autocorrelation, found.crosscorrelation
+    if own is not None and causes is not None:
+        text += (
+            f" Its residuals are hardly correlated: {100.0 * own.outside:.0f} % of the correlations in time and"
+            f" {100.0 * causes.outside:.0f} % of those with the commands are beyond their 99 % limits, where"
+            f" {100.0 * COLOURED:.0f} % are allowed."
+        )
     return Sentence(
         "Twin", "Trust it within the flown range", True, f"{text} {_scope(found)}".strip(),
         (("unseen", "unseen flight"), ("ranges", "flown range"), ("crosscorrelation", "residuals"),
