@@ -1,21 +1,26 @@
 """Sweeps: all combinations, the same bits on any cluster, whatever dies meanwhile; what is kept is not flown again."""
 
 import json
+import math
 import os
 import signal
+import statistics
 import subprocess
 import sys
 import threading
 import time
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import twinloop as tl
 from command import hearing_ctrl_c, invoke
 from lives import plain
 from twinloop.sweep import crossed, sweep
 from twinloop.sweep.jobs import Job, system_of
-from twinloop.sweep.summary import summarised
+from twinloop.sweep.summary import _quartiles, summarised
 from twinloop.sweep.workers import finished
 
 SMALL = {"model_population": ["20"], "model_generations": ["5", "10"], "test_population": ["10"],
@@ -131,10 +136,18 @@ def test_quartiles_are_those_of_the_campaigns(here):
             for outcome in outcomes
             if outcome.job.group == group
         )
-        assert row["best"][0] == best[0] and row["best"][2] == best[1]
+        assert row["best"] == pytest.approx(np.quantile(best, [0.25, 0.5, 0.75]))
         assert row["left"] == sum(
             run.left_envelope for o in outcomes if o.job.group == group for run in o.campaign.experiments
         )
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=9), st.integers(0, 9))
+def test_quartiles_are_those_of_numpy_also_where_some_twins_diverged(values, diverged):
+    assert _quartiles(values) == pytest.approx(np.quantile(values, [0.25, 0.5, 0.75]).tolist())
+    found = sorted(values) + [math.inf] * diverged
+    low, high = found[(len(found) - 1) // 2], found[len(found) // 2]
+    assert _quartiles([None, *found])[1] == pytest.approx(statistics.median([low, high]))
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
-
-import numpy as np
 
 from twinloop.campaign import Campaign
 from twinloop.faces.text import table
@@ -63,9 +62,20 @@ def _before(campaign: Campaign) -> float | None:
 
 
 def _quartiles(values: Iterable[float | None]) -> list[float] | None:
-    known = [value for value in values if value is not None]
-    # A twin that diverged left an infinite error: a rank knows what to do with it, a mean would not.
-    return np.quantile(known, QUARTERS, method="nearest").tolist() if known else None
+    known = sorted(value for value in values if value is not None)
+    return [_quantile(known, share) for share in QUARTERS] if known else None
+
+
+def _quantile(known: Sequence[float], share: float) -> float:
+    """A quantile between ranks (method 7 of Hyndman and Fan 1996), where some values may be infinite.
+
+    A twin that diverged left an infinite error: between it and a finite one everything is infinite.
+    """
+    place = share * (len(known) - 1)
+    below, part = math.floor(place), place % 1.0
+    if part == 0.0 or known[below] == known[below + 1]:
+        return known[below]
+    return known[below] + part * (known[below + 1] - known[below])
 
 
 def as_text(rows: Sequence[dict[str, Any]]) -> str:
