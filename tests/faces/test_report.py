@@ -87,6 +87,12 @@ def test_the_verdict_comes_first_with_numbers(good, bad, page):
     assert "Do not trust it" in of_bad and "Fly it" not in of_bad
 
 
+def test_a_flight_is_named_before_it_is_spoken_of(good):
+    band = Check("band", "twin", 0.5, 0.75, False, True, "Half of the readings were inside.")
+    of_twin, *_ = verdict(good.examine(), Checks([band]), summary(good, {"name": "p"}, {}))
+    assert of_twin.text.startswith("Too many readings of the last unseen flight were outside its band.")
+
+
 def table(text, name):
     """Cells of a table of the page, row by row; none where something else stands in its place."""
     part = text[text.index(f'id="{name}"') :]

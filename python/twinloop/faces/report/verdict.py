@@ -83,7 +83,7 @@ PLAIN = {
     "follows": "in free run it does not follow the experiments that it was learnt from",
     "remarks": "its remarks are serious",
     "unseen-flight": "it did not predict the last unseen flight",
-    "band": "too many readings of that flight were outside its band",
+    "band": "too many readings of the last unseen flight were outside its band",
     "quality": "the last quality that it predicted was far off",
     "whiteness": "its residuals are correlated in time",
     "commands": "its residuals are correlated with the commands",
