@@ -9,7 +9,7 @@ import numpy as np
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats
 from twinloop._ground.showing import Shown
-from twinloop._ground.texts import text
+from twinloop._ground.texts import in_unit, text
 from twinloop._ground.values import Value
 from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
@@ -129,7 +129,7 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
     if excess[k, i] > 1.0:
         state = signals.states[int(i)]
         raise InvalidInput(
-            f"Trajectory: expected {state.name} within {farthest[i]:g} {state.unit} (twice the divergence"
+            f"Trajectory: expected {state.name} within {in_unit(f'{farthest[i]:g}', state.unit)} (twice the divergence"
             f" factor times its scale), found {trajectory.states[k, i]:g} at row {k}; cut the record before"
             " it, or declare a larger scale."
         )
@@ -194,6 +194,7 @@ def _check_commands(trajectory: Trajectory, signals: Signals) -> None:
         k = int(np.argmax(beyond))
         if beyond[k] > high - low:
             raise InvalidInput(
-                f"Trajectory: expected {command.name} within its bounds, {low:g} to {high:g} {command.unit}, found"
-                f" {sent[k]:g} at row {k}; record what was sent, in that unit, or declare the bounds that it has."
+                f"Trajectory: expected {command.name} within its bounds,"
+                f" {in_unit(f'{low:g} to {high:g}', command.unit)}, found {sent[k]:g} at row {k}; record"
+                " what was sent, in that unit, or declare the bounds that it has."
             )

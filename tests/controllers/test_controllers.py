@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import twinloop as tl
 from oracles import Pid, same_bits
 from twinloop._experiment.hold_back import HoldBack
+from twinloop.controllers.gains import gain_units
 from twinloop.systems.quadrotor import gains_from_backstepping, gains_from_frequency
 
 ROTORS = [(0.0, 300.0)] * 4
@@ -249,3 +250,11 @@ def test_a_copy_goes_on_in_the_midst_of_a_run_and_shares_no_memory(pendulum_sign
     other.reset()
     afresh = family.controller(original.genes, EXCITED, HELD)
     assert same_bits(copied(other).command(*rows[0]), afresh.command(*rows[0]))
+
+
+@pytest.mark.parametrize(
+    ("output", "state", "units"),
+    [("1", "rad", ("1/rad", "1/(rad s)", "s/rad")), ("", "1", ("1", "1/s", "s")), ("kW", "", ("kW", "kW/s", "kW s"))],
+)  # fmt: skip
+def test_what_has_no_unit_is_not_in_the_units_of_gains(output, state, units):
+    assert gain_units(output, state) == units

@@ -12,7 +12,7 @@ from browser import SIZES, browser, kept, opened, serious
 from conftest import PENDULUM_GAINS
 from lives import CONTROLLER, SIGNALS, SMALL
 from twinloop.campaign.certificate import certificate
-from twinloop.faces.certificate import facts, page
+from twinloop.faces.certificate import _plots, facts, page
 from twinloop.faces.cli import main
 
 MAPPING = """
@@ -214,6 +214,13 @@ def test_margins_of_loops_that_are_unstable_or_around_a_twin_that_does_not_follo
     assert not found.granted
 
 
+def test_figures_of_a_certificate_are_in_the_units_of_its_tables():
+    prediction = {"t": [0.0, 3600.0], "states": [[0.0], [0.4]], "band": None, "target": [0.5]}
+    (plot,) = _plots(prediction, ["roll"], ["rad"])
+    assert plot["words"] == "from 0 to 0.4 rad in 3600 s" and "roll (rad)" in plot["svg"]
+    assert _plots(prediction, ["share"], ["1"])[0]["words"] == "from 0 to 0.4 in 3600 s"
+
+
 def test_nothing_told_is_no_certificate():
     with pytest.raises(tl.NotAvailable, match="at least one recorded experiment"):
         rig_campaign().certificate()
@@ -277,6 +284,11 @@ def test_the_page_opens_without_a_complaint_and_keeps_nobody_out(pages, name, si
         wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
         assert wide[0] <= wide[1]
         assert page.locator("figure > svg").count() == SIGNALS.n_x
+        smallest = (
+            "Math.min(...[...document.querySelectorAll('svg .tick')].map(t =>"
+            " parseFloat(getComputedStyle(t).fontSize) * t.getScreenCTM().a))"
+        )
+        assert page.evaluate(smallest) >= 0.75 * 15.0  # of the page's text
         for drawn in page.locator("svg").all():
             box = drawn.bounding_box()
             assert box["width"] > 150 and box["height"] > 60

@@ -28,7 +28,7 @@ from twinloop.faces.report.source import OWN
 from twinloop.faces.report.tables.controller import margins as margins_table
 from twinloop.faces.report.verdict import of_next, verdict
 from twinloop.faces.result import summary
-from twinloop.faces.text.controller import advice_text
+from twinloop.faces.text.controller import advice_text, advice_words
 from twinloop.faces.text.verdict import verdict as verdict_text
 from twinloop.records import to_text
 
@@ -377,6 +377,24 @@ def test_where_the_target_is_missed_nobody_is_told_just_to_stop(good, monkeypatc
     shown["controller"]["off_target"] = str(end)
     shown["advice"] |= {"trusted": True, "stop": True, "gain": 1e-5, "scatter": 1e-3}
     assert all(words in said(shown) for said in (verdict_text, advice_text))
+
+
+def test_a_quality_without_a_unit_leaves_no_gap_in_a_sentence(good, page):
+    result = summary(good, {"name": "a pendulum"}, {})
+    assert " ".join(advice_words(result).split()) in " ".join("".join(Elements(page).text).split())
+    for unit in ("", "1"):
+        result["quality"]["unit"] = unit
+        found = SimpleNamespace(best=object(), margins=object(), ending=None)
+        for stop in (True, False):
+            result["advice"] |= {"gain": 0.2, "scatter": 0.1, "trusted": True, "stop": stop}
+            for words in (advice_words(result), of_next(found, Checks([]), result).text):
+                assert "0.2" in words and not re.search(r" [.,;1]", words)
+
+
+def test_tables_of_the_report_are_in_the_units_of_its_figures(good, page):
+    (row,) = (row for row in table(page, "noise") if row[0] == "angle")
+    sensor = summary(good, {"name": "p"}, {})["twin"]["states"][0]["sensor"]
+    assert row[1] == "°" and float(row[3]) == pytest.approx(np.degrees(sensor), rel=1e-3)
 
 
 def test_checks_that_could_not_be_made_are_what_comes_next(good):

@@ -47,3 +47,13 @@ def one_line(text: str) -> str:
         text: from anybody, such as a unit.
     """
     return " ".join("".join(each if each.isprintable() else " " for each in text).split())
+
+
+def in_unit(text: str, unit: str) -> str:
+    """A number, or a range of them, in its unit; alone where that is none.
+
+    Args:
+        text: of the number.
+        unit: of it; "" and "1" are none.
+    """
+    return text if unit in ("", "1") else f"{text} {unit}"

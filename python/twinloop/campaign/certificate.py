@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.check import Checks
 from twinloop.campaign.examination.checking import checks
 from twinloop.campaign.history import Experiment
@@ -145,8 +146,9 @@ def _not_tested(
         f"Other starts and targets than the task's, and flights longer than {best.steps * signals.dt:g} s."
     )
     said += [
-        f"{use.name} is predicted between {use.predicted[0]:.3g} and {use.predicted[1]:.3g} {use.unit}, and was flown"
-        f" between {use.flown[0]:.3g} and {use.flown[1]:.3g}: outside the flown range the twin extrapolates."
+        f"{use.name} is predicted between {use.predicted[0]:.3g} and {in_unit(f'{use.predicted[1]:.3g}', use.unit)},"
+        f" and was flown between {use.flown[0]:.3g} and {use.flown[1]:.3g}: outside the flown range the twin"
+        " extrapolates."
         for use in uses
         if use.beyond_flown
     ]

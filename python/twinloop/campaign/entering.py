@@ -9,7 +9,7 @@ import numpy as np
 
 from twinloop import _core
 from twinloop._experiment.replay import Replay
-from twinloop._ground.texts import text
+from twinloop._ground.texts import in_unit, text
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.setup import Setup
 from twinloop.errors import InvalidInput
@@ -159,7 +159,7 @@ def check_first_reading(trajectory: Trajectory, test: Test) -> None:
     for i in np.flatnonzero(wrong):
         state = test.family.signals.states[int(i)]
         raise InvalidInput(
-            f"Campaign.tell: expected {state.name} to begin near {test.initial_state[i]:g} {state.unit}, found"
-            f" {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the sensor"
-            " was not ready: write the true state into the first row, or run the test again."
+            f"Campaign.tell: expected {state.name} to begin near {in_unit(f'{test.initial_state[i]:g}', state.unit)},"
+            f" found {trajectory.states[0, i]:g} in the first row and {trajectory.states[1, i]:g} in the second; the"
+            " sensor was not ready: write the true state into the first row, or run the test again."
         )

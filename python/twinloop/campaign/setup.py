@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats, floats, number, whole
+from twinloop._ground.texts import in_unit
 from twinloop._ground.values import Value
 from twinloop.campaign.coevolution.search import grammar, settings_of_tests, variation
 from twinloop.campaign.presets import AnyOptions, DefaultOptions, Options, options_of
@@ -372,8 +373,8 @@ def _check_reachable(what: str, values: Floats, limits: Limits) -> None:
     for value, state, limit in zip(values, limits.signals.states, limits.states, strict=True):
         if abs(value) >= limit:
             raise InvalidInput(
-                f"{what}: expected {state.name} within {limit:g} {state.unit}, the divergence factor times its scale,"
-                f" found {value:g}; give it in the unit that is declared, or declare a larger scale."
+                f"{what}: expected {state.name} within {in_unit(f'{limit:g}', state.unit)}, the divergence factor"
+                f" times its scale, found {value:g}; give it in the unit that is declared, or declare a larger scale."
             )
 
 
@@ -388,8 +389,9 @@ def _check_inside(what: str, values: Floats, signals: Signals, margin: float) ->
                 value -= round((value - middle) / state.period) * state.period
             if not low + room <= value <= high - room:
                 raise InvalidInput(
-                    f"{what}: expected {state.name} within {low + room:g} to {high - room:g} {state.unit}, its envelope"
-                    f" less the margin of {margin:g}, found {value:g}; declare a wider envelope, or move it."
+                    f"{what}: expected {state.name} within {in_unit(f'{low + room:g} to {high - room:g}', state.unit)},"
+                    f" its envelope less the margin of {margin:g}, found {value:g}; declare a wider envelope, or move"
+                    " it."
                 )
 
 

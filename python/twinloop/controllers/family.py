@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from twinloop import _core
 from twinloop._experiment.hold_back import HoldBack
 from twinloop._ground.arrays import Floats, floats, number
+from twinloop._ground.texts import in_unit
 from twinloop._ground.values import Value
 from twinloop.controllers.gains import FixedGain, Gain
 from twinloop.errors import InvalidInput, unknown
@@ -107,8 +108,8 @@ class Family(Value):
         for gain, value in zip(self.gains, values, strict=True):
             if not gain.low <= value <= gain.high:
                 raise InvalidInput(
-                    f"Gain {gain.name!r}: expected {gain.low:g} to {gain.high:g} {gain.unit}, found"
-                    f" {value:g}; change it, or widen the bounds of the family."
+                    f"Gain {gain.name!r}: expected {in_unit(f'{gain.low:g} to {gain.high:g}', gain.unit)},"
+                    f" found {value:g}; change it, or widen the bounds of the family."
                 )
         values.flags.writeable = False
         return values

@@ -144,8 +144,12 @@ def gain_units(output: str, state: str) -> tuple[str, str, str]:
         state: unit of what it controls.
 
     Returns:
-        The three units, such as "N m/rad", "N m/(rad s)" and "N m s/rad".
+        The three units, such as "N m/rad", "N m/(rad s)" and "N m s/rad"; "1/rad", "1/(rad s)" and "s/rad" of an
+        output without a unit.
     """
     top = f"({output})" if "/" in output else output or "1"
     bottom = f"({state})" if "/" in state or " " in state else state or "1"
-    return f"{top}/{bottom}", f"{top}/({bottom} s)", f"{top} s/{bottom}"
+    over = "s" if top == "1" else f"{top} s"
+    if bottom == "1":
+        return top, f"{top}/s", over
+    return f"{top}/{bottom}", f"{top}/({bottom} s)", f"{over}/{bottom}"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from twinloop import __version__
+from twinloop._ground.texts import in_unit
 from twinloop.autopilots import Autopilot
 from twinloop.campaign import Campaign
 from twinloop.campaign.assessment import predicted_quality
@@ -18,7 +19,7 @@ from twinloop.errors import NotAvailable
 from twinloop.faces.figures.figure import Band, Line, Mark, Panel
 from twinloop.faces.figures.style import DARK, LIGHT, RULES, variables
 from twinloop.faces.figures.svg import panel_svg
-from twinloop.faces.figures.units import labelled, shown_unit, words
+from twinloop.faces.figures.units import words
 from twinloop.faces.result import plain_dict
 from twinloop.faces.text.words import quality_words
 from twinloop.planning.leaving import risk_of_what, risk_words
@@ -175,17 +176,16 @@ def _plots(
     target = np.broadcast_to(np.array(prediction["target"]), states.shape) if states.size else states
     plots = []
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):
-        factor, label = labelled(name, unit)
+        # In the unit that is declared, as the tables beside them and the sentences below.
+        label = f"{words(name)} ({unit or '1'})"
         marks: list[Mark] = (
-            []
-            if band is None
-            else [Band(t, factor * band[0, :, i], factor * band[1, :, i], "twin", "90 % band")]
+            [] if band is None else [Band(t, band[0, :, i], band[1, :, i], "twin", "90 % band")]
         )
         marks += [
-            Line(t, factor * target[: len(states), i], "target", "target"),
-            Line(t, factor * states[:, i], "twin", "twin"),
+            Line(t, target[: len(states), i], "target", "target"),
+            Line(t, states[:, i], "twin", "twin"),
         ]
-        first, last = factor * states[0, i], factor * states[-1, i]
-        said = f"from {first:.3g} to {last:.3g} {shown_unit(unit)[1]} in {t[-1]:.3g} s"
+        first, last = states[0, i], states[-1, i]
+        said = f"from {first:.3g} to {in_unit(f'{last:.3g}', unit)} in {t[-1]:g} s"
         plots.append({"svg": panel_svg(Panel(words(name), marks, "time (s)", label)), "words": said})
     return plots

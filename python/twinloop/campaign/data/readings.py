@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.data.reports import Derived, derived, is_rate, repeats
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
@@ -62,8 +63,8 @@ def suspicious(runs: Sequence[Trajectory], signals: Signals) -> Iterator[Remark]
         if min(map(np.min, sent)) == max(map(np.max, sent)):
             yield note(
                 "constant-command",
-                f"{command.name} is {sent[0][0]:g} {command.unit} in every row: its effect cannot be learnt;"
-                " check that the command that was sent was logged.",
+                f"{command.name} is {in_unit(f'{sent[0][0]:g}', command.unit)} in every row: its effect cannot be"
+                " learnt; check that the command that was sent was logged.",
             )
     moved = [i for i in range(signals.n_x) if any(np.ptp(run.states[:, i]) > 0.0 for run in runs)]
     if moved and all(ratio([run.states[:, i] for run in runs]) > WHITE for i in moved):

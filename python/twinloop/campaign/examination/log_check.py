@@ -9,6 +9,7 @@ import numpy as np
 
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.sent import (
@@ -240,9 +241,9 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
         if column.beyond:
             yield serious(
                 "beyond-bounds",
-                f"{name} is beyond its bounds in {100.0 * column.beyond:.3g} % of the rows ({column.least:g} to"
-                f" {column.greatest:g} {column.unit}): check its unit, and that the sent command was logged,"
-                " not the requested one.",
+                f"{name} is beyond its bounds in {100.0 * column.beyond:.3g} % of the rows ("
+                f"{in_unit(f'{column.least:g} to {column.greatest:g}', column.unit)}): check its"
+                " unit, and that the sent command was logged, not the requested one.",
             )
         elif (column.at_bound or 0.0) > SATURATED and column.least != column.greatest:
             yield note(
@@ -256,7 +257,7 @@ def _of_column(column: Column, rows: int) -> Iterator[Remark]:
     if column.least == column.greatest:
         yield serious(
             "still",
-            f"{name} is {column.least:g} {column.unit} in every row: its sensor was off, or not logged.",
+            f"{name} is {in_unit(f'{column.least:g}', column.unit)} in every row: its sensor was off, or not logged.",
         )
     elif column.moved is not None and column.moved < MOVED:
         yield note(
@@ -280,14 +281,14 @@ def _of_scales(states: Floats, signals: Signals) -> Iterator[Remark]:
         if most > 2.0 * Limits(signals).states[i]:
             yield serious(
                 "scale",
-                f"{state.name} reaches {most:.4g} {state.unit}, {most / state.scale:.3g} times its scale: check its"
-                " unit (degrees, milli?), or declare a larger scale.",
+                f"{state.name} reaches {in_unit(f'{most:.4g}', state.unit)}, {most / state.scale:.3g} times its"
+                " scale: check its unit (degrees, milli?), or declare a larger scale.",
             )
         elif 0.0 < most < SMALL * state.scale:
             yield note(
                 "scale",
-                f"{state.name} stays within {most:.3g} {state.unit}, {most / state.scale:.2g} of its scale: check its"
-                " unit.",
+                f"{state.name} stays within {in_unit(f'{most:.3g}', state.unit)}, {most / state.scale:.2g} of its"
+                " scale: check its unit.",
             )
 
 

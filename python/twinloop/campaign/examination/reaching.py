@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinloop._ground.arrays import Floats
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.use import AT_A_BOUND
 from twinloop.signals import Command, Signals, State
 from twinloop.trajectory import Trajectory
@@ -37,8 +38,8 @@ class Miss:
     share: float
 
     def __str__(self) -> str:
-        unit = self.state.unit
-        return f"{self.off:.3g} {unit} from {self.state.name}'s target of {self.target:.4g} {unit}"
+        off, target = (in_unit(text, self.state.unit) for text in (f"{self.off:.3g}", f"{self.target:.4g}"))
+        return f"{off} from {self.state.name}'s target of {target}"
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,10 @@ class Ending:
         """Where it ends, if that is not at the target; else empty."""
         if not self.misses:
             return ""
-        held = [f"{command.name} at its bound of {bound:.4g} {command.unit}" for command, bound in self.held]
+        held = [
+            f"{command.name} at its bound of {in_unit(f'{bound:.4g}', command.unit)}"
+            for command, bound in self.held
+        ]
         return f"It ends {', '.join(map(str, self.misses))}{', with ' * bool(held)}{', '.join(held)}."
 
 
@@ -87,7 +91,7 @@ def ending(
     noise = np.zeros(signals.n_x) if sensors is None else NOISE * sensors
     misses = tuple(
         Miss(signals.states[i], float(target[i]), float(off[i]), float(shares[i]))
-        for i in np.flatnonzero((weights != 0.0) & (shares > REACHED) & (off > noise))
+        for i in np.flatnonzero((weights != 0.0) & (shares > REACHED) & (off > noise)).tolist()
     )
     return Ending(misses, _held(flight.commands[-last:], signals.commands))
 

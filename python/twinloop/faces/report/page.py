@@ -27,6 +27,7 @@ from twinloop.faces.report.tables import twin as of_twin
 from twinloop.faces.report.tables.table import Table
 from twinloop.faces.report.verdict import evidence, verdict
 from twinloop.faces.result import summary
+from twinloop.faces.text.controller import advice_words
 from twinloop.planning.leaving import risk_words
 
 UNNAMED = "campaign"
@@ -160,11 +161,10 @@ def _figures(found: Examination, names: Sequence[str]) -> list[Figure]:
 
 def _next(campaign: Campaign, result: Mapping[str, Any]) -> dict[str, object]:
     """What is waiting to be flown, and what another flight would bring."""
+    known = "advice" in result and result["advice"]["gain"] is not None
     return {
         "waiting": campaign.waiting,
-        "advice": result.get("advice"),
-        "unit": result["quality"]["unit"],
-        "off_target": (result["controller"] or {}).get("off_target"),
+        "words": advice_words(result) if known else "",
         "flights": campaign.setup.predicted_flights,
     }
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.check import Check, Checks
 from twinloop.campaign.examination.checking import COLOURED
 from twinloop.campaign.examination.examination import Examination
@@ -239,7 +240,8 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
     unit = result["quality"]["unit"]
     links = (("next", "next experiment"),)
     off = _off_target(found)
-    stop = ("Stop, or change the task", None) if off else ("Stop", True)
+    stop = "Stop, or change the task" if off else "Stop"
+    good = None if off else True
     if advice is None:
         return Sentence(
             "Next", "You decide", None, "The preset paper does not say what another test would bring.", links
@@ -272,22 +274,23 @@ def of_next(found: Examination, checks: Checks, result: Mapping[str, Any]) -> Se
         )
     if advice["gain"] == 0.0:
         text = f"The models agree on what to fly: another flight would not improve the quality.{off}"
-        return Sentence("Next", *stop, text, links)
+        return Sentence("Next", stop, good, text, links)
     gain, scatter = _number(advice["gain"]), _number(advice["scatter"])
     if advice["stop"]:
-        text = f"Another flight would improve the quality by {gain} {unit}".rstrip()
+        text = f"Another flight would improve the quality by {in_unit(gain, unit)}"
         return Sentence(
             "Next",
-            *stop,
-            f"{text}; the same flight repeated scatters by {scatter} {unit}".rstrip() + f".{off}",
+            stop,
+            good,
+            f"{text}; the same flight repeated scatters by {in_unit(scatter, unit)}.{off}",
             links,
         )
-    text = f"Another flight may improve the quality by {gain} {unit}".rstrip()
+    text = f"Another flight may improve the quality by {in_unit(gain, unit)}"
     return Sentence(
         "Next",
         "Fly another",
         None,
-        f"{text}; one measurement scatters by {scatter} {unit}".rstrip() + ".",
+        f"{text}; one measurement scatters by {in_unit(scatter, unit)}.",
         links,
     )
 

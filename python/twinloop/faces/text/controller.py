@@ -81,16 +81,24 @@ def _risk(risk: float | None, result: Mapping[str, Any]) -> str:
 
 
 def advice_text(result: Mapping[str, Any]) -> str:
-    """What another experiment would bring."""
+    """What another experiment would bring, under its title."""
+    return f"ANOTHER EXPERIMENT?\n{advice_words(result)}"
+
+
+def advice_words(result: Mapping[str, Any]) -> str:
+    """What another experiment would bring.
+
+    Args:
+        result: a `twinloop.faces.result.summary` of a preset that knows it.
+    """
     advice, unit = result["advice"], result["quality"]["unit"]
-    title = "ANOTHER EXPERIMENT?\n"
     scatter = advice["scatter"]
     if advice["gain"] is None:
-        return title + "No flight was planned yet; ask for one to see what it would bring."
+        return "No flight was planned yet; ask for one to see what it would bring."
     if not advice["trusted"]:
-        return f"{title}The twin is not reliable yet, so it cannot say. Look into the remarks, then fly another test."
+        return "The twin is not reliable yet, so it cannot say. Look into the remarks, then fly another test."
     share = f", {100.0 * advice['share']:.2g} % of what it is now" if advice["share"] is not None else ""
-    words = f"{title}When test {advice['before_test']} was planned, knowing which model is right would"
+    words = f"When test {advice['before_test']} was planned, knowing which model is right would"
     size = None if scatter is None else with_unit(scatter, unit)
     if advice["gain"] == 0.0:
         stop = f" {_stop(result)}" if advice["stop"] else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from twinloop._ground.texts import in_unit
 from twinloop.campaign.examination.examination import Examination
 
 
@@ -29,7 +30,7 @@ QUALITIES = {
 
 def with_unit(value: float, unit: str) -> str:
     """A value in its unit."""
-    return f"{value:.2g} {unit}".rstrip()
+    return in_unit(f"{value:.2g}", unit)
 
 
 def quality_words(kind: str, unit: str) -> str:

@@ -28,14 +28,14 @@ def states(result: Mapping[str, Any]) -> Table | None:
     twin = result["twin"]
     if "states" not in twin:
         return None
-    rows = [
-        [
-            words(state["name"]), state["unit"] or "1", state["error"], state["sensor"],
-            state["error"] / state["sensor"] if state["sensor"] and state["error"] is not None else None,
+    rows = []
+    for state in twin["states"]:
+        (factor, unit), error, sensor = shown_unit(state["unit"]), state["error"], state["sensor"]
+        rows.append([
+            words(state["name"]), unit, None if error is None else factor * error, factor * sensor,
+            error / sensor if sensor and error is not None else None,
             1e3 * state["offset"],
-        ]
-        for state in twin["states"]
-    ]  # fmt: skip
+        ])  # fmt: skip
     head = ["state", "unit", "error of whole flights", "sensor's noise", "ratio", "read late by (ms)"]
     note = (
         "Errors are root mean squares of flown minus simulated; noise is a standard deviation, as estimated. A ratio"
@@ -49,17 +49,13 @@ def disturbances(result: Mapping[str, Any]) -> Table | None:
     found = result["twin"].get("disturbances")
     if not found:
         return None
-    rows = [
-        [
-            words(each["name"]),
-            each["unit"] or "1",
-            each["white"] or None,
-            each["correlated"] or None,
-            each["correlation_time"] or None,
-            CAUSES[each["cause"]] if each["correlated"] else None,
-        ]
-        for each in found
-    ]
+    rows = []
+    for each in found:
+        factor, unit = shown_unit(each["unit"])
+        rows.append([
+            words(each["name"]), unit, factor * each["white"] or None, factor * each["correlated"] or None,
+            each["correlation_time"] or None, CAUSES[each["cause"]] if each["correlated"] else None,
+        ])  # fmt: skip
     head = [
         "state",
         "unit",
