@@ -1,6 +1,7 @@
 """What is taken away gives the twin's numbers: run by Python, compiled by a C compiler, read by SymPy."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -202,6 +203,26 @@ def test_latex_of_a_step_of_euler_says_which_of_the_states_goes_on_by_which():
     assert r"+ 0.05 \left(\mathit{rate}\right)" in twin_of(PENDULUM, "explicit-euler").export("latex")
     body = TWINS["kinematics, semi-implicit Euler"]().export("latex")
     assert r"\mathit{q}_{k+1} \, \cos\left(\mathit{roll}\right)" in body and "t_" not in body
+
+
+@pytest.mark.parametrize("form", ["acceleration", "explicit-euler"])
+def test_a_long_sum_is_broken_over_lines_that_a_page_holds(form):
+    pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+    lines = [
+        line
+        for i, j in pairs
+        for line in (f"r5 = r{i} * r{j}", f"r5 = r5 * {0.123456 + i + j}", "r4 = r4 + r5")
+    ]
+    text = twin_of(lines, form).export("latex")
+    rows = text[text.index("{align*}") + 9 : text.index("\\end")].split("\\\\")
+    of_rate = rows[1:]
+    assert len(rows) > 3 and all(row.lstrip().startswith(r"&\quad + ") for row in of_rate[1:])
+    for row in rows:
+        assert row.count("&") == 1 and row.count(r"\left") == row.count(r"\right")
+        right = re.sub(r"\\[a-zA-Z]+|[\\{}, ]", "", row.split("&")[1])
+        assert len(right) <= 70
+    assert all(f"{0.123456 + i + j:.6g} " in text for i, j in pairs)
+    assert text.count(r"\Bigl(") == text.count(r"\Bigr)") == (form == "explicit-euler")
 
 
 def test_latex_says_what_the_equations_say():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 
 from twinloop._core import __version__
@@ -14,7 +15,7 @@ from twinloop.law.exports.python_source import equation_roots, joined
 from twinloop.law.expressions import Expressions
 from twinloop.law.forms import DERIVATIVES, EULER
 from twinloop.law.law import Law
-from twinloop.law.writing import EXACT, Dialect, Writer
+from twinloop.law.writing import EXACT, Dialect, Term, Writer
 
 SYMPY = Dialect({
     "abs": "sp.Abs({})", "sqrt": "sp.sqrt(sp.Abs({}))", "min": "sp.Min({}, {})", "max": "sp.Max({}, {})",
@@ -117,6 +118,10 @@ LATEX = Dialect(
     longest=400,
 )
 
+WIDE = 64
+"""Characters, as a reader sees them, that the right side of an equation may be long on one line of a page."""
+ON_ANOTHER_LINE = " \\\\\n  &\\quad "
+
 IN_FULL = replace(LATEX, longest=sys.maxsize, worth=sys.maxsize)
 """No part of an equation has a name."""
 
@@ -138,7 +143,7 @@ def latex_source(law: Law, digits: int = 6) -> str:
     roots = [written(target, expansion[root]) for root in law.outputs]
     writer = Writer(target, roots, [latex_name(symbol) for symbol in law.symbols], digits, "t_", False, LATEX)
     lines = [
-        rf"  {name} &= {joined(writer.terms(number, define=True), ' ')}"
+        rf"  {name} &= {_in_lines(writer.terms(number, define=True))}"
         for number, name in writer.names.items()
     ]
     outputs = dict(zip(law.outputs, roots, strict=True))
@@ -151,7 +156,7 @@ def latex_source(law: Law, digits: int = 6) -> str:
             terms = Writer(
                 law.expressions, every, _given_symbols(law, place), digits, "t_", False, IN_FULL
             ).terms(root)
-        right = joined(terms, " ")
+        right = _in_lines(terms)
         if law.form == "acceleration":
             left = rf"\frac{{\mathrm{{d}} {symbol}}}{{\mathrm{{d}} t}}"
         else:
@@ -159,7 +164,12 @@ def latex_source(law: Law, digits: int = 6) -> str:
             if law.form == "increment":
                 right = f"{symbol} - {right[1:]}" if right.startswith("-") else f"{symbol} + {right}"
             elif law.form in EULER:
-                right = rf"{symbol} + {_latex_number(law.signals.dt, digits)} \left({right}\right)"
+                # What grows with its content ends on its line.
+                left_bracket, right_bracket = (
+                    (r"\Bigl(", r"\Bigr)") if ON_ANOTHER_LINE in right else (r"\left(", r"\right)")
+                )
+                step = _latex_number(law.signals.dt, digits)
+                right = f"{symbol} + {step} {left_bracket}{right}{right_bracket}"
         lines.append(rf"  {left} &= {right}")
     lines = [re.sub(r"\bt_([0-9]+)", r"t_{\1}", line) for line in lines]
     for place, offset in _late(law):
@@ -168,6 +178,33 @@ def latex_source(law: Law, digits: int = 6) -> str:
         lines.append(rf"  {symbol}_{{\mathrm{{read}}}}(t) &= {symbol}(t {sign} {shift}\,\mathrm{{s}})")
     notes = "".join(f"% {note}\n" for note in _notes(law, digits))
     return notes + "\\begin{align*}\n" + " \\\\\n".join(lines) + "\n\\end{align*}\n"
+
+
+def _in_lines(terms: Sequence[Term]) -> str:
+    """A sum, broken over lines between its terms where it is wider than a page."""
+    first, *rest = terms
+    text = ("-" if first[0] == "-" else "") + first[1]
+    width = _seen(text)
+    for sign, term in rest:
+        size = _seen(term) + 3
+        if width + size > WIDE:
+            text += ON_ANOTHER_LINE
+            width = 0
+        else:
+            text += " "
+        text += f"{sign} {term}"
+        width += size
+    return text
+
+
+def _seen(text: str) -> int:
+    """How many characters wide a reader sees a formula, about: of a fraction the wider part."""
+    fraction = re.compile(r"\\frac{((?:[^{}]|{[^{}]*})*)}{((?:[^{}]|{[^{}]*})*)}")
+    while found := fraction.search(text):
+        wider = max(found.groups(), key=_seen)
+        text = text[: found.start()] + wider + text[found.end() :]
+    text = re.sub(r"\\(?:mathit|mathrm|left|right|sqrt|quad|,|(?=_))", "", text)
+    return len(re.sub(r"[{}^\\ ]", "", text.replace(r"\cdot", "·")))
 
 
 def _notes(law: Law, digits: int) -> list[str]:
