@@ -29,6 +29,7 @@ def test_table_1_shows_the_papers_settings_beside_ours():
     text = reproduce("table1", "--smoke")
     for words in ("15000", "250", "Table I", "+ − × ÷"):
         assert words in text
+    assert " 1 run asked" in text
     rows = {row["setting"]: row for row in json.loads(reproduce("table1", "--json"))["rows"]}
     stated = [row for row in rows.values() if row["paper"] not in ("not stated", "the whole set")]
     assert all(row["paper"] == row["ours"] for row in stated)

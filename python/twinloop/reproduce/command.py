@@ -92,12 +92,12 @@ def _footer(result: dict[str, object], picture: Path | None) -> str:
     assert isinstance(differences, list) and isinstance(info, dict)
     lines += [f"- {difference}" for difference in differences]
     lines.append(
-        f"Seed {result['seed']}, {result['runs_asked']} runs asked, {result['model_generations']} generations"
-        f" of models, {result['test_generations']} of tests; {info['seconds']:.1f} s on {info['threads']}"
-        " threads."
+        f"Seed {result['seed']}, {result['runs_asked']} run{'s' * (result['runs_asked'] != 1)} asked,"
+        f" {result['model_generations']} generations of models, {result['test_generations']} of tests;"
+        f" {info['seconds']:.1f} s on {info['threads']} thread{'s' * (info['threads'] != 1)}."
     )
     if result["smoke"]:
-        lines.append("A smoke run: the numbers mean nothing.")
+        lines.append("A smoke run: the numbers mean nothing, and versions may come out equal.")
     if result["interrupted"]:
         lines.append("Interrupted: only what was finished is shown.")
     if picture is not None:
