@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 __all__ = [
@@ -33,6 +33,23 @@ class InvalidInput(TwinloopError, ValueError):
     """An argument cannot be used; the call has changed nothing."""
 
 
+class AtRow(InvalidInput):
+    """A row of a record cannot be used; `at` names it by its line where the record stands in a file.
+
+    Args:
+        before: the sentence up to the row.
+        row: its index.
+        after: the rest of the sentence.
+    """
+
+    def __init__(self, before: str, row: int, after: str) -> None:
+        super().__init__(f"{before} {row_name(row)}{after}")
+        self.parts = before, row, after
+
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str]]:
+        return InvalidInput, (str(self),)
+
+
 class SystemFailure(TwinloopError, RuntimeError):
     """The system under test raised an exception, or returned something that is no next state."""
 
@@ -57,12 +74,29 @@ class RemarkWarning(UserWarning):
     """A serious remark on data or a twin: check it before you use the result. `twin.remarks` has it as a value."""
 
 
+def row_name(row: int, lines: Sequence[int] | None = None) -> str:
+    """What every sentence calls a row of a record.
+
+    In a file it is its line, as an editor shows it: from 1, with the header and empty lines. In arrays it is the index
+    that Python takes: from 0.
+
+    Args:
+        row: its index.
+        lines: of each row in its file; None: the record stands in no file with lines.
+
+    Returns:
+        Such as "line 46" or "row 44".
+    """
+    return f"row {row}" if lines is None else f"line {lines[row]}"
+
+
 @contextmanager
-def at(where: str) -> Iterator[None]:
+def at(where: str, lines: Sequence[int] | None = None) -> Iterator[None]:
     """Adds the place to the errors of a block, such as a file and its section.
 
     Args:
         where: such as a file and its section.
+        lines: of each row of a record in that file; None: rows are called by their index.
 
     Raises:
         InvalidInput: as inside, with the place before it.
@@ -70,7 +104,20 @@ def at(where: str) -> Iterator[None]:
     try:
         yield
     except InvalidInput as reason:
-        raise InvalidInput(f"{where}: {reason}") from reason
+        raise InvalidInput(f"{where}: {in_file(reason, lines)}") from reason
+
+
+def in_file(reason: InvalidInput, lines: Sequence[int] | None) -> str:
+    """The sentence of an error, with a row by its line.
+
+    Args:
+        reason: the error.
+        lines: of each row in its file; None: the record stands in no file with lines.
+    """
+    if not isinstance(reason, AtRow):
+        return str(reason)
+    before, row, after = reason.parts
+    return f"{before} {row_name(row, lines)}{after}"
 
 
 def unknown(kind: str, found: object, known: Iterable[str]) -> InvalidInput:

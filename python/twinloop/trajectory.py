@@ -11,7 +11,7 @@ from twinloop._ground.arrays import Floats, floats
 from twinloop._ground.showing import Shown
 from twinloop._ground.texts import in_unit, text
 from twinloop._ground.values import Value
-from twinloop.errors import InvalidInput, unknown
+from twinloop.errors import AtRow, InvalidInput, unknown
 from twinloop.records import Recorded
 from twinloop.records.reading import MOST_ITEMS
 from twinloop.signals import Signals
@@ -58,9 +58,10 @@ class Trajectory(Shown, Value, Recorded, kind="trajectory"):
         commands = floats("Trajectory.commands (one row less than states)", self.commands, (len(t) - 1, None))
         if len(t) > 1 and float(np.diff(t).min()) <= 0.0:
             k = int(np.argmin(np.diff(t)))
-            raise InvalidInput(
-                f"Trajectory.t: expected times that grow, found {t[k]:g} s then {t[k + 1]:g} s at rows {k}"
-                f" and {k + 1}; sort the record or remove repeated rows."
+            raise AtRow(
+                f"Trajectory.t: expected times that grow, found {t[k]:g} s and then {t[k + 1]:g} s at",
+                k + 1,
+                "; sort the record or remove repeated rows.",
             )
         if text("Trajectory.ended", self.ended) not in ENDINGS:
             raise unknown("end of a trajectory", self.ended, ENDINGS)
@@ -128,10 +129,11 @@ def check_recorded(trajectory: object, limits: Limits, steps: int | None, least:
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     if excess[k, i] > 1.0:
         state = signals.states[int(i)]
-        raise InvalidInput(
+        raise AtRow(
             f"Trajectory: expected {state.name} within {in_unit(f'{farthest[i]:g}', state.unit)} (twice the divergence"
-            f" factor times its scale), found {trajectory.states[k, i]:g} at row {k}; cut the record before"
-            " it, or declare a larger scale."
+            f" factor times its scale), found {trajectory.states[k, i]:g} at",
+            int(k),
+            "; cut the record before it, or declare a larger scale.",
         )
     _check_commands(trajectory, signals)
 
@@ -149,11 +151,11 @@ def check_period(trajectory: Trajectory, signals: Signals) -> None:
     intervals = np.diff(trajectory.t)
     worst = int(np.argmax(np.abs(intervals - signals.dt)))
     if abs(intervals[worst] - signals.dt) > JITTER * signals.dt * (1.0 + 1e-9):
-        raise InvalidInput(
-            f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s after row"
-            f" {worst + 1}, t = {trajectory.t[worst]:g} s; put in a row that was lost, give t in s, or declare the"
-            " system's own period as dt. Where the loop only jitters around it, pass the even times dt * np.arange(n"
-            " + 1)."
+        raise AtRow(
+            f"Trajectory: expected a period of {signals.dt:g} s within 1 %, found {intervals[worst]:g} s after",
+            worst,
+            f", t = {trajectory.t[worst]:g} s; put in a row that was lost, give t in s, or declare the system's own"
+            " period as dt. Where the loop only jitters around it, pass the even times dt * np.arange(n + 1).",
         )
 
 
@@ -193,8 +195,10 @@ def _check_commands(trajectory: Trajectory, signals: Signals) -> None:
         beyond = np.maximum(low - sent, sent - high)
         k = int(np.argmax(beyond))
         if beyond[k] > high - low:
-            raise InvalidInput(
+            raise AtRow(
                 f"Trajectory: expected {command.name} within its bounds,"
-                f" {in_unit(f'{low:g} to {high:g}', command.unit)}, found {sent[k]:g} at row {k}; record"
-                " what was sent, in that unit, or declare the bounds that it has."
+                f" {in_unit(f'{low:g} to {high:g}', command.unit)}, found"
+                f" {sent[k]:g} at",
+                k,
+                "; record what was sent, in that unit, or declare the bounds that it has.",
             )

@@ -242,7 +242,7 @@ def test_rows_that_are_missing_within_a_flight_are_no_flight_that_was_stopped(fo
     lines = Path("flight.csv").read_text(encoding="utf-8").splitlines()
     Path("flight.csv").write_text("\n".join(lines[:8] + lines[10:]), encoding="utf-8")
     refused = run("tell", "rig.db", "0", "flight.csv")
-    assert refused.exit_code == 2 and "found 0.15 s after row 7" in refused.stderr
+    assert refused.exit_code == 2 and "found 0.15 s after line 8" in refused.stderr
     assert "--aborted" not in refused.stderr
 
 
@@ -510,19 +510,19 @@ def test_a_note_may_hold_any_mark_and_a_line_end_in_quotes(tmp_path, mark):
         ),
         (
             "t,angle,rate,torque\n0,0,0,0\n0.05,0,,0\n0.1,0,,0\n0.15,0,0,0\n",
-            "for rate in each row, found nan in row 2, t = 0.05 s .2 such rows.; fill it in, or cut",
+            "for rate in each row, found nan in line 3, t = 0.05 s .2 such rows.; fill it in, or cut",
         ),
-        ("t,angle,rate,torque\n0.05,0,0,0\n0,0,0,0\n", "log.csv: .*times that grow"),
+        ("t,angle,rate,torque\n0.05,0,0,0\n0,0,0,0\n", "log.csv: .*times that grow.* at line 3; sort"),
         (
             "t,angle,rate,torque\n0,0,0,0\n0.05,0,nan,0\n",
-            "log.csv: .*for rate in each row, found nan in row 2, t = 0.05 s",
+            "log.csv: .*for rate in each row, found nan in line 3, t = 0.05 s",
         ),
         (
             "t,angle,rate,torque\n0,1_000,0,0\n0.05,0,0,0\n",
             "line 2: expected a number for angle, found '1_000'",
         ),
         ("t,angle,rate,torque\n0,0,٣,0\n0.05,0,0,0\n", "line 2: expected a number for rate, found '٣'"),
-        ("t,angle,rate,torque\n0,0,0,inf\n0.05,0,0,0\n", "for torque in each row, found inf in row 1"),
+        ("t,angle,rate,torque\n0,0,0,inf\n0.05,0,0,0\n", "for torque in each row, found inf in line 2"),
         ("t,angle,rate,torque\n", "log.csv: .*record the run"),
     ],
 )

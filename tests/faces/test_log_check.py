@@ -1,13 +1,17 @@
 """`twinloop check`: what is wrong with a log is said before it is told, each fault by its own name."""
 
 import json
+import pickle
+import re
 
 import numpy as np
 import pytest
 
+import twinloop as tl
 from command import invoke
-from lives import RIG, by_hand
+from lives import RIG, SIGNALS, by_hand
 from twinloop.logs import write_columns
+from twinloop.trajectory import check_recorded
 
 FULL = RIG.replace('derivative_of = "angle"', 'derivative_of = "angle"\nenvelope = [-12.0, 12.0]')
 
@@ -64,9 +68,9 @@ def without(rows):
 
 FAULTS = {
     "period": (changed("t", lambda t: 1e3 * t), "look whether t is in s"),
-    "gaps": (without([30, 31, 32, 70]), "in 2 places, about 4 in all, the first after 1.45 s"),
+    "gaps": (without([30, 31, 32, 70]), "in 2 places, about 4 in all, the first after 1.45 s (line 31)"),
     "jitter": (changed("t", lambda t: t + 0.002 * (np.arange(len(t)) % 2)), "up to 4 %"),
-    "order": (changed("t", 1.0, 50), "row 51"),
+    "order": (changed("t", 1.0, 50), "line 52"),
     "not-a-number": (changed("rate", np.nan, 40), "rate has no finite number in 1 of 121 rows"),
     "still": (changed("rate", 0.25), "0.25 rad/s in every row"),
     "frozen": (changed("angle", lambda x: x[0], slice(60, 90)), "froze"),
@@ -121,6 +125,40 @@ def test_a_log_without_a_column_and_a_strange_archive_are_misuse(checked, tmp_pa
     assert shaped.exit_code == 2 and "(4, 3)" in shaped.stderr
     np.savez(tmp_path / "x.npz", t=np.zeros(4), states=np.array([["a"] * 2] * 4), commands=np.zeros((3, 1)))
     assert invoke("check", str(tmp_path / "x.npz"), rig).exit_code == 2
+
+
+ROWS = {
+    "a time that repeats": (changed("t", 2.45, 50), 50),
+    "a row that was lost": (without([51]), 50),
+    "a reading out of scale": (changed("angle", 1e9, 50), 50),
+    "a command beyond its bounds": (changed("torque", 50.0, 50), 50),
+    "no number": (changed("rate", np.nan, 50), 50),
+}
+
+
+@pytest.mark.parametrize("fault", ROWS)
+def test_a_row_of_a_file_is_the_line_that_an_editor_shows(checked, tmp_path, fault):
+    change, row = ROWS[fault]
+    where = re.compile(r"\b(?:row|line) \d+")
+    file, rig = tmp_path / "flight.csv", tmp_path / "rig.toml"
+    assert set(where.findall(checked(change).stdout)) <= {f"line {row + 2}"}
+    assert where.findall(invoke("identify", str(file), "--config", str(rig)).stderr) == [f"line {row + 2}"]
+    file.write_text("\n\n" + file.read_text())
+    assert where.findall(invoke("identify", str(file), "--config", str(rig)).stderr) == [f"line {row + 4}"]
+
+
+def test_a_row_of_arrays_is_their_index():
+    run = by_hand(120, seed=2)
+    signals = tl.Signals(SIGNALS.states, SIGNALS.commands, run.t[1] - run.t[0])
+    states, late = run.states.copy(), run.t.copy()
+    states[50, 0], late[50] = 1e9, late[49]
+    with pytest.raises(tl.InvalidInput, match=r"found 1e\+09 at row 50; cut"):
+        check_recorded(tl.Trajectory(run.t, states, run.commands), tl.Limits(signals), None)
+    with pytest.raises(tl.InvalidInput, match="at row 50; sort") as refused:
+        tl.Trajectory(late, run.states, run.commands)
+    assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
+    found = tl.check_log(late, run.states, run.commands, signals)
+    assert "at row 50, 2.45 s" in found.remarks[0].sentence
 
 
 def test_empty_cells_of_a_historian_are_counted_and_a_slow_period_is_told_in_seconds(tmp_path):

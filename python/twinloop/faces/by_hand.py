@@ -24,7 +24,7 @@ from twinloop.faces.sheet import columns, facts, foretold, sheet
 from twinloop.faces.telling import attach as attach_flight
 from twinloop.faces.telling import counted, numbered, tell_failed
 from twinloop.faces.telling import tell as tell_flight
-from twinloop.logs import write_columns
+from twinloop.logs import Log, write_columns
 from twinloop.planning.quality import quality_unit
 from twinloop.store import shown_name
 from twinloop.test import Test
@@ -128,10 +128,10 @@ def tell(
     log = _told(store, test, flight, failed, aborted, reason)
     with closing(_campaign(store)) as campaign:
         if failed is not None:
-            asked = tell_failed(campaign, test, failed, log)
+            asked, read = tell_failed(campaign, test, failed, log)
         else:
             assert log is not None  # refused above
-            asked = tell_flight(
+            asked, read = tell_flight(
                 campaign,
                 test,
                 log,
@@ -148,7 +148,7 @@ def tell(
             "spread": asked.spread,
             "quality": runs[-1].quality if runs else None,
         }
-        remarks = _against(campaign, runs[-1] if log is not None else None, asked)
+        remarks = [] if read is None else _against(campaign, runs[-1], asked, read)
         answer({**_standing(campaign, asked), **quality, "remarks": remarks}, text, as_json)
         _say(remarks)
 
@@ -201,9 +201,9 @@ def _aborted(store: str, test: int, log: Path, why: str) -> str:
 def attach(store: str, flight: Path, as_json: bool) -> None:
     """Add a recorded FLIGHT without a test, as CSV or .npz."""
     with closing(_campaign(store)) as campaign:
-        attach_flight(campaign, flight)
+        read = attach_flight(campaign, flight)
         text = f"Saved: {flight}; {counted(campaign)} in {shown_name(store)}."
-        remarks = _against(campaign, campaign.experiments[-1], None)
+        remarks = _against(campaign, campaign.experiments[-1], None, read)
         answer(
             {"file": str(flight), "experiments": len(campaign.experiments), "remarks": remarks}, text, as_json
         )
@@ -223,11 +223,9 @@ def abandon(store: str, test: int, as_json: bool) -> None:
         answer(_standing(campaign, asked), text, as_json)
 
 
-def _against(campaign: Campaign, flight: Experiment | None, asked: Test | None) -> list[str]:
+def _against(campaign: Campaign, flight: Experiment, asked: Test | None, read: Log) -> list[str]:
     """What speaks against a flight that was told."""
-    if flight is None:
-        return []
-    return [remark.sentence for remark in against(flight, asked, campaign.signals)]
+    return [remark.sentence for remark in against(flight, asked, campaign.signals, read.lines)]
 
 
 def _say(remarks: Sequence[str]) -> None:

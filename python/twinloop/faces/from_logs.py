@@ -20,7 +20,7 @@ from twinloop.faces.result import plain_dict, to_json
 from twinloop.faces.run_info import Stopwatch
 from twinloop.faces.text import table
 from twinloop.law.twin import Twin
-from twinloop.logs import load
+from twinloop.logs import read_log
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory, check_recorded
 
@@ -92,14 +92,14 @@ def identify(
 
 
 def _flight(file: Path, signals: Signals, config: Path) -> Trajectory:
-    flight = load(file, signals, columns=read_fields(config))
+    log = read_log(file, signals, columns=read_fields(config))
+    flight = log.trajectory()
     try:
-        check_recorded(flight, Limits(signals), None)
+        with log.errors():
+            check_recorded(flight, Limits(signals), None)
         return flight
     except InvalidInput as reason:
-        raise InvalidInput(
-            f"Log {file}: {reason} To look into it: twinloop check {file} {config}"
-        ) from reason
+        raise InvalidInput(f"{reason} To look into it: twinloop check {file} {config}") from reason
 
 
 def _facts(twin: Twin, files: Sequence[Path], runs: Sequence[Trajectory], learnt: int) -> dict[str, Any]:

@@ -38,14 +38,12 @@ def check(
     if output is not None:
         check_writable(output, [".csv"])
     signals, _ = read_signals(config)
-    t, states, commands = read_log(log, signals, None, read_fields(config), Window(start, stop))
-    name = f"Log {log}"
-    found = check_log(
-        _numbers(f"{name}, t", t, np.shape(t)[:1]),
-        _numbers(f"{name}, states", states, (len(t), signals.n_x)),
-        _numbers(f"{name}, commands", commands, (max(0, len(t) - 1), signals.n_u)),
-        signals,
-    )
+    read = read_log(log, signals, None, read_fields(config), Window(start, stop))
+    rows, name = len(read.t), f"Log {log}"
+    t = _numbers(f"{name}, t", read.t, np.shape(read.t)[:1])
+    states = _numbers(f"{name}, states", read.states, (rows, signals.n_x))
+    commands = _numbers(f"{name}, commands", read.commands, (max(0, rows - 1), signals.n_u))
+    found = check_log(t, states, commands, signals, read.lines)
     if as_json:
         facts = {"file": str(log), "fit": found.fit, **dataclasses.asdict(found)}
         click.echo(to_json(plain_dict(facts)), nl=False)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from twinloop.campaign import Campaign
-from twinloop.errors import InvalidInput, at
-from twinloop.logs import load
+from twinloop.errors import InvalidInput
+from twinloop.logs import Log, read_log
 from twinloop.test import Test
 from twinloop.trajectory import Trajectory, check_period, equal_runs
 
@@ -55,7 +55,7 @@ def tell(
     aborted: str = "",
     name: str | None = None,
     otherwise: str = "say why it was stopped",
-) -> Test:
+) -> tuple[Test, Log]:
     """Tells the flight of a test.
 
     Args:
@@ -67,7 +67,7 @@ def tell(
         otherwise: what to do with a log that ends early, if it cannot be had whole.
 
     Returns:
-        The test.
+        The test, and the log as it was read.
 
     Raises:
         InvalidInput: no such test, or a log that cannot be used, that was told before, or that ends early without a
@@ -77,23 +77,24 @@ def tell(
     test = numbered(campaign, number)
     called = str(log) if name is None else name
     ended = "aborted" if aborted else "completed"
-    run = load(log, campaign.signals, ended=ended, reason=aborted, name=called)
+    found = read_log(log, campaign.signals, called)
+    run = found.trajectory(ended, aborted)
     if not aborted and run.steps < test.steps:
         if run.steps:
             # Rows that are missing within it are no flight that was stopped.
-            with at(f"Log {called}"):
+            with found.errors():
                 check_period(run, campaign.signals)
         raise InvalidInput(
             f"Log {called}: expected the {test.steps} steps of test {number}, found {run.steps}; record it whole, or"
             f" {otherwise}."
         )
     _refuse_told(campaign, run, called, test)
-    with at(f"Log {called}"):
+    with found.errors():
         campaign.tell(test, run)
-    return test
+    return test, found
 
 
-def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> None:
+def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> Log:
     """Attaches a flight without a test.
 
     Args:
@@ -101,18 +102,25 @@ def attach(campaign: Campaign, log: Path, *, name: str | None = None) -> None:
         log: CSV or .npz.
         name: what messages call the log; None: its path.
 
+    Returns:
+        The log as it was read.
+
     Raises:
         InvalidInput: a log that cannot be used, or that is there already.
         StoreFailure: the store cannot be written.
     """
     called = str(log) if name is None else name
-    run = load(log, campaign.signals, name=called)
+    found = read_log(log, campaign.signals, called)
+    run = found.trajectory()
     _refuse_told(campaign, run, called, None)
-    with at(f"Log {called}"):
+    with found.errors():
         campaign.attach(run)
+    return found
 
 
-def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None = None) -> Test:
+def tell_failed(
+    campaign: Campaign, number: int, reason: str, log: Path | None = None
+) -> tuple[Test, Log | None]:
     """Tells that a test failed.
 
     Args:
@@ -122,7 +130,7 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
         log: CSV or .npz with what was recorded; None: nothing.
 
     Returns:
-        The test.
+        The test, and the log as it was read.
 
     Raises:
         InvalidInput: no such test, one with a recorded flight, no reason, the same failure once more, or a log that
@@ -141,9 +149,14 @@ def tell_failed(campaign: Campaign, number: int, reason: str, log: Path | None =
             f"Test {number}: expected a failure that is not recorded yet, found {reason!r} recorded already; if it was"
             " flown again and failed again, say so in other words."
         )
-    run = None if log is None else load(log, campaign.signals, ended="aborted", reason=reason)
-    campaign.tell_failed(test, reason, run)
-    return test
+    if log is None:
+        campaign.tell_failed(test, reason)
+        return test, None
+    found = read_log(log, campaign.signals)
+    run = found.trajectory("aborted", reason)
+    with found.errors():
+        campaign.tell_failed(test, reason, run)
+    return test, found
 
 
 def _refuse_told(campaign: Campaign, run: Trajectory, called: str, test: Test | None) -> None:

@@ -6,13 +6,15 @@ import csv
 import io
 import zipfile
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.errors import InvalidInput, at
+from twinloop.errors import AtRow, InvalidInput, at
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -23,6 +25,46 @@ DELIMITERS = ",;\t"
 WHOLE = Window()
 MOST_BYTES = 200_000_000
 """Of a log, unpacked: an hour of twenty signals at a kilohertz, as text."""
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """The columns of a log as they stand there, whatever is wrong with them; of a `.ulg` on the period of the signals.
+
+    Args:
+        called: what messages call it.
+        signals: names of the columns, and the order of states and commands.
+        t: times (n + 1,), s.
+        states: (n + 1, n_x).
+        commands: (n, n_u); like the others, those of an `.npz` file have the shape that they have there.
+        lines: of each row in the file (n + 1,); None: it has no lines.
+    """
+
+    called: str
+    signals: Signals
+    t: Floats
+    states: Floats
+    commands: Floats
+    lines: Sequence[int] | None
+
+    def trajectory(self, ended: str = "completed", reason: str = "") -> Trajectory:
+        """The flight.
+
+        Args:
+            ended: "completed", "aborted" or "diverged".
+            reason: why it did not complete.
+
+        Raises:
+            InvalidInput: a value that is no number, or columns that are no flight.
+        """
+        with self.errors():
+            names = (*self.signals.state_names, *self.signals.command_names)
+            _refuse_no_number(self.t, names, (self.states, self.commands))
+            return Trajectory(self.t, self.states, self.commands, ended=ended, reason=reason)
+
+    def errors(self) -> AbstractContextManager[None]:
+        """Within it, errors name the log, and rows by their lines."""
+        return at(f"Log {self.called}", self.lines)
 
 
 def load(
@@ -66,10 +108,7 @@ def load(
             are too far apart.
         NotAvailable: a `.ulg` without the package pyulog.
     """
-    t, states, commands = read_log(path, signals, name, columns, Window(start, stop))
-    with at(f"Log {path if name is None else name}"):
-        _refuse_no_number(t, (*signals.state_names, *signals.command_names), (states, commands))
-        return Trajectory(t, states, commands, ended=ended, reason=reason)
+    return read_log(path, signals, name, columns, Window(start, stop)).trajectory(ended, reason)
 
 
 def read_log(
@@ -78,8 +117,8 @@ def read_log(
     name: str | None = None,
     columns: Mapping[str, str] | None = None,
     window: Window = WHOLE,
-) -> tuple[Floats, Floats, Floats]:
-    """The columns of a log as they stand there, whatever is wrong with them; of a `.ulg` on the period of the signals.
+) -> Log:
+    """The columns of a log as they stand there.
 
     Args:
         path: of the file.
@@ -87,9 +126,6 @@ def read_log(
         name: of the log in messages; None: its path.
         columns: of a `.ulg` the field of each state and command.
         window: of a `.ulg`, the part that is meant.
-
-    Returns:
-        Times (n + 1,), states (n + 1, n_x) and commands (n, n_u); of an `.npz` file in the shapes that it has.
 
     Raises:
         InvalidInput: no such file, a column that is missing, something that is no number, or `columns` and a part of a
@@ -101,19 +137,21 @@ def read_log(
     try:
         _check_size(called, path.stat().st_size)
         if path.suffix.lower() == ".ulg":
-            return read_ulog(path, called, signals, columns, window)
+            return Log(called, signals, *read_ulog(path, called, signals, columns, window), None)
         if window != WHOLE:
             raise InvalidInput(
                 f"Log {called}: expected a .ulg to take a part of, found another file; cut it first."
             )
-        t, states, commands = (
-            _arrays(path, called) if path.suffix.lower() == ".npz" else _columns(path, called, signals)
+        t, states, commands, lines = (
+            (*_arrays(path, called), None)
+            if path.suffix.lower() == ".npz"
+            else _columns(path, called, signals)
         )
     except OSError as reason:
         raise InvalidInput(
             f"Log {called}: expected a file that can be read, found: {reason.strerror}; check its name."
         ) from reason
-    return t, states, commands[:-1] if len(commands) == len(t) else commands
+    return Log(called, signals, t, states, commands[:-1] if len(commands) == len(t) else commands, lines)
 
 
 def write_columns(path: Path, columns: Mapping[str, Floats]) -> None:
@@ -144,9 +182,11 @@ def _refuse_no_number(t: Floats, names: Sequence[str], parts: Sequence[Floats]) 
     for name, column in zip(names, columns, strict=False):
         rows = np.flatnonzero(~np.isfinite(column))
         if len(rows) and rows[0] < len(t):
-            raise InvalidInput(
-                f"expected a finite number for {name} in each row, found {column[rows[0]]} in row {rows[0] + 1}, t ="
-                f" {t[rows[0]]:g} s ({len(rows)} such row{'s' * (len(rows) > 1)}); fill it in, or cut the log before."
+            raise AtRow(
+                f"expected a finite number for {name} in each row, found {column[rows[0]]} in",
+                int(rows[0]),
+                f", t = {t[rows[0]]:g} s ({len(rows)} such row{'s' * (len(rows) > 1)}); fill it in, or cut the log"
+                " before.",
             )
 
 
@@ -185,7 +225,8 @@ def _arrays(path: Path, called: str) -> tuple[Floats, Floats, Floats]:
     return found
 
 
-def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats, Floats]:
+def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats, Floats, Sequence[int]]:
+    """Times, states and commands, and the line of each row."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as reason:
@@ -234,7 +275,8 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         return np.array([column(name, count) for name in wanted]).reshape(len(wanted), -1).T
 
     n = len(body)
-    return np.array(column(TIME, n)), matrix(signals.state_names, n), matrix(signals.command_names, n - 1)
+    t, states = np.array(column(TIME, n)), matrix(signals.state_names, n)
+    return t, states, matrix(signals.command_names, n - 1), [line for line, _ in body]
 
 
 def _refuse_longer(body: Sequence[tuple[int, Sequence[str]]], columns: int, called: str) -> None:

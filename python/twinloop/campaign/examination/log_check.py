@@ -20,7 +20,7 @@ from twinloop.campaign.data.sent import (
 )
 from twinloop.campaign.excited import excited
 from twinloop.campaign.history import Experiment
-from twinloop.errors import InvalidInput
+from twinloop.errors import InvalidInput, in_file, row_name
 from twinloop.identification.records import Run, guessed_noise
 from twinloop.remarks import Remark, note, serious
 from twinloop.signals import Signals
@@ -94,7 +94,9 @@ class LogCheck:
         return not any(remark.serious for remark in self.remarks)
 
 
-def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> LogCheck:
+def check_log(
+    t: Floats, states: Floats, commands: Floats, signals: Signals, lines: Sequence[int] | None = None
+) -> LogCheck:
     """Checks a log as it was recorded.
 
     Args:
@@ -102,12 +104,13 @@ def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> 
         states: readings (n + 1, n_x), in the units of the signals.
         commands: as sent (n, n_u).
         signals: declared signals.
+        lines: of each row in its file, for the sentences; None: they call rows by their index.
     """
     steps = np.diff(t)
     known = steps[np.isfinite(steps)]
     lost = known > LOST * signals.dt
     near = known[~lost]
-    remarks = [*_of_times(t, known, signals.dt)]
+    remarks = [*_of_times(t, known, signals.dt, lines)]
     columns = (*_states(states, signals), *_commands(commands, signals))
     remarks += [remark for column in columns for remark in _of_column(column, len(t))]
     remarks += _of_scales(states, signals)
@@ -117,7 +120,8 @@ def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> 
         and np.isfinite(commands).all()
         and len(commands) > 1
     ):
-        remarks += _of_run(t, states, commands, signals, bool(remarks and any(r.serious for r in remarks)))
+        said = any(remark.serious for remark in remarks)
+        remarks += _of_run(t, states, commands, signals, said, lines)
     return LogCheck(
         rows=len(t),
         seconds=float(t[-1] - t[0]) if len(t) else 0.0,
@@ -130,19 +134,22 @@ def check_log(t: Floats, states: Floats, commands: Floats, signals: Signals) -> 
     )
 
 
-def against(flight: Experiment, asked: Test | None, signals: Signals) -> list[Remark]:
+def against(
+    flight: Experiment, asked: Test | None, signals: Signals, lines: Sequence[int] | None = None
+) -> list[Remark]:
     """What speaks against a flight by itself, without a twin.
 
     Args:
         flight: that was recorded.
         asked: its test as it was asked for; None for an attached flight.
         signals: declared signals.
+        lines: of each row in its file, for the sentences; None: they call rows by their index.
 
     Returns:
         Serious remarks, and a note where an excitation was not flown; none where nothing does.
     """
     run = flight.trajectory
-    found = check_log(run.t, run.states, run.commands, signals).remarks
+    found = check_log(run.t, run.states, run.commands, signals, lines).remarks
     others = other_commands([flight])
     pair = exchanged(flight) if others else None
     names = [signals.commands[i].name for i in pair or ()]
@@ -150,7 +157,7 @@ def against(flight: Experiment, asked: Test | None, signals: Signals) -> list[Re
     return [*(each for each in found if each.serious), *from_other_controllers(others, names), *excitations]
 
 
-def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:
+def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) -> Iterator[Remark]:
     if len(t) < 3:
         yield serious("short", f"The log has {len(t)} rows: at least 3 are needed to learn from.")
         return
@@ -161,7 +168,7 @@ def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:
         row = int(np.argmax(steps <= 0.0)) + 1
         yield serious(
             "order",
-            f"Time does not increase at row {row + 1}, {t[row]:g} s: sort the rows and remove duplicates.",
+            f"Time does not increase at {row_name(row, lines)}, {t[row]:g} s: sort the rows and remove duplicates.",
         )
         return
     period = float(np.median(steps))
@@ -179,7 +186,7 @@ def _of_times(t: Floats, steps: Floats, dt: float) -> Iterator[Remark]:
         yield serious(
             "gaps",
             f"Rows are missing in {int(lost.sum())} place{'s' * (int(lost.sum()) != 1)}, about {rows} in all, the first"
-            f" after {t[first]:g} s: split the log there, or fill in the rows.",
+            f" after {t[first]:g} s ({row_name(first, lines)}): split the log there, or fill in the rows.",
         )
     worst = float(np.abs(steps[~lost] / dt - 1.0).max(initial=0.0))
     if worst > JITTER:
@@ -292,7 +299,14 @@ def _of_scales(states: Floats, signals: Signals) -> Iterator[Remark]:
             )
 
 
-def _of_run(t: Floats, states: Floats, commands: Floats, signals: Signals, known: bool) -> Sequence[Remark]:
+def _of_run(
+    t: Floats,
+    states: Floats,
+    commands: Floats,
+    signals: Signals,
+    known: bool,
+    lines: Sequence[int] | None,
+) -> Sequence[Remark]:
     """What is said of a run when it is learnt, and what would refuse it that was not said yet."""
     try:
         run = Trajectory(t, states, commands)
@@ -303,5 +317,5 @@ def _of_run(t: Floats, states: Floats, commands: Floats, signals: Signals, known
         try:
             check_recorded(run, Limits(signals), None)
         except InvalidInput as reason:
-            found.append(serious("refused", str(reason)))
+            found.append(serious("refused", in_file(reason, lines)))
     return found
