@@ -161,6 +161,25 @@ def test_a_row_of_arrays_is_their_index():
     assert "at row 50, 2.45 s" in found.remarks[0].sentence
 
 
+def repeated(log):
+    for name, values in log.items():
+        log[name] = np.repeat(values, 3)
+
+
+def reversed_rows(log):
+    for name, values in log.items():
+        log[name] = values[::-1].copy()
+
+
+def test_rows_that_are_repeated_or_in_reverse_are_said_to_be(checked):
+    said = checked(repeated)
+    assert said.exit_code == 1 and "363 rows over 6 s.\n" in said.stdout
+    assert "242 rows have the time of the row before, the first at line 3, 0 s" in said.stdout
+    said = checked(reversed_rows)
+    assert said.exit_code == 1 and "121 rows.\n" in said.stdout
+    assert "in reverse order, the last time first: sort them by t" in said.stdout
+
+
 def test_empty_cells_of_a_historian_are_counted_and_a_slow_period_is_told_in_seconds(tmp_path):
     (tmp_path / "oven.toml").write_text(
         'dt = 10.0\n[states.heat]\nunit = "K"\nscale = 10.0\n[commands.power]\nunit = "W"\nbounds = [0.0, 9.0]\n'

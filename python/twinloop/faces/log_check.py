@@ -71,9 +71,16 @@ def _period(seconds: float) -> str:
     return f"{seconds:.4g} s" if seconds >= 1.0 else f"{1e3 * seconds:.4g} ms ({1.0 / seconds:.4g} Hz)"
 
 
+def _clock(found: LogCheck) -> str:
+    """How long the log is and how far its rows are apart, where its times say so."""
+    if not found.seconds >= 0.0:
+        return ""
+    rate = f", one in {_period(found.period)}" if found.period and found.period > 0.0 else ""
+    return f" over {found.seconds:.4g} s{rate}"
+
+
 def _text(log: Path, found: LogCheck) -> str:
-    rate = "" if found.period is None else f", one in {_period(found.period)}"
-    lines = [f"{log}: {found.rows} rows over {found.seconds:.4g} s{rate}."]
+    lines = [f"{log}: {found.rows} rows{_clock(found)}."]
     rows = [
         [
             column.name,

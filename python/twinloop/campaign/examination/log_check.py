@@ -165,11 +165,7 @@ def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) 
         yield serious("times", "Some rows have no time: remove them.")
         return
     if (steps <= 0.0).any():
-        row = int(np.argmax(steps <= 0.0)) + 1
-        yield serious(
-            "order",
-            f"Time does not increase at {row_name(row, lines)}, {t[row]:g} s: sort the rows and remove duplicates.",
-        )
+        yield serious("order", _disorder(t, steps, lines))
         return
     period = float(np.median(steps))
     if abs(period / dt - 1.0) > JITTER:
@@ -195,6 +191,24 @@ def _of_times(t: Floats, steps: Floats, dt: float, lines: Sequence[int] | None) 
             f"The time between two rows departs by up to {100.0 * worst:.2g} % from dt; {100.0 * JITTER:g} % are"
             " allowed. Where the loop only jitters around its period, write even times.",
         )
+
+
+def _disorder(t: Floats, steps: Floats, lines: Sequence[int] | None) -> str:
+    """How time does not increase, in words."""
+    back = steps < 0.0
+    if back.all():
+        return "The rows are in reverse order, the last time first: sort them by t."
+    row = int(np.argmax(back if back.any() else steps == 0.0)) + 1
+    if back.any():
+        return (
+            f"Time goes back at {row_name(row, lines)}, from {t[row - 1]:g} s to {t[row]:g} s: sort the rows by t, or"
+            " split the log where another one begins."
+        )
+    count = int((steps == 0.0).sum())
+    return (
+        f"{count} row{' has' if count == 1 else 's have'} the time of the row before, the first at"
+        f" {row_name(row, lines)}, {t[row]:g} s: remove rows that are repeated, or write t with more digits."
+    )
 
 
 def _finite(values: Floats) -> tuple[Floats, int]:
