@@ -161,6 +161,28 @@ def test_a_row_of_arrays_is_their_index():
     assert "at row 50, 2.45 s" in found.remarks[0].sentence
 
 
+def five_times_as_often(log):
+    t = log["t"]
+    often = np.linspace(t[0], t[-1], 5 * (len(t) - 1) + 1)
+    for name in ("angle", "rate"):
+        log[name] = np.interp(often, t, log[name])
+    log["torque"] = np.repeat(log["torque"], 5)
+    log["t"] = often
+
+
+def often_and_frozen(log):
+    five_times_as_often(log)
+    log["angle"][300:450] = log["angle"][0]
+
+
+@pytest.mark.parametrize(
+    ("change", "codes"),
+    [(five_times_as_often, {"period"}), (often_and_frozen, {"period", "frozen"})],
+)
+def test_of_a_wrong_period_no_consequences_are_told(checked, change, codes):
+    assert {each["code"] for each in json.loads(checked(change, "--json").stdout)["remarks"]} == codes
+
+
 def repeated(log):
     for name, values in log.items():
         log[name] = np.repeat(values, 3)

@@ -120,8 +120,7 @@ def check_log(
         and np.isfinite(commands).all()
         and len(commands) > 1
     ):
-        said = any(remark.serious for remark in remarks)
-        remarks += _of_run(t, states, commands, signals, said, lines)
+        remarks += _of_run(t, states, commands, signals, remarks, lines)
     return LogCheck(
         rows=len(t),
         seconds=float(t[-1] - t[0]) if len(t) else 0.0,
@@ -318,14 +317,18 @@ def _of_run(
     states: Floats,
     commands: Floats,
     signals: Signals,
-    known: bool,
+    before: Sequence[Remark],
     lines: Sequence[int] | None,
 ) -> Sequence[Remark]:
     """What is said of a run when it is learnt, and what would refuse it that was not said yet."""
+    known = any(remark.serious for remark in before)
     try:
         run = Trajectory(t, states, commands)
     except InvalidInput as reason:
         return [] if known else [serious("refused", str(reason))]
+    if any(remark.code == "period" for remark in before):
+        # What is integrated or counted in periods would only repeat that these are wrong.
+        return [remark for remark in suspicious([run], signals) if remark.serious]
     found = [*against_derivatives([run], signals), *suspicious([run], signals)]
     if not known:
         try:
