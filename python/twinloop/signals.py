@@ -19,6 +19,8 @@ from twinloop.errors import InvalidInput, unknown
 from twinloop.records import Recorded
 
 Bounds = tuple[float, float]
+TURNS = {"rad": 2.0 * math.pi, "deg": 360.0}
+"""A whole turn in the units of angles."""
 WHOLE_TURN = 0.99
 """Share of its period that the envelope of an angle spans if it bounds nothing: -3.14 to 3.14 is a whole turn."""
 

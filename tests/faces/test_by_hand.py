@@ -246,6 +246,17 @@ def test_rows_that_are_missing_within_a_flight_are_no_flight_that_was_stopped(fo
     assert "--aborted" not in refused.stderr
 
 
+def test_an_attached_flight_that_wraps_is_said_to_at_its_line(folder):
+    t = SIGNALS.dt * np.arange(121)
+    angle, rate = 3.0 + 0.5 * np.sin(3.0 * t), 1.5 * np.cos(3.0 * t)
+    row = int(np.argmax(angle > np.pi))
+    columns = {"t": t, "angle": np.angle(np.exp(1j * angle)), "rate": rate, "torque": np.sin(t[:-1])}
+    write_columns(Path("wraps.csv"), columns)
+    said = run("attach", "rig.db", "wraps.csv")
+    assert said.exit_code == 0
+    assert f"Against this flight: angle jumps by a whole turn at line {row + 2}, {t[row]:g} s" in said.stderr
+
+
 def test_what_speaks_against_a_flight_is_said_when_it_is_told(folder):
     run("ask", "rig.db")
     flight = flown(look().tests[0])

@@ -57,6 +57,16 @@ def test_a_biased_rate_is_no_other_unit():
     assert said(flown(change=lambda x: x + np.array([0.0, 0.0, 0.1]))) == []
 
 
+def test_an_angle_that_wraps_is_said_to_with_its_run_and_nothing_that_follows_from_it():
+    def wrapped(states):
+        turned = states + np.array([0.0, 3.0, 0.0])
+        turned[:, 1] = np.angle(np.exp(1j * turned[:, 1]))
+        return turned
+
+    (remark,) = said(flown(), flown(1, change=wrapped))
+    assert remark.startswith("angle jumps by a whole turn in run 2 of 2 at ")
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -18,6 +18,7 @@ from twinloop.campaign.data.sent import (
     from_other_controllers,
     other_commands,
 )
+from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.excited import excited
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, in_file, row_name
@@ -329,7 +330,8 @@ def _of_run(
     if any(remark.code == "period" for remark in before):
         # What is integrated or counted in periods would only repeat that these are wrong.
         return [remark for remark in suspicious([run], signals) if remark.serious]
-    found = [*against_derivatives([run], signals), *suspicious([run], signals)]
+    runs, found = without_turns([run], signals, lambda _, row: f"at {row_name(row, lines)}, {run.t[row]:g} s")
+    found += [*against_derivatives(runs, signals), *suspicious(runs, signals)]
     if not known:
         try:
             check_recorded(run, Limits(signals), None)

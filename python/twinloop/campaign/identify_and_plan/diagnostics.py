@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from twinloop.campaign.data.declared import against_derivatives
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.sent import from_other_controllers
+from twinloop.campaign.data.wrapped import without_turns
 from twinloop.campaign.history import Experiment
 from twinloop.campaign.identify_and_plan.elsewhere import NOWHERE, Elsewhere
 from twinloop.campaign.identify_and_plan.misses import Miss
@@ -63,8 +64,13 @@ def diagnostics_of(
     Returns:
         Remarks, none where nothing does.
     """
-    recorded = [run.trajectory for run in experiments]
+    recorded, wrapped = without_turns(
+        [run.trajectory for run in experiments],
+        signals,
+        lambda k, row: f"in run {k + 1} of {len(experiments)} at {experiments[k].trajectory.t[row]:g} s",
+    )
     said = [
+        *wrapped,
         *against_derivatives(recorded, signals),
         *suspicious(recorded, signals),
         *from_other_controllers(found.others),
