@@ -8,13 +8,13 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from twinloop._ground.arrays import Floats
 from twinloop.errors import AtRow, InvalidInput, at
+from twinloop.logs.headers import advice, listed
 from twinloop.logs.ulog import Window, read_ulog
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
@@ -253,16 +253,13 @@ def _columns(path: Path, called: str, signals: Signals) -> tuple[Floats, Floats,
         )
     missing = [name for name in wanted if name not in names]
     if missing:
-        there = ", ".join(names[:20]) or "none"
-        meant = [near[0] for name in missing for near in [get_close_matches(name, names, n=1)] if near]
-        advice = (
-            f"did you mean {', '.join(map(repr, meant))}?"
-            if meant
-            else "name columns as the signals are named."
-        )
+        units = {TIME: "s"} | {state.name: state.unit for state in signals.states}
+        units |= {command.name: command.unit for command in signals.commands}
+        unused = [name for name in names if name and name not in wanted]
+        meant = advice({name: units[name] for name in missing}, unused)
         raise InvalidInput(
-            f"Log {called}: expected columns called {', '.join(wanted)}, found {there}; {', '.join(missing)}"
-            f" {'is' if len(missing) == 1 else 'are'} missing: {advice}"
+            f"Log {called}: expected columns called {', '.join(wanted)}, found {listed(names)}; {', '.join(missing)}"
+            f" {'is' if len(missing) == 1 else 'are'} missing: {meant}"
         )
     body = rows[1:]
     _refuse_longer(body, len(names), called)

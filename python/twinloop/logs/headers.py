@@ -1,0 +1,80 @@
+"""Headers of logs: which column is probably meant by the name of a signal."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from difflib import SequenceMatcher
+
+ALIKE = 0.75
+"""Similarity from which a name is taken for a mistyped other one: "torqe" for "torque", but not "t" for "tz"."""
+LONGEST, MOST = 80, 500
+"""Characters of a column's name, and columns, up to which they are compared."""
+UNIT = re.compile(r"(.*?)[\s_]*[\[(]([^\])]*)[\])]")
+"""A name with a unit in brackets: "roll [rad]", "Roll (rad)"."""
+ALIASES = {"t": ("time", "timestamp")}
+SHOWN = 20
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names of columns, of many the first.
+
+    Args:
+        names: of all.
+    """
+    return ", ".join([*names[:SHOWN], *(["…"] if len(names) > SHOWN else [])]) or "none"
+
+
+def advice(missing: Mapping[str, str], unused: Sequence[str]) -> str:
+    """What to do about columns that are missing.
+
+    Args:
+        missing: unit of each name that is wanted.
+        unused: columns that no signal has.
+
+    Returns:
+        For each name the column that is probably meant, no column twice; without any, how columns are named.
+    """
+    compared = [column for column in unused if len(column) <= LONGEST][:MOST]
+    pairs = sorted(
+        (
+            (_likeness(name, unit, column), name, column)
+            for name, unit in missing.items()
+            for column in compared
+        ),
+        key=lambda pair: -pair[0],
+    )
+    meant: dict[str, str] = {}
+    for likeness, name, column in pairs:
+        if likeness >= ALIKE and name not in meant and column not in meant.values():
+            meant[name] = column
+    if not meant:
+        return "name columns as the signals are named."
+    said = [
+        f"{meant[name]!r} for {name}{_unit(missing[name], meant[name])}" for name in missing if name in meant
+    ]
+    return f"did you mean {', '.join(said)}?"
+
+
+def _likeness(name: str, unit: str, column: str) -> float:
+    """How probable it is that a column is meant by a name: 1 where they differ in case and a unit alone."""
+    name, found = name.casefold(), column.casefold()
+    bare = UNIT.fullmatch(found)
+    found = bare[1] if bare else found
+    if found == name or found in ALIASES.get(name, ()):
+        return 1.0
+    if found.startswith(f"{name}_") and found[len(name) + 1 :] in _written(unit):
+        return 1.0
+    return SequenceMatcher(None, name, found).ratio()
+
+
+def _written(unit: str) -> set[str]:
+    """How a unit stands behind a name, and the other one of angles: "rad_s", "rads", "radps"."""
+    units = {unit.casefold(), unit.casefold().replace("rad", "deg"), unit.casefold().replace("deg", "rad")}
+    return {each.replace("/", by).replace(" ", "_") for each in units for by in ("_", "", "p")}
+
+
+def _unit(wanted: str, column: str) -> str:
+    """That a column is in another unit, where its header says so."""
+    bare = UNIT.fullmatch(column)
+    return f" (which is in {wanted})" if bare and bare[2].strip() not in (wanted, "") else ""
