@@ -126,6 +126,45 @@ def test_what_was_asked_for_wrongly_is_said(tmp_path, columns, more, word):
         tl.load(path, SIGNALS, columns=columns, **more)
 
 
+def refused(path, columns=COLUMNS, **more):
+    with pytest.raises(tl.InvalidInput) as refusal:
+        tl.load(path, SIGNALS, columns=columns, **more)
+    return str(refusal.value)
+
+
+def test_a_topic_whose_format_alone_is_there_has_no_samples(tmp_path):
+    formats = FORMATS | {
+        "torque": "uint64_t timestamp;double[3] xyz;",
+        "other": "uint64_t timestamp;double x;",
+    }
+    path = written(tmp_path, ulog(formats, [*rows(), (3.0, "other", 0, [1.0])]))
+    said = refused(path, {**COLUMNS, "aileron": "torque.xyz[0]"})
+    assert "found its format alone" in said and said.endswith("actuator, other, rates, vehicle_attitude.")
+    assert "did you mean 'other'" in refused(path, {**COLUMNS, "aileron": "othr.x"})
+    empty = written(tmp_path, ulog({}, []))
+    assert "found no topic at all" in refused(empty)
+
+
+def test_angles_of_a_quaternion_are_among_the_fields_that_are_named(tmp_path):
+    path = written(tmp_path, ulog(FORMATS, rows()))
+    assert "did you mean 'roll'" in refused(path, {**COLUMNS, "roll": "vehicle_attitude.rol"})
+    assert "roll, pitch, yaw, q[0]" in refused(path, {**COLUMNS, "roll": "vehicle_attitude.heading"})
+    assert "did you mean 'xyz" in refused(path, {**COLUMNS, "p": "rates.xy[0]"})
+
+
+def test_times_that_repeat_or_go_back_are_said_with_their_place(tmp_path):
+    twice = [row for row in rows() for _ in range(1 + (row[1] == "rates" and row[0] > 1.0))]
+    said = refused(written(tmp_path, ulog(FORMATS, twice)))
+    count = sum(row[1] == "rates" and row[0] > 1.0 for row in rows())
+    assert (
+        f"rates.xyz[0] at increasing times, found {count} that repeat" in said and "the first 1.001 s" in said
+    )
+    back = [(4.0 - row[0] if row[1] == "rates" else row[0], *row[1:]) for row in rows()]
+    assert "found 3.989 s after 4 s" in refused(written(tmp_path, ulog(FORMATS, back)))
+    one = [row for row in rows() if row[1] != "rates" or row[0] == 0.0]
+    assert "at least two, found 1" in refused(written(tmp_path, ulog(FORMATS, one)))
+
+
 def bomb():
     """A few bytes that ask for 60000² fields."""
     formats = {"vehicle_attitude": "uint64_t timestamp;inner[60000] a;", "inner": "double[60000] b;"}

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +119,13 @@ def _parsed(path: Path, called: str, topics: list[str]) -> Any:
         ) from missing
 
     class Bounded(ULog):  # type: ignore[misc]
+        topics: ClassVar[set[str]] = set()  # also of those whose samples are not read
+
         class _MessageAddLogged(ULog._MessageAddLogged):  # type: ignore[misc]
+            def _parse_format(self, formats: Any) -> None:
+                super()._parse_format(formats)
+                Bounded.topics.add(self.message_name)
+
             def _parse_nested_type(self, prefix: str, name: str, formats: Any) -> None:
                 sizes = [max(1, size) for _, size, _ in formats[name].fields]
                 if len(self.field_data) + sum(sizes) > MOST_FIELDS or prefix.count(".") > 8:
@@ -147,7 +153,7 @@ def _parsed(path: Path, called: str, topics: list[str]) -> Any:
 def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> _Samples:
     same = [data for data in log.data_list if data.name == topic]
     if not same:
-        raise unknown(f"topic, which the log {called} should have:", topic, sorted(log.message_formats))
+        raise _no_samples(log, called, topic)
     data = next((each.data for each in same if each.multi_id == instance), None)
     address = f"{topic}/{instance}.{field}" if instance else f"{topic}.{field}"
     if data is None or "timestamp" not in data:
@@ -161,13 +167,49 @@ def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> _S
     elif field in EULER and all(part in data for part in quaternion):
         values = _angle(field, *(np.asarray(data[part], dtype=np.float64) for part in quaternion))
     else:
-        raise unknown(f"field of {topic} in the log {called}", field, sorted(data))
+        angles = EULER if all(part in data for part in quaternion) else ()
+        raise unknown(f"field of {topic} in the log {called}", field, [*angles, *sorted(data)])
     micro = data["timestamp"]
-    if len(micro) < 2 or (micro[1:] <= micro[:-1]).any() or micro[0] < log.start_timestamp:
-        raise InvalidInput(
-            f"Log {called}: expected at least two samples of {address}, at increasing times, found others."
+    expected = f"Log {called}: expected samples of {address} at increasing times"
+    if (micro < log.start_timestamp).any():
+        raise InvalidInput(f"{expected}, found some before the log begins; take another log.")
+    times = (micro - np.uint64(log.start_timestamp)).astype(np.float64) * 1e-6
+    _refuse_disorder(expected, times)
+    return _Samples(address, times, values)
+
+
+def _no_samples(log: Any, called: str, topic: str) -> InvalidInput:
+    """The error for a topic that has no samples."""
+    if not log.topics:
+        return InvalidInput(
+            f"Log {called}: expected samples of {topic}, found no topic at all; copy the log from the card again, or"
+            " take another one."
         )
-    return _Samples(address, (micro - np.uint64(log.start_timestamp)).astype(np.float64) * 1e-6, values)
+    if topic in log.message_formats:
+        return InvalidInput(
+            f"Log {called}: expected samples of {topic}, found its format alone; have that topic logged, or name a"
+            f" field of one that is: {', '.join(sorted(log.topics - {topic})) or 'none'}."
+        )
+    return unknown(f"topic, which the log {called} should have:", topic, sorted(log.topics))
+
+
+def _refuse_disorder(expected: str, times: Floats) -> None:
+    """Refuses times (m,), s after the beginning of a log, that are too few or do not increase."""
+    steps = np.diff(times)
+    if len(times) < 2:
+        raise InvalidInput(f"{expected}, at least two, found {len(times)}; take a longer log.")
+    if (steps < 0.0).any():
+        place = int(np.argmax(steps < 0.0))
+        raise InvalidInput(
+            f"{expected}, found {times[place + 1]:.6g} s after {times[place]:.6g} s; save it as CSV, sorted."
+        )
+    if (steps == 0.0).any():
+        again = times[1:][steps == 0.0]
+        raise InvalidInput(
+            f"{expected}, found {len(again)} that repeat the time of the one before, the first {again[0]:.6g} s after"
+            " the beginning of the log; it logs them twice: save it as CSV without the repeated ones, or name another"
+            " instance or topic."
+        )
 
 
 def _angle(name: str, w: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
