@@ -71,7 +71,7 @@ class NotAvailable(TwinloopError, RuntimeError):
 
 
 class RemarkWarning(UserWarning):
-    """A serious remark on data or a twin: check it before you use the result. `twin.remarks` has it as a value."""
+    """A remark on data or a twin: check it before you use the result. `twin.remarks` has those on a twin as values."""
 
 
 def row_name(row: int, lines: Sequence[int] | None = None) -> str:

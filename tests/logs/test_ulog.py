@@ -4,6 +4,7 @@ import json
 import struct
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +164,25 @@ def test_times_that_repeat_or_go_back_are_said_with_their_place(tmp_path):
     assert "found 3.989 s after 4 s" in refused(written(tmp_path, ulog(FORMATS, back)))
     one = [row for row in rows() if row[1] != "rates" or row[0] == 0.0]
     assert "at least two, found 1" in refused(written(tmp_path, ulog(FORMATS, one)))
+
+
+def test_a_log_that_was_cut_is_read_until_then_and_it_is_said(tmp_path):
+    whole = ulog(FORMATS, rows())
+    path = written(tmp_path, whole[: round(0.6 * len(whole))])
+    with pytest.warns(tl.RemarkWarning, match=r"ends within a message.* can be read until 1\.\d+ s") as said:
+        run = tl.load(path, SIGNALS, columns=COLUMNS)
+    until = float(str(said[0].message).partition("until ")[2].split()[0])
+    assert until - 0.02 < run.t[-1] + 0.004 < until  # the last rows of a period, and the first command
+    np.testing.assert_allclose(run.states[:, 0], roll(0.004 + run.t), atol=1e-6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert tl.load(path, SIGNALS, columns=COLUMNS, stop=1.0).steps == 49  # a part before that is whole
+        tl.load(written(tmp_path, whole), SIGNALS, columns=COLUMNS)
+    path = written(tmp_path, whole[:-3])
+    fields = 'angle = "vehicle_attitude.pitch"\nrate = "rates.xyz[0]"\ntorque = "actuator/1.control[1]"\n'
+    (tmp_path / "rig.toml").write_text(RIG + "[log]\n" + fields)
+    found = json.loads(invoke("check", str(path), str(tmp_path / "rig.toml"), "--json").stdout)
+    assert [each["severity"] for each in found["remarks"] if each["code"] == "cut"] == ["note"]
 
 
 def bomb():

@@ -93,6 +93,8 @@ def identify(
 
 def _flight(file: Path, signals: Signals, config: Path) -> Trajectory:
     log = read_log(file, signals, columns=read_fields(config))
+    for remark in log.remarks:
+        click.echo(f"Log {file}: {remark}", err=True)
     flight = log.trajectory()
     try:
         with log.errors():

@@ -44,6 +44,7 @@ def check(
     states = _numbers(f"{name}, states", read.states, (rows, signals.n_x))
     commands = _numbers(f"{name}, commands", read.commands, (max(0, rows - 1), signals.n_u))
     found = check_log(t, states, commands, signals, read.lines)
+    found = dataclasses.replace(found, remarks=(*read.remarks, *found.remarks))
     if as_json:
         facts = {"file": str(log), "fit": found.fit, **dataclasses.asdict(found)}
         click.echo(to_json(plain_dict(facts)), nl=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import warnings
 import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -13,9 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from twinloop._ground.arrays import Floats
-from twinloop.errors import AtRow, InvalidInput, at
+from twinloop.errors import AtRow, InvalidInput, RemarkWarning, at
 from twinloop.logs.headers import advice, listed
 from twinloop.logs.ulog import Window, read_ulog
+from twinloop.remarks import Remark
 from twinloop.signals import Signals
 from twinloop.trajectory import Trajectory
 
@@ -38,6 +40,7 @@ class Log:
         states: (n + 1, n_x).
         commands: (n, n_u); like the others, those of an `.npz` file have the shape that they have there.
         lines: of each row in the file (n + 1,); None: it has no lines.
+        remarks: on the file.
     """
 
     called: str
@@ -46,6 +49,7 @@ class Log:
     states: Floats
     commands: Floats
     lines: Sequence[int] | None
+    remarks: tuple[Remark, ...] = ()
 
     def trajectory(self, ended: str = "completed", reason: str = "") -> Trajectory:
         """The flight.
@@ -87,7 +91,8 @@ def load(
     A log of PX4 (`.ulg`, extra `ulog`) has topics with fields, each with its own times. They are resampled to the
     period of the signals: states are interpolated between two samples, and each command is the last one sent. If two
     samples are more than two periods apart, the log is refused. A topic with a quaternion `q` also has the angles
-    "roll", "pitch" and "yaw".
+    "roll", "pitch" and "yaw". Of a log that was cut, as when power is lost, the part before is read, and a
+    `RemarkWarning` says until when.
 
     Args:
         path: of the file.
@@ -108,7 +113,10 @@ def load(
             are too far apart.
         NotAvailable: a `.ulg` without the package pyulog.
     """
-    return read_log(path, signals, name, columns, Window(start, stop)).trajectory(ended, reason)
+    log = read_log(path, signals, name, columns, Window(start, stop))
+    for remark in log.remarks:
+        warnings.warn(f"Log {log.called}: {remark.sentence} ({remark.code})", RemarkWarning, stacklevel=2)
+    return log.trajectory(ended, reason)
 
 
 def read_log(
@@ -137,7 +145,8 @@ def read_log(
     try:
         _check_size(called, path.stat().st_size)
         if path.suffix.lower() == ".ulg":
-            return Log(called, signals, *read_ulog(path, called, signals, columns, window), None)
+            t, states, commands, remarks = read_ulog(path, called, signals, columns, window)
+            return Log(called, signals, t, states, commands, None, remarks)
         if window != WHOLE:
             raise InvalidInput(
                 f"Log {called}: expected a .ulg to take a part of, found another file; cut it first."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, NotAvailable, unknown
+from twinloop.remarks import Remark, note
 from twinloop.signals import Signals
 
 ADDRESS = re.compile(r"([a-z0-9_]+)(?:/([0-9]{1,3}))?\.(\S+)", re.ASCII | re.IGNORECASE)
@@ -40,6 +41,18 @@ class Window:
     stop: float | None = None
 
 
+class _Cut(io.BufferedReader):
+    """A file that knows whether it ended within what was to be read, as it does where power was lost."""
+
+    cut = False
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        data = super().read(size)
+        # At its right end a file has no byte of another message.
+        self.cut |= size is not None and 0 < len(data) < size
+        return data
+
+
 @dataclass(frozen=True, eq=False)
 class _Samples:
     """A field as it was logged: times (m,) in s after the beginning of the log, values (m,)."""
@@ -51,8 +64,8 @@ class _Samples:
 
 def read_ulog(
     path: Path, called: str, signals: Signals, columns: Mapping[str, str] | None, window: Window
-) -> tuple[Floats, Floats, Floats]:
-    """Times (n + 1,) from 0, states (n + 1, n_x) and commands (n, n_u) of a log, a row each period.
+) -> tuple[Floats, Floats, Floats, tuple[Remark, ...]]:
+    """Times (n + 1,) from 0, states (n + 1, n_x) and commands (n, n_u) of a log, a row each period; and remarks on it.
 
     States are interpolated between the two samples beside each time, commands are those sent last.
 
@@ -69,7 +82,7 @@ def read_ulog(
     """
     names = (*signals.state_names, *signals.command_names)
     fields = _fields(called, names, columns)
-    log = _parsed(path, called, sorted({topic for topic, _, _ in fields.values()}))
+    log, cut = _parsed(path, called, sorted({topic for topic, _, _ in fields.values()}))
     found = {name: _samples(log, called, *fields[name]) for name in names}
     start, stop = _common(called, list(found.values()), window, signals.dt)
     for samples in found.values():
@@ -78,7 +91,17 @@ def read_ulog(
     times = np.asarray(start + signals.dt * np.arange(count + 1), dtype=np.float64)
     states = [np.interp(times, found[name].times, found[name].values) for name in signals.state_names]
     commands = [_held(found[name], times[:-1]) for name in signals.command_names]
-    return times - start, np.stack(states, axis=1), np.stack(commands, axis=1)
+    remarks = [_cut(found.values())] if cut and window.stop is None else []
+    return times - start, np.stack(states, axis=1), np.stack(commands, axis=1), tuple(remarks)
+
+
+def _cut(found: Iterable[_Samples]) -> Remark:
+    until = max(float(samples.times[-1]) for samples in found)
+    return note(
+        "cut",
+        f"The file ends within a message, as when power is lost: it can be read until {until:.6g} s after its"
+        " beginning, and what came later is missing. If the flight ended badly there, take the part before that.",
+    )
 
 
 def _fields(
@@ -109,8 +132,8 @@ def _fields(
     return found
 
 
-def _parsed(path: Path, called: str, topics: list[str]) -> Any:
-    """The log with these topics, as pyulog reads it; whatever it stumbles over is one sentence."""
+def _parsed(path: Path, called: str, topics: list[str]) -> tuple[Any, bool]:
+    """The log with these topics, as pyulog reads it, and whether it is cut; what it stumbles over is one sentence."""
     try:
         from pyulog import ULog
     except ImportError as missing:
@@ -134,7 +157,7 @@ def _parsed(path: Path, called: str, topics: list[str]) -> Any:
 
     try:
         # pyulog prints its warnings, and does not close what it opened where it fails.
-        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
+        with _Cut(io.FileIO(path)) as file, contextlib.redirect_stdout(io.StringIO()):
             log = Bounded(file, topics)
     except OSError:
         raise
@@ -147,7 +170,7 @@ def _parsed(path: Path, called: str, topics: list[str]) -> Any:
             f"Log {called}: expected a whole log, found a damaged one; copy it from the card again, or save"
             " its undamaged part as CSV."
         )
-    return log
+    return log, file.cut
 
 
 def _samples(log: Any, called: str, topic: str, instance: int, field: str) -> _Samples:
