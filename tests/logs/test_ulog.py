@@ -185,6 +185,23 @@ def test_a_log_that_was_cut_is_read_until_then_and_it_is_said(tmp_path):
     assert [each["severity"] for each in found["remarks"] if each["code"] == "cut"] == ["note"]
 
 
+@pytest.mark.parametrize(("unit", "turn"), [("rad", 2.0 * np.pi), ("deg", 360.0)])
+def test_a_heading_that_wraps_between_two_samples_goes_on(tmp_path, unit, turn):
+    def heading(t):
+        return turn * (0.45 + 0.3 * t)
+
+    formats = {"position": "uint64_t timestamp;double heading;", "actuator": FORMATS["actuator"]}
+    samples = [
+        (0.013 * k, "position", 0, [heading(0.013 * k) - turn * np.rint(heading(0.013 * k) / turn)])
+        for k in range(150)
+    ]
+    sent = [(0.02 * k, "actuator", 0, [0.0, 0.0]) for k in range(98)]
+    signals = tl.Signals([tl.State("yaw", unit, turn)], SIGNALS.commands, dt=0.02)
+    columns = {"yaw": "position.heading", "aileron": "actuator.control[0]"}
+    run = tl.load(written(tmp_path, ulog(formats, sorted(samples + sent))), signals, columns=columns)
+    np.testing.assert_allclose(run.states[:, 0], heading(run.t), atol=1e-3 * turn)
+
+
 def bomb():
     """A few bytes that ask for 60000² fields."""
     formats = {"vehicle_attitude": "uint64_t timestamp;inner[60000] a;", "inner": "double[60000] b;"}

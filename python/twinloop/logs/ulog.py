@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from twinloop._ground.arrays import Floats
 from twinloop.errors import InvalidInput, NotAvailable, unknown
 from twinloop.remarks import Remark, note
-from twinloop.signals import Signals
+from twinloop.signals import TURNS, Signals, State
 
 ADDRESS = re.compile(r"([a-z0-9_]+)(?:/([0-9]{1,3}))?\.(\S+)", re.ASCII | re.IGNORECASE)
 """A topic, which of several of that name, and a field: "vehicle_attitude.roll", "sensor_gyro/1.x"."""
@@ -89,7 +89,7 @@ def read_ulog(
         _refuse_gaps(called, samples, start, stop, signals.dt)
     count = int((stop - start) / signals.dt + 1e-6)
     times = np.asarray(start + signals.dt * np.arange(count + 1), dtype=np.float64)
-    states = [np.interp(times, found[name].times, found[name].values) for name in signals.state_names]
+    states = [_interpolated(found[state.name], state, times) for state in signals.states]
     commands = [_held(found[name], times[:-1]) for name in signals.command_names]
     remarks = [_cut(found.values())] if cut and window.stop is None else []
     return times - start, np.stack(states, axis=1), np.stack(commands, axis=1), tuple(remarks)
@@ -269,6 +269,13 @@ def _refuse_gaps(called: str, samples: _Samples, start: float, stop: float, dt: 
             f" apart, found {1e3 * gaps[place]:.4g} ms after {samples.times[place]:.6g} s; log it more often, choose a"
             " longer dt, or a part without that gap."
         )
+
+
+def _interpolated(samples: _Samples, state: State, times: Floats) -> Floats:
+    """Values between samples; of an angle that wraps between two of them by the short way, so that it jumps nowhere."""
+    turn = state.period or TURNS.get(state.unit)
+    values = samples.values if turn is None else np.unwrap(samples.values, period=turn)
+    return np.asarray(np.interp(times, samples.times, values))
 
 
 def _held(samples: _Samples, times: Floats) -> Floats:
