@@ -43,8 +43,7 @@ test: $(VENV)/.installed-test $(VENV)/.installed-others $(NATIVE) ## all tests, 
 	$(BIN)/python benchmarks/long_campaign.py --smoke
 	$(BIN)/python benchmarks/report.py --smoke
 	$(BIN)/python benchmarks/laws.py --smoke
-	$(BIN)/twinloop bench power --smoke
-	$(BIN)/twinloop bench zoo --smoke
+	$(BIN)/twinloop bench --smoke
 	$(BIN)/twinloop bench zoo --smoke --plants heater --ablation backtracking
 
 check: $(VENV)/.installed-check $(NATIVE) ## formatting, lints, types, layers

@@ -1,4 +1,4 @@
-"""The verb `twinloop bench power`: works the exam off, tunes the others, and prints the tables."""
+"""The verbs `twinloop bench`, and `bench power`: works the exam off, tunes the others, and prints the tables."""
 
 from __future__ import annotations
 
@@ -39,9 +39,18 @@ SMOKE_SEEDS = range(1)
 SMOKE_LEFT_OUT = ("ours-*", "without-*")
 
 
-@click.group()
-def bench() -> None:
+@click.group(invoke_without_command=True)
+@click.option("--smoke", is_flag=True, help="All studies in turn: do they run? The numbers mean nothing.")
+@click.pass_context
+def bench(context: click.Context, smoke: bool) -> None:
     """Compare Twinloop with others, and with its targets."""
+    if context.invoked_subcommand is not None:
+        context.default_map = {context.invoked_subcommand: {"smoke": smoke}}
+    elif not smoke:
+        click.echo(context.get_help())
+    else:
+        codes = (study.main(["--smoke"], standalone_mode=False) for study in (power, zoo))
+        context.exit(next((code for code in codes if code), 0))
 
 
 bench.add_command(zoo)

@@ -5,6 +5,7 @@ import json
 import math
 import sqlite3
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -12,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import twinloop as tl
+from command import invoke
 from twinloop import _core
 from twinloop.campaign.presets import options_of
 from twinloop.faces.cli import main
@@ -709,6 +711,44 @@ def test_a_smoke_run_without_optional_packages_says_what_it_left_out(monkeypatch
     assert "about" in done.stderr
     for words in ("quadrotor-0: normalised error on held-out controllers", "least-squares-integral", "Bars"):
         assert words in done.stdout
+
+
+@pytest.fixture
+def studies(monkeypatch):
+    """Stand-ins for the studies: what each was called with, and the code with which each ends."""
+    called, codes = [], {"power": 0, "zoo": 0}
+
+    def stand_in(name):
+        @click.pass_context
+        def study(context, smoke, **_):
+            called.append((name, smoke))
+            context.exit(codes[name])
+
+        return study
+
+    for name in codes:
+        monkeypatch.setattr(main.get_command(None, "bench").commands[name], "callback", stand_in(name))
+    return called, codes
+
+
+def test_a_smoke_run_of_bench_is_that_of_its_studies_in_turn(studies):
+    called, codes = studies
+    assert invoke("bench", "--smoke").exit_code == 0
+    assert called == [("power", True), ("zoo", True)]
+    codes["power"] = 1
+    assert invoke("bench", "--smoke").exit_code == 1
+
+
+def test_smoke_counts_before_the_name_of_a_study_too(studies):
+    called, _ = studies
+    assert [invoke("bench", *words).exit_code for words in (["--smoke", "zoo"], ["zoo"])] == [0, 0]
+    assert called == [("zoo", True), ("zoo", False)]
+
+
+def test_bench_alone_names_its_studies():
+    done = invoke("bench")
+    assert done.exit_code == 0 and done.stderr == ""
+    assert "power" in done.stdout and "zoo" in done.stdout
 
 
 def test_ctrl_c_keeps_what_was_measured_and_says_so(tmp_path, monkeypatch):
