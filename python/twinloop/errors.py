@@ -10,6 +10,7 @@ __all__ = [
     "InvalidInput",
     "NoAnswer",
     "NotAvailable",
+    "NotTrusted",
     "RemarkWarning",
     "StoreFailure",
     "SystemFailure",
@@ -68,6 +69,10 @@ class StoreFailure(TwinloopError, RuntimeError):
 
 class NotAvailable(TwinloopError, RuntimeError):
     """The requested value does not exist yet, or not in this installation."""
+
+
+class NotTrusted(NotAvailable):
+    """A twin fails its checks, or no controller can be answered for: learn from more tests."""
 
 
 class RemarkWarning(UserWarning):

@@ -455,8 +455,9 @@ class Campaign(Shown, Persistent, kind="campaign"):
         gains with `campaign.test`.
 
         Raises:
-            NotAvailable: there is no run; or, with "default", no controller to fly: no flight was completed, and the
-                twin does not support its preferred gains.
+            NotAvailable: there is no run.
+            NotTrusted: with "default", no controller to fly: no flight was completed, and the twin does not support
+                its preferred gains.
         """
         with self._at_work():
             self._learn()
@@ -548,7 +549,8 @@ class Campaign(Shown, Persistent, kind="campaign"):
 
         Raises:
             InvalidInput: no such kind, or a path that cannot be written.
-            NotAvailable: the twin fails a check, or the export could not be checked on its flights.
+            NotTrusted: the twin fails a check.
+            NotAvailable: the export could not be checked on its flights.
         """
         return taken_twin(self, to, kind, precision, force)
 

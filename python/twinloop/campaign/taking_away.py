@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from twinloop.errors import NotAvailable
+from twinloop.errors import NotTrusted
 from twinloop.law.exports.export import asked, delivered, exported_controller
 from twinloop.law.exports.gymnasium_source import Episode
 
@@ -20,9 +20,10 @@ def taken_twin(
     campaign: Campaign, to: str | Path, kind: str | None, precision: str, force: bool
 ) -> str | tuple[Path, ...]:
     """The twin as `Campaign.export_twin` describes it, with the campaign's task as the episode of an environment."""
+    asked(to, kind)  # refused before checks, which take their time
     failed = [] if force else [check for check in campaign.checks().failed if check.subject == "twin"]
     if failed:
-        raise NotAvailable(
+        raise NotTrusted(
             f"Export: expected a twin that holds its checks, found: {' '.join(map(str, failed))} Learn from more"
             " tests, or pass force=True (--force)."
         )

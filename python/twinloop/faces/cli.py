@@ -17,7 +17,7 @@ from twinloop._ground.arrays import share
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file
 from twinloop.campaign.presets import PRESETS, options_of, parsed
-from twinloop.errors import InvalidInput, NotAvailable, TwinloopError, unknown
+from twinloop.errors import InvalidInput, NotAvailable, NotTrusted, TwinloopError, unknown
 from twinloop.faces.by_hand import abandon, ask, attach, new, tell
 from twinloop.faces.certifying import certify
 from twinloop.faces.console import Watch
@@ -84,6 +84,8 @@ class OneSentence(click.Group):
                 code = super().main(args, prog_name, standalone_mode=False, **extra)
         except click.ClickException as misuse:
             _fail(misuse.format_message(), misuse.exit_code)
+        except NotTrusted as failure:
+            _fail(str(failure), 1)
         except (InvalidInput, NotAvailable) as misuse:
             _fail(str(misuse), 2)
         except TwinloopError as failure:

@@ -195,7 +195,8 @@ class Twin(Shown, Value, Recorded, kind="twin"):
 
         Raises:
             InvalidInput: no such kind, or a path that cannot be written.
-            NotAvailable: the twin does not follow its own flights, or the export could not be checked on them.
+            NotTrusted: the twin does not follow its own flights.
+            NotAvailable: the export could not be checked on them.
         """
         return taken_twin(self, to, kind, precision, force, episode)
 

@@ -270,7 +270,7 @@ def test_a_twin_that_does_not_follow_its_flights_is_exported_only_by_force(tmp_p
     bad = [TestErrors(i, 1.0, 2.0, 0.9, None, 2.0) for i in range(2)]
     twin = twin_of(PENDULUM, errors=bad)
     assert not twin.follows
-    with pytest.raises(NotAvailable, match="force=True"):
+    with pytest.raises(tl.NotTrusted, match="force=True"):
         twin.export(tmp_path / "twin.py")
     assert not (tmp_path / "twin.py").exists()
     assert twin.export(tmp_path / "twin.py", force=True) == (tmp_path / "twin.py",)
@@ -476,9 +476,29 @@ def test_a_campaign_whose_twin_fails_a_check_exports_it_only_by_force(new_campai
     campaign = new_campaign()
     campaign.run(pendulum, experiments=1)
     assert not campaign.checks().twin_passed
-    with pytest.raises(NotAvailable, match=r"holds its checks, found: .*Fly one more"):
+    with pytest.raises(tl.NotTrusted, match=r"holds its checks, found: .*Fly one more"):
         campaign.export_twin("python")
     assert "def simulate(" in campaign.export_twin("python", force=True)
+
+
+def test_an_unknown_kind_is_refused_before_the_twin_is_judged(new_campaign, pendulum, monkeypatch):
+    campaign = new_campaign()
+    campaign.run(pendulum, experiments=1)
+    monkeypatch.setattr(campaign, "checks", lambda: pytest.fail("judged"))
+    with pytest.raises(tl.InvalidInput, match="kind of export 'fnord'"):
+        campaign.export_twin("fnord")
+
+
+def test_a_twin_that_fails_its_checks_is_a_failure_and_an_unknown_kind_is_misuse(
+    tmp_path, new_campaign, pendulum
+):
+    pytest.importorskip("sqlalchemy")
+    store = tmp_path / "rig.db"
+    new_campaign(store=store).run(pendulum, experiments=1)
+    failed = run(store, "twin", "--to", "python")
+    assert failed.returncode == 1 and "holds its checks" in failed.stderr
+    misused = run(store, "twin", "--to", "fnord")
+    assert misused.returncode == 2 and "kind of export 'fnord'" in misused.stderr
 
 
 @pytest.mark.parametrize(

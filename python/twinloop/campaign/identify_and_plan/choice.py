@@ -22,7 +22,7 @@ from twinloop.campaign.identify_and_plan.track_record import (
     unproven_risk,
 )
 from twinloop.campaign.logbook import Logbook
-from twinloop.errors import NotAvailable
+from twinloop.errors import NotTrusted
 from twinloop.planning.gains import nearby
 from twinloop.planning.gusts import Moved
 from twinloop.planning.judging import Committee, Judged, expected, risk
@@ -62,7 +62,7 @@ class Choice:
             best: the best test flown; None if there is none.
 
         Raises:
-            NotAvailable: neither can be answered for.
+            NotTrusted: neither can be answered for.
         """
         flown = best if best is not None and standing.finishes(self.book, best.number) else None
         genes = np.stack([tuned] if flown is None else [tuned, flown.genes])
@@ -72,7 +72,7 @@ class Choice:
         refused = self._refused(members, judged, tuned, flown)
         if flown is None:
             if refused:
-                raise NotAvailable(
+                raise NotTrusted(
                     f"{UNKNOWN}{refused}, and no gains have completed a flight. Fly another controller that you"
                     " trust."
                 )

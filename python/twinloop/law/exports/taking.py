@@ -9,7 +9,7 @@ import numpy as np
 
 from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
-from twinloop.errors import NotAvailable
+from twinloop.errors import NotTrusted
 from twinloop.law.exports.augmented import augmented, begun
 from twinloop.law.exports.export import Source, asked, delivered, exported
 from twinloop.law.exports.gymnasium_source import Episode
@@ -31,7 +31,7 @@ def taken_twin(
     """The twin as `Twin.export` describes it."""
     chosen, path = asked(to, kind)
     if not force and not twin.follows:
-        raise NotAvailable(
+        raise NotTrusted(
             "Export: expected a twin that follows the flights that it was learnt from, found one that does not"
             " follow half of them; learn from more tests, or pass force=True (--force)."
         )
