@@ -15,7 +15,7 @@ def test_a_twin_from_logs_is_that_of_a_campaign_with_attached_runs():
     for run in runs:
         campaign.attach(run)
     assert twin.equations(17) == campaign.twin.equations(17)
-    assert [row.test for row in twin.errors] == [None, None]
+    assert [(row.test, row.attached) for row in twin.errors] == [(None, 1), (None, 2)]
 
 
 def test_it_foretells_a_run_that_it_has_not_seen():

@@ -63,6 +63,10 @@ def test_attached_flights_and_tests_are_learnt_together_in_the_order_they_came()
     campaign.tell(asked, PLANT.run(asked))
     campaign.attach(by_hand(12, seed=1))
     assert [row.test for row in campaign.twin.errors] == [0, None, 1, None]
+    assert [row.attached for row in campaign.twin.errors] == [None, 1, None, 2]
+    printed = str(campaign.twin.errors).splitlines()
+    assert [line.split()[0] for line in printed] == ["test", "0", "attached-1", "1", "attached-2"]
+    assert len({len(line) for line in printed}) == 1
     assert [run.before is None for run in campaign.experiments] == [True, True, False, False]
     ignorant = campaign.experiments[3].before
     assert ignorant is not None and ignorant < campaign.experiments[3].frozen

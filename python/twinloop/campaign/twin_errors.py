@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
@@ -60,8 +61,17 @@ def errors_of(
         A row for each experiment, in the order of `tell`.
     """
     steps, runs = _one_step_errors(model, book, workers), free_errors(model, book, workers, noise)
+    attached = count(1)
     return [
-        TestErrors(run.number, step, free.error, free.normalised, run.before, free.error)
+        TestErrors(
+            run.number,
+            step,
+            free.error,
+            free.normalised,
+            run.before,
+            free.error,
+            next(attached) if run.attached else None,
+        )
         for run, step, free in zip(book.experiments, steps, runs, strict=True)
     ]
 

@@ -47,7 +47,7 @@ def _campaign(campaign: Campaign) -> str:
 
 
 def _twin(twin: Twin) -> str:
-    rows = [[row.test, row.open_loop, row.closed_loop, row.normalised, row.before] for row in twin.errors]
+    rows = [[row.run, row.open_loop, row.closed_loop, row.normalised, row.before] for row in twin.errors]
     head = ["test", "one step", "whole flight", "normalised", "before it was learnt"]
     return f"<pre>{escape(twin.equations())}</pre>" + _table(head, rows)
 

@@ -28,9 +28,11 @@ class TestErrors(Recorded, kind="test_errors"):
         normalised: closed_loop over that of the model that never moves; 1 means useless.
         before: closed-loop error of the twin at the last `ask` before the run; None if there was no `ask` yet.
         after: closed-loop error now.
+        attached: of an attached run, its number among these, from 1; None for a run of a test.
     """
 
     __test__ = False
+    VERSION = 2
 
     test: int | None
     open_loop: float
@@ -38,6 +40,14 @@ class TestErrors(Recorded, kind="test_errors"):
     normalised: float
     before: float | None
     after: float
+    attached: int | None = None
+
+    @property
+    def run(self) -> str:
+        """What the run is called: the number of its test, or attached-1, attached-2 …, as `withdraw` calls it."""
+        if self.test is not None:
+            return str(self.test)
+        return "-" if self.attached is None else f"attached-{self.attached}"
 
 
 class ErrorTable(tuple[TestErrors, ...]):
@@ -57,16 +67,17 @@ class ErrorTable(tuple[TestErrors, ...]):
 
     def __str__(self) -> str:
         """A table as text."""
+        names = [row.run for row in self]
+        width = max(map(len, ["test", *names]))
         head = (
-            f"{'test':>4}  {'open loop':>10}  {'closed loop':>11}  {'normalised':>10}  {'before':>10} "
+            f"{'test':>{width}}  {'open loop':>10}  {'closed loop':>11}  {'normalised':>10}  {'before':>10} "
             f" {'after':>10}"
         )
         lines = [head]
-        for row in self:
+        for name, row in zip(names, self, strict=True):
             before = "-" if row.before is None else f"{row.before:.4g}"
-            test = "-" if row.test is None else row.test
             lines.append(
-                f"{test:>4}  {row.open_loop:>10.4g}  {row.closed_loop:>11.4g}  {row.normalised:>10.4g}  "
+                f"{name:>{width}}  {row.open_loop:>10.4g}  {row.closed_loop:>11.4g}  {row.normalised:>10.4g}  "
                 f"{before:>10}  {row.after:>10.4g}"
             )
         return "\n".join(lines)
