@@ -37,7 +37,7 @@ SECTIONS = {
     "Errors": ["errors.*"],
 }
 """Headings, with the names below each; `*` stands for all of a room that no heading before it has."""
-HANDLES = {"engine", "task", "dynamics"}
+HANDLES = {"engine", "dynamics"}
 """Members that give the engine what it reads itself."""
 
 
@@ -104,7 +104,7 @@ def block(line):
 
 def entry(name, thing):
     """The part of the page on a class, a function or a value."""
-    if not callable(thing):
+    if not inspect.isclass(thing) and not inspect.isroutine(thing):
         parts = [prose(flowing(said_of(name)))]
     elif thing.__module__ == "twinloop._core":
         parts = of_the_engine(thing)
@@ -131,7 +131,7 @@ def said_of(name):
     """The string behind the assignment of a room's value, in the room or in the module that it comes from."""
     room, _, value = name.rpartition(".")
     source = inspect.getsource(getattr(tl, room))
-    come_from = re.findall(rf"^from (\S+) import .*\b{value}\b", source, re.MULTILINE)
+    come_from = re.findall(rf"^from (\S+) import (?:\([^)]*|.*)\b{value}\b", source, re.MULTILINE)
     body = ast.parse(inspect.getsource(import_module(come_from[0])) if come_from else source).body
     for at, following in pairwise(body):
         if isinstance(at, (ast.Assign, ast.AnnAssign)) and ast.unparse(at).partition(":")[0].startswith(

@@ -1,6 +1,8 @@
 """Types of what campaigns, tests and twins give back: names for annotations and `isinstance`. Nobody builds them."""
 
-from twinloop._core import Flights, Model, ModelSearch, Program, Quality, SelectedTests
+from typing import TYPE_CHECKING
+
+from twinloop._core import Flights, Model, ModelSearch, Program, Quality, SelectedTests, Task
 from twinloop._experiment.hold_back import HoldBack
 from twinloop.campaign.assessment import Advice
 from twinloop.campaign.certificate import Certificate, Use
@@ -20,6 +22,7 @@ from twinloop.campaign.examination.steps import StepAnswer
 from twinloop.campaign.examination.unseen import Unseen
 from twinloop.campaign.examination.use import Effort, GainSlope
 from twinloop.campaign.history import (
+    Cause,
     Experiment,
     Failure,
     Iteration,
@@ -39,11 +42,15 @@ from twinloop.law.linear.state_space import Linear
 from twinloop.law.noise import CorrelatedDisturbance, Noise
 from twinloop.law.reports import Computed, Held
 
+if TYPE_CHECKING:
+    from twinloop.faces.figures.plots import Plots
+
 __all__ = [
     "Actuation",
     "Actuator",
     "Advice",
     "Beside",
+    "Cause",
     "Certificate",
     "Check",
     "Checks",
@@ -82,6 +89,7 @@ __all__ = [
     "ModelSearch",
     "Noise",
     "Planned",
+    "Plots",
     "Pole",
     "Program",
     "Progress",
@@ -91,9 +99,19 @@ __all__ = [
     "Span",
     "StateFit",
     "StepAnswer",
+    "Task",
     "TestErrors",
     "TestLoop",
     "Unseen",
     "Use",
     "Withdrawal",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """What draws campaigns, which is loaded when it is asked for."""
+    if name != "Plots":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from twinloop.faces.figures.plots import Plots
+
+    return Plots

@@ -12,7 +12,7 @@ import twinloop as tl
 from lives import begun
 from twinloop.faces.figures.plots import Plots
 
-HANDLES = {"engine", "setting", "task", "dynamics"}
+HANDLES = {"engine", "setting", "dynamics"}
 """Members that give the engine what it reads itself; nobody annotates with these."""
 
 
@@ -41,7 +41,7 @@ def classes_in(hint):
 
 def hints_of(thing, owner=None):
     """Type hints by name; `Self` and `Plots`, a face, are imported for type checkers alone."""
-    return typing.get_type_hints(thing, localns={"Self": owner, "Plots": object})
+    return typing.get_type_hints(thing, localns={"Self": owner, "Plots": Plots})
 
 
 def meant(member):
@@ -104,7 +104,8 @@ def test_importing_the_package_loads_no_face_no_study_and_no_optional_package():
 def test_every_public_room_says_which_of_its_names_are_meant(room):
     names = rooms()[room].__all__
     assert len(names) == len(set(names)) and not any(name.startswith("_") for name in names)
-    assert all(getattr(rooms()[room], name).__doc__ for name in names)
+    found = [getattr(rooms()[room], name) for name in names]
+    assert all(each.__doc__ for each in found if typing.get_origin(each) is not typing.Literal)
 
 
 def test_every_type_that_a_public_member_gives_back_has_a_public_name():
@@ -113,7 +114,14 @@ def test_every_type_that_a_public_member_gives_back_has_a_public_name():
 
 def test_what_draws_a_campaign_has_its_type():
     assert tl.Campaign.plot.fget.__annotations__["return"] == "Plots"
-    assert type(begun().plot) is Plots
+    assert type(begun().plot) is tl.results.Plots is Plots
+
+
+def test_causes_and_tasks_have_names():
+    assert set(typing.get_args(tl.results.Cause)) == {"disturbance", "law", "undecided"}
+    assert isinstance(begun().experiments[0].test.task, tl.results.Task)
+    with pytest.raises(AttributeError, match="'Plot'"):
+        _ = tl.results.Plot
 
 
 def test_a_type_without_a_name_is_found_wherever_it_hides(monkeypatch):
