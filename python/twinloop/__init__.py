@@ -1,5 +1,8 @@
 """Twinloop: from a handful of experiments to a twin made of readable equations and a tuned controller."""
 
+from twinloop._ground import loading as _loading  # noqa: F401 before all that takes its time
+
+# isort: split
 from twinloop import (
     autopilots,
     contracts,

@@ -14,6 +14,7 @@ from click.core import ParameterSource
 
 from twinloop import __version__
 from twinloop._ground.arrays import share
+from twinloop._ground.loading import INTERRUPTED, NO_RESULT
 from twinloop.campaign import Campaign
 from twinloop.campaign.campaign_file import read_file
 from twinloop.campaign.presets import PRESETS, options_of, parsed
@@ -91,7 +92,7 @@ class OneSentence(click.Group):
         except TwinloopError as failure:
             _fail(str(failure), 1)
         except (click.Abort, KeyboardInterrupt):
-            _fail("Interrupted before there was a result.", 130)
+            _fail(NO_RESULT, INTERRUPTED)
         except OSError as failure:
             _fail(f"The system refused: {failure}.", 1)
         sys.exit(code if isinstance(code, int) else 0)

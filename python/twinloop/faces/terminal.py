@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from twinloop._ground.loading import heard
 from twinloop.errors import RemarkWarning
 
 DASHES = "─–—−"
@@ -25,7 +26,7 @@ NEAREST = "twinloop.nearest"
 
 @contextmanager
 def prepared() -> Iterator[None]:
-    """A command's surroundings: no text is too much for standard output and error, and SIGTERM is Ctrl-C.
+    """A command's surroundings: no text is too much for standard output and error, Ctrl-C is heard, SIGTERM as well.
 
     Remarks are in the result that is shown, and so are no warnings beside it.
     """
@@ -41,6 +42,7 @@ def prepared() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    heard()
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
