@@ -73,3 +73,16 @@ def test_a_wrong_sign_is_no_body():
     assert [remark.code for remark in said(turned, signals())] and "body-rates" not in [
         remark.code for remark in said(turned, signals())
     ]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_angle_that_wraps_is_followed_round_and_a_wrong_sign_is_seen_all_the_same(sign):
+    t = 0.05 * np.arange(201)
+    angle, rate = 3.0 * t + np.sin(2.0 * t), 3.0 + 2.0 * np.cos(2.0 * t)
+    known = tl.Signals(
+        [tl.State("angle", "rad", 3.0, periodic=True), tl.State("rate", "rad/s", 8.0, derivative_of="angle")],
+        [tl.Command("u", "1", (-1.0, 1.0))], 0.05,
+    )  # fmt: skip
+    states = np.stack([np.angle(np.exp(1j * angle)), sign * rate], axis=1)
+    found = said(tl.Trajectory(t, states, np.zeros((200, 1))), known)
+    assert [remark.code for remark in found] == ([] if sign > 0.0 else ["derivative"])

@@ -37,7 +37,7 @@ def against_derivatives(recorded: Sequence[Trajectory], signals: Signals) -> Ite
         recorded: runs, periodic states among them as they were wrapped.
         signals: of the system.
     """
-    runs = [Run.of(run.states, run.commands) for run in recorded]
+    runs = [Run.of(run.states, run.commands).continued(signals) for run in recorded]
     noise = guessed_noise(runs, np.array([state.scale for state in signals.states]))
     body = _as_a_body(runs, signals, noise)
     if body is not None:
