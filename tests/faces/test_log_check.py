@@ -37,6 +37,7 @@ def test_nothing_is_said_against_a_good_log(checked):
     said = checked()
     assert said.exit_code == 0 and "The log can be used for learning." in said.stdout
     assert "121 rows over 6 s, one in 50 ms (20 Hz)" in said.stdout and "✗" not in said.stdout
+    assert "○" not in said.stdout
     found = json.loads(checked(lambda log: None, "--json").stdout)
     assert found["fit"] and found["gaps"] == 0 and found["period"] == pytest.approx(0.05)
     angle, rate, torque = found["columns"]
@@ -98,6 +99,7 @@ NOTES = {
     "constant-command": (changed("torque", 1.0), "torque is 1 N m in every row"),
     "saturated": (changed("torque", lambda u: np.sign(u) * 2.0), "at a bound in 100 %"),
     "envelope": (changed("rate", lambda x: np.where(np.arange(len(x)) == 60, 13.0, x)), "outside its envelope"),
+    "late": (changed("angle", lambda x: np.r_[[x[0]] * 2, x[:-2]]), "later than rate, which moves it"),
     "little-moved": (
         changed("rate", lambda x: np.random.default_rng(4).normal(size=x.shape)), "little can be learnt about it"
     ),

@@ -19,7 +19,7 @@ FRONTS = {
     "autopilots": "declared files sweep",
     "campaign": "assessment campaign_file certificate cost from_logs history keeping presets remaining setup",
     "campaign/coevolution": "method search",
-    "campaign/data": "declared levels readings reports sent wrapped",
+    "campaign/data": "declared lateness levels readings reports sent wrapped",
     "campaign/examination": (
         "beside check checking correlation data examination frequency learning log_check loops poles "
         "rivals steps unseen use"

@@ -46,6 +46,23 @@ def test_the_halves_are_the_zoo_and_share_no_plant():
 
 
 @pytest.mark.parametrize("name", PLANTS)
+def test_a_log_of_a_first_flight_is_called_late_only_where_sensors_are(name):
+    found = there(name)
+    asked, system = found.asked, found.make(0)
+    campaign = tl.Campaign(
+        system.signals, controller=asked.controller, initial_state=asked.start, target_state=asked.target,
+        duration=asked.duration, threads=1, progress=None,
+    )  # fmt: skip
+    test = campaign.test(asked.first)
+    said = []
+    for run in (system.run(test), found.truth.run(test)):
+        said += tl.check_log(run.t, run.states, run.commands, system.signals).remarks
+    lines = [one.sentence for one in said if one.code in ("late", "alike-commands", "fed-back")]
+    assert all("ms later than p, q and r" in line for line in lines)
+    assert bool(lines) == (name == "body-late")
+
+
+@pytest.mark.parametrize("name", PLANTS)
 def test_a_plant_keeps_to_the_contracts(name):
     found = there(name)
     asked = found.asked

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from twinloop._experiment.limits import Limits
 from twinloop._ground.arrays import Floats
 from twinloop._ground.texts import in_unit
 from twinloop.campaign.data.declared import against_derivatives
+from twinloop.campaign.data.lateness import late
 from twinloop.campaign.data.readings import suspicious
 from twinloop.campaign.data.sent import (
     exchanged,
@@ -19,6 +20,7 @@ from twinloop.campaign.data.sent import (
     other_commands,
 )
 from twinloop.campaign.data.wrapped import without_turns
+from twinloop.campaign.examination.told_apart import alike
 from twinloop.campaign.excited import excited
 from twinloop.campaign.history import Experiment
 from twinloop.errors import InvalidInput, in_file, row_name
@@ -36,6 +38,9 @@ SATURATED = 0.5
 """Share of the rows at a bound above which a command says little."""
 SMALL = 1e-3
 """Share of its scale within which a state that moved may be in another unit."""
+
+AS_LATE = frozenset({"repeated-readings", "derived-rate"})
+"""Remarks that say already why a state comes later than another."""
 
 
 @dataclass(frozen=True)
@@ -332,9 +337,19 @@ def _of_run(
         return [remark for remark in suspicious([run], signals) if remark.serious]
     runs, found = without_turns([run], signals, lambda _, row: f"at {row_name(row, lines)}, {run.t[row]:g} s")
     found += [*against_derivatives(runs, signals), *suspicious(runs, signals)]
+    if not known and not any(remark.serious for remark in found):
+        found += _of_columns(run, signals, {remark.code for remark in found})
     if not known:
         try:
             check_recorded(run, Limits(signals), None)
         except InvalidInput as reason:
             found.append(serious("refused", in_file(reason, lines)))
     return found
+
+
+def _of_columns(run: Trajectory, signals: Signals, codes: Set[str]) -> Iterator[Remark]:
+    """What columns that are right by themselves say beside each other."""
+    states = signals.continued(run.states, run.states[0])
+    if not codes & AS_LATE:
+        yield from late(states, signals)
+    yield from alike(states[:-1], run.commands, signals)
